@@ -1,0 +1,37 @@
+# Every target works from a bare checkout and reinstalls nothing on a second call.
+PY := .venv/bin/python
+STAMP := .venv/.installed
+DEV_STAMP := .venv/.installed-dev
+PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
+
+.PHONY: demo test lint types bench clean
+
+demo: $(STAMP)
+	.venv/bin/vrs demo
+
+test: $(DEV_STAMP) lint types
+	$(PY) -m pytest -n 2
+
+lint: $(DEV_STAMP)
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+
+types: $(DEV_STAMP)
+	.venv/bin/mypy
+
+bench: $(DEV_STAMP)
+	$(PY) -m benchmarks
+
+$(PY):
+	@sh .ci/venv
+
+$(STAMP): pyproject.toml constraints.txt | $(PY)
+	$(PIP) -e .
+	@touch $@
+
+$(DEV_STAMP): $(STAMP)
+	$(PIP) -e '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf .venv build dist *.egg-info out

@@ -1,0 +1,83 @@
+"""Speed of the simulated PUMA against a bare PyBullet loop, in the same run.
+
+Blocks of both alternate, so that a busy machine slows both; the median and the worst block are shown.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from robots.bullet import Payload, Reality, World, load_arm
+from robots.puma560.body import RealArm, puma_links
+from robots.puma560.parameters import POSES, default_limits
+from vrs.model import Array
+
+BLOCK = 500
+"""Steps a block."""
+
+
+def references(steps: int, *, speed: float = 0.9, dt: float = 1e-3) -> tuple[Array, Array, Array]:
+    """Return sinusoids about `nominal` that reach a share of the joint speeds, as q, qd, qdd, (steps, 6)."""
+    limits = default_limits()
+    omega = np.minimum(limits.qdd_max / limits.qd_max, 2 * np.pi * np.array([0.5, 0.6, 0.7, 0.55, 0.65, 0.75]))
+    size = speed * limits.qd_max / omega
+    phase = np.outer(np.arange(1, steps + 1) * dt, omega)
+    q = POSES["nominal"] + size * (1 - np.cos(phase)) / 2
+    return q, size * omega * np.sin(phase) / 2, size * omega**2 * np.cos(phase) / 2
+
+
+def bare_loop(world: World, body: int, torques: Array) -> None:
+    """Set torques, step, read the joints: the least that any PyBullet arm does."""
+    bullet, client, joints = world.bullet, world.client, tuple(range(6))
+    for tau in torques.tolist():
+        bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=tau, physicsClientId=client)
+        bullet.stepSimulation(physicsClientId=client)
+        bullet.getJointStates(body, joints, physicsClientId=client)
+
+
+def seconds(action: Callable[[], object]) -> float:
+    """Return the processor time that an action takes [s]."""
+    start = time.process_time()
+    action()
+    return time.process_time() - start
+
+
+def measure(blocks: int = 20) -> dict[str, float]:
+    """Return microseconds a step, times real time, and the ratio to the bare loop."""
+    q, qd, qdd = references(blocks * BLOCK)
+    arm_s, bare_s = [], []
+    with (
+        RealArm(Reality(), q=POSES["nominal"], payload=Payload(2.5)) as arm,
+        World(gravity=9.81, dt=1e-3) as world,
+    ):
+        body = load_arm(world, puma_links())
+        arm.run(q[:1], qd[:1], qdd[:1])
+        for i in range(blocks):
+            part = slice(i * BLOCK, (i + 1) * BLOCK)
+            arm_s.append(seconds(partial(arm.run, q[part], qd[part], qdd[part])))
+            bare_s.append(seconds(partial(bare_loop, world, body, np.zeros((BLOCK, 6)))))
+    step = statistics.median(arm_s) / BLOCK
+    bare = statistics.median(bare_s) / BLOCK
+    return {
+        "arm_us": step * 1e6,
+        "arm_best_us": min(arm_s) / BLOCK * 1e6,
+        "arm_worst_us": max(arm_s) / BLOCK * 1e6,
+        "bare_us": bare * 1e6,
+        "times_real_time": 1e-3 / step,
+        "ratio_to_bare": statistics.median(a / b for a, b in zip(arm_s, bare_s, strict=True)),
+    }
+
+
+def main() -> None:
+    """Print the figures as JSON."""
+    print(json.dumps({name: round(value, 2) for name, value in measure().items()}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

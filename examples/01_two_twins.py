@@ -1,0 +1,24 @@
+"""A virtual and a real robot on one plan, half a second apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from interfaces.link import delay_profile
+from interfaces.runtime.attribution import measures
+from interfaces.runtime.bodies import simulated_puma
+from interfaces.runtime.plan import parse_plan
+from interfaces.runtime.virtual import run_twins
+from robots import puma560
+
+PLAN = b"""{"issue": 0.0, "execute": 0.5, "move": [20, 50, -160, 0, 30, 0], "speed": 0.6}
+{"issue": 0.8, "execute": 1.0, "move": [-10, 60, -170, 0, 30, 0], "speed": 0.6}"""
+
+model = puma560.model()
+plan = parse_plan(PLAN, "two moves", model)
+run = run_twins(plan, model, delay_profile("constant:0.5"), simulated_puma(), seed=0)
+errors = measures(run)
+print(f"clock offset D = {run.D:.3f} s")
+print(f"tool apart at equal user time:     {1e3 * errors.tool_rms_user_m:8.3f} mm rms")
+print(f"tool apart at equal timeline time: {1e3 * errors.tool_rms_timeline_m:8.3f} mm rms")
+print(f"joints apart at equal timeline time: {np.degrees(errors.joint_rms_timeline_rad):.4f} deg rms")

@@ -1,0 +1,1 @@
+"""Everything that joins a person or a machine to a robot."""

@@ -1,0 +1,123 @@
+"""The report of a run: one HTML file that opens without a network."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from html import escape
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from interfaces.report.markup import card, figures, receipts, table, tiles, words
+from interfaces.report.plots import Plot, plots
+from interfaces.report.scene import scene
+from interfaces.runtime.run import TwinRun
+from vrs.errors import FormatError
+
+
+def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> None:
+    """Write the report of a run; equal runs give equal bytes.
+
+    Args:
+        path: The file to write.
+        run: Both twins.
+        summary: Its figures, as `interfaces.report.summary.summarize` gives them.
+
+    Raises:
+        FormatError: If the installed MeshCat has no viewer bundle.
+        OSError: If the file can't be written.
+    """
+    Path(path).write_text(render(run, summary), encoding="utf-8", newline="\n")
+
+
+def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
+    """Return the report as one HTML text."""
+    viewer, licences = viewer_bundle()
+    drawn = plots(run)
+    return Template(_asset("report.html")).substitute(
+        title=escape(run.title or "Twin run"),
+        css=_asset("report.css"),
+        facts=_facts(run, summary),
+        tiles=tiles(summary),
+        plots="".join(_figure(plot) for plot in drawn if not plot.is_joint),
+        joints="".join(_figure(plot) for plot in drawn if plot.is_joint),
+        figures=figures(summary),
+        receipts=receipts("Virtual robot", run.receipts_virtual) + receipts("Real robot", run.receipts_real),
+        events=_events(run),
+        licences=escape(licences),
+        data=_script_json(scene(run)),
+        viewer=_script(viewer),
+        script=_script(_asset("report.js")),
+    )
+
+
+@lru_cache(maxsize=1)
+def viewer_bundle() -> tuple[str, str]:
+    """Find MeshCat's viewer and its licence texts without importing MeshCat.
+
+    Raises:
+        FormatError: If it isn't installed or has no bundle.
+    """
+    spec = find_spec("meshcat")
+    if spec is None or spec.origin is None:
+        raise FormatError("meshcat", "not installed; the report's 3D view is its viewer bundle")
+    root = Path(spec.origin).parent / "viewer"
+    bundle = root / "dist" / "main.min.js"
+    if not bundle.is_file():
+        raise FormatError(str(bundle), "missing; reinstall meshcat")
+    texts = [root / "LICENSE", root / "dist" / "main.min.js.LICENSE.txt"]
+    licences = "\n\n".join(text.read_text(encoding="utf-8").strip() for text in texts if text.is_file())
+    return bundle.read_text(encoding="utf-8"), licences
+
+
+def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:
+    order = ", then ".join(words(str(cause)) for cause in summary.get("attribution_order", ()))
+    facts = {
+        "robot": run.model.name,
+        "delay": run.delay,
+        "clock offset D": f"{run.D:.3f} s".replace("-", "−"),
+        "seed": str(run.seed),
+        "duration": f"{run.t[-1] - run.t[0]:.1f} s",
+        "commands": str(len(run.receipts_virtual)),
+        "counterfactuals off": order,
+    }
+    return "".join(f"<li><span>{name}</span>{escape(value)}</li>" for name, value in facts.items() if value)
+
+
+def _figure(plot: Plot) -> str:
+    note = f"<figcaption>{escape(plot.note)}</figcaption>" if plot.note else ""
+    cursor = (
+        f'<div class="cursor" hidden data-low="{plot.low!r}" data-high="{plot.high!r}" '
+        f'data-left="{plot.left:.5f}" data-right="{plot.right:.5f}"></div>'
+    )
+    return (
+        f'<figure class="card" id="plot-{plot.name}"><h3>{escape(plot.title)}</h3>'
+        f'<div class="plot">{plot.svg}{cursor}</div>{note}</figure>'
+    )
+
+
+def _events(run: TwinRun) -> str:
+    if not run.events:
+        return ""
+    rows = [(f"{event.t:.2f} s", event.kind, event.text) for event in run.events]
+    return "<h2>Events</h2>" + card("By user time", table(("time", "kind", "what"), rows))
+
+
+def _asset(name: str) -> str:
+    return resources.files("interfaces.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _script_json(value: object) -> str:
+    """JSON that no browser takes for markup."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _script(text: str) -> str:
+    """Keep a script's own strings from ending its element."""
+    return re.sub(r"</(script)", r"<\\/\1", text, flags=re.IGNORECASE).replace("<!--", "<\\!--")

@@ -1,0 +1,214 @@
+"""Tables of the report as HTML. Everything that comes from a user or a run is escaped here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any, Final
+
+from interfaces.report.tables import MEASURES, ROWS
+from vrs.commands import Receipt
+
+Json = Mapping[str, Any]
+
+ELSEWHERE: Final = frozenset(
+    {
+        "schema",
+        "title",
+        "robot",
+        "seed",
+        "delay",
+        "receipts_virtual",
+        "receipts_real",
+        "packets",
+        "events",
+        "attribution_order",
+        "errors",
+        "attribution",
+        "commands",
+        "path",
+    }
+)
+"""Parts of a summary that the report shows in a form of its own."""
+UNITS: Final = {
+    "path_error": "mm", "time_difference": "s", "speed_error": "m/s", "progress": "%", "cell": "m", "v_max": "m/s",
+}  # fmt: skip
+"""Units of the figures on the tool path, by the start of their names."""
+SUFFIXES: Final = {"_deg": "deg", "_rad": "rad", "_m": "mm", "_s": "s"}
+SCALES: Final = {"mm": 1e3, "%": 100.0}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, markup: bool = False) -> str:
+    """Build a table whose first column names the row and whose numbers stand right.
+
+    Args:
+        head: Column heads.
+        rows: Cells; texts are escaped.
+        markup: Whether cells that are texts are HTML already.
+    """
+    body = [[_cell(value, markup) for value in row] for row in rows]
+    numeric = [
+        bool(body) and all(row[i][1] for row in body) and any(row[i][0] != "–" for row in body)
+        for i in range(len(head))
+    ]
+    style = [' class="number"' if is_number else "" for is_number in numeric]
+    top = "".join(f'<th scope="col"{style[i]}>{escape(text)}</th>' for i, text in enumerate(head))
+    lines = []
+    for row in body:
+        first = f'<th scope="row"{style[0]}>{row[0][0]}</th>'
+        rest = "".join(f"<td{style[i + 1]}>{text}</td>" for i, (text, _) in enumerate(row[1:]))
+        lines.append(f"<tr>{first}{rest}</tr>")
+    thead = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
+    return f'<div class="scroll"><table>{thead}<tbody>{"".join(lines)}</tbody></table></div>'
+
+
+def card(title: str, body: str, note: str = "", *, wide: bool = False) -> str:
+    """Frame a piece of the page."""
+    hint = f'<p class="note">{escape(note)}</p>' if note else ""
+    return f'<section class="card{" wide" if wide else ""}"><h3>{escape(title)}</h3>{body}{hint}</section>'
+
+
+def tiles(summary: Json) -> str:
+    """Build the few figures that a reader looks for first, as far as the summary has them."""
+    timeline = _part(_part(summary, "errors"), "timeline_time")
+    user = _part(_part(summary, "errors"), "user_time")
+    path, commands = _part(summary, "path"), _part(summary, "commands")
+    joint_rms = timeline.get("joint_rms_deg") or [None]
+    late, lost = commands.get("late"), commands.get("lost")
+    found = [
+        (_with_unit(max(joint_rms, key=lambda x: x or 0.0), "deg"), "worst joint, rms, equal timeline time"),
+        (_with_unit(timeline.get("tool_rms_m"), "mm"), "tool, rms, equal timeline time"),
+        (_with_unit(user.get("tool_rms_m"), "mm"), "tool, rms, as the user sees it"),
+        (_with_unit(path.get("time_difference_mean"), "s"), "mean time difference along the path"),
+        (None if late is None or lost is None else f"{late} / {lost}", "commands late / lost"),
+    ]
+    shown = [
+        f'<div class="card tile"><b>{escape(value)}</b><span>{escape(label)}</span></div>'
+        for value, label in found
+        if value is not None
+    ]
+    return f'<h2>In short</h2><div class="tiles">{"".join(shown)}</div>' if shown else ""
+
+
+def figures(summary: Json) -> str:
+    """Build the tables of every figure in a summary, also of those that this module doesn't know by name."""
+    out = []
+    if errors := _part(summary, "errors"):
+        out.append(card("Errors, real against virtual", _errors(errors), wide=True))
+    if attribution := summary.get("attribution"):
+        order = [str(cause) for cause in summary.get("attribution_order", attribution[0]["parts"])]
+        note = f"Counterfactual runs, switched off one after the other: {', then '.join(map(words, order))}."
+        out.append(card("Where the error comes from (rms)", _attribution(attribution, order), note, wide=True))
+    if path := _part(summary, "path"):
+        rows = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
+        out.append(card("Tool path and time difference, user time", table(("", ""), rows)))
+    if commands := _part(summary, "commands"):
+        out.append(card("Commands", table(("", ""), _flat(commands))))
+    rest = {name: value for name, value in summary.items() if name not in ELSEWHERE}
+    if rest:
+        out.append(card("The run", table(("", ""), _flat(rest))))
+    return "".join(out)
+
+
+def receipts(title: str, items: Sequence[Receipt]) -> str:
+    """Build the table of one engine's receipts."""
+    head = ("id", "status", "asked [s]", "execute [s]", "end [s]", "reason")
+    rows = []
+    for r in items:
+        status = f'<span class="status status-{escape(str(r.status))}">{escape(str(r.status))}</span>'
+        reason = r.reason
+        if r.superseded_by is not None:
+            reason += f"{'; ' if reason else ''}superseded by {r.superseded_by}"
+        rows.append((str(r.command_id), status, r.asked_at, r.execute_at, r.end, escape(reason)))
+    body = table(head, rows, markup=True) if rows else '<p class="note">None.</p>'
+    return card(title, body)
+
+
+def words(name: str) -> str:
+    """Turn a name of the summary into words, its unit taken off."""
+    for suffix in SUFFIXES:
+        name = name.removesuffix(suffix)
+    return name.replace("_", " ")
+
+
+def _errors(errors: Json) -> str:
+    labels = {key: label.removeprefix("… ") for key, label in ROWS}
+    columns = [str(key) for key in errors]
+    names: dict[str, None] = {str(name): None for key in columns for name in errors[key]}
+    rows: list[list[object]] = []
+    for name in names:
+        values = [errors[key].get(name) for key in columns]
+        unit = _unit(name)
+        size = max((len(v) for v in values if isinstance(v, list)), default=0)
+        if not size:
+            rows.append([_label(name, unit), *(_scaled(v, unit) for v in values)])
+        for j in range(size):
+            label = _label(name.replace("joint_", f"joint_{j + 1}_", 1), unit)
+            rows.append([label, *(_scaled(v[j], unit) if isinstance(v, list) else None for v in values)])
+    return table(("", *(labels.get(key, words(key)) for key in columns)), rows)
+
+
+def _attribution(items: Sequence[Json], order: Sequence[str]) -> str:
+    rows = []
+    for item in items:
+        label, scale, unit = MEASURES.get(item["measure"], (words(item["measure"]), 1.0, _unit(item["measure"])))
+        values = [item["total"], *(item["parts"].get(cause) for cause in order), item["residual"]]
+        rows.append([f"{label} [{unit}]", *(None if v is None else scale * float(v) for v in values)])
+    return table(("", "total", *map(words, order), "residual"), rows)
+
+
+def _flat(values: Json, prefix: str = "") -> list[tuple[str, object]]:
+    rows: list[tuple[str, object]] = []
+    for name, value in values.items():
+        label = f"{prefix}{words(str(name))}"
+        if isinstance(value, Mapping):
+            rows.extend(_flat(value, f"{label}: "))
+        elif isinstance(value, (list, tuple)):
+            rows.append((label, ", ".join(_number(x) if isinstance(x, float) else str(x) for x in value)))
+        else:
+            rows.append((label, _with_unit(value, _unit(str(name)))))
+    return rows
+
+
+def _part(values: Json, name: str) -> Json:
+    part = values.get(name)
+    return part if isinstance(part, Mapping) else {}
+
+
+def _unit(name: str) -> str:
+    return next((unit for suffix, unit in SUFFIXES.items() if name.endswith(suffix)), "")
+
+
+def _path_unit(name: str) -> str:
+    return next((unit for start, unit in UNITS.items() if name.startswith(start)), _unit(name))
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{words(name)} [{unit}]" if unit else words(name)
+
+
+def _scaled(value: object, unit: str) -> object:
+    return value * SCALES.get(unit, 1.0) if isinstance(value, float) else value
+
+
+def _with_unit(value: object, unit: str) -> str | None:
+    """Text of a figure in its unit; None where it isn't defined."""
+    if value is None or isinstance(value, str):
+        return value
+    text = _number(_scaled(value, unit))
+    return f"{text} {unit}" if unit else text
+
+
+def _number(value: object) -> str:
+    if isinstance(value, bool) or not isinstance(value, float):
+        return str(value)
+    return f"{value:.0f}" if abs(value) >= 1e4 else f"{round(value, 3) + 0.0:.3f}".replace("-", "−")
+
+
+def _cell(value: object, markup: bool) -> tuple[str, bool]:
+    """A cell's HTML and whether it may stand in a column of numbers."""
+    if value is None:
+        return "–", True
+    if isinstance(value, str):
+        return (value if markup else escape(value)), False
+    return escape(_number(value)), True

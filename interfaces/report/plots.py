@@ -1,0 +1,251 @@
+"""The report's plots, as SVG that takes its colours from the page and repeats byte for byte."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from interfaces.runtime.run import TwinRun
+from vrs.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Stand-ins that the SVG backend writes out literally; the page's style sheet gives the real colours.
+_COLOURS: Final = {
+    "#010101": "var(--ink)",
+    "#020202": "var(--muted)",
+    "#030303": "var(--line)",
+    "#040404": "var(--virtual)",
+    "#050505": "var(--real)",
+    "#060606": "var(--bad)",
+    "#0a0101": "var(--j1)",
+    "#0a0202": "var(--j2)",
+    "#0a0303": "var(--j3)",
+    "#0a0404": "var(--j4)",
+    "#0a0505": "var(--j5)",
+    "#0a0606": "var(--j6)",
+}
+INK, MUTED, LINE, VIRTUAL, REAL, BAD = list(_COLOURS)[:6]
+JOINTS: Final = tuple(list(_COLOURS)[6:])
+MAX_POINTS: Final = 6_000
+"""Most samples of a curve that are handed to the plotter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """One plot of the report."""
+
+    name: str
+    """Short name, unique in the page."""
+    title: str
+    svg: str
+    """An `<svg>` element."""
+    low: float
+    """User time at the left edge of the axes [s]."""
+    high: float
+    """User time at the right edge of the axes [s]."""
+    left: float
+    """Left edge of the axes, as a share of the picture's width."""
+    right: float
+    """Right edge of the axes, as a share of the picture's width."""
+    note: str = ""
+    """One line of explanation."""
+    is_joint: bool = False
+    """Whether it shows the trajectory of one joint."""
+
+
+def plots(run: TwinRun) -> tuple[Plot, ...]:
+    """Draw joint errors, tool error, delays, and the trajectory of every joint."""
+    tau, q_virtual, q_real = equal_timeline_time(run)
+    error = np.degrees(q_real - q_virtual)
+    n = error.shape[1]
+    same = f"Real minus virtual at equal timeline time (the real robot's clock runs {-run.D:.3g} s behind)."
+    out = [
+        _plot(run, "joint-errors", "Joint errors", "deg", lambda ax: _lines(ax, tau, error), note=same),
+        _plot(run, "tool-error", "Tool error", "mm", lambda ax: _tool_error(ax, run), note=same),
+        _plot(
+            run,
+            "delays",
+            "Delay of each packet",
+            "s",
+            lambda ax: _delays(ax, run),
+            note="At the time of sending. The dashed line is the offset that the clocks allow for.",
+        ),
+    ]
+    out.extend(
+        _plot(
+            run,
+            f"joint-{j + 1}",
+            f"Joint {j + 1}",
+            "deg",
+            partial(_trajectory, run=run, j=j),
+            size=(4.6, 2.3),
+            is_joint=True,
+        )
+        for j in range(n)
+    )
+    return tuple(out)
+
+
+def equal_timeline_time(run: TwinRun) -> tuple[Array, Array, Array]:
+    """Bring both twins to the same timeline time τ.
+
+    Returns:
+        τ [s], (m,); joints of the virtual robot at τ and of the real one when its clock reads τ [rad], (m, n).
+    """
+    keep = run.t - run.D <= run.t[-1] + 1e-9
+    if np.count_nonzero(keep) < 2:
+        keep = np.arange(len(run.t)) < 2
+    tau = run.t[keep]
+    real = np.column_stack([np.interp(tau - run.D, run.t, column) for column in run.q_real.T])
+    return tau, run.q_virtual[keep], real
+
+
+def _tool_error(ax: Axes, run: TwinRun) -> None:
+    tau, q_virtual, q_real = equal_timeline_time(run)
+    p_virtual = np.asarray(run.model.forward(q_virtual))[:, :3, 3]
+    p_real = np.asarray(run.model.forward(q_real))[:, :3, 3]
+    distance = 1e3 * np.linalg.norm(p_real - p_virtual, axis=1)
+    ax.plot(*_thin(tau, distance), color=REAL, linewidth=1.4)
+    ax.set_ylim(bottom=0.0)
+
+
+def _lines(ax: Axes, t: Array, values: Array) -> None:
+    for j, column in enumerate(values.T):
+        ax.plot(*_thin(t, column), color=JOINTS[j % len(JOINTS)], linewidth=1.3, label=f"{j + 1}")
+    _legend(ax, columns=values.shape[1])
+
+
+def _delays(ax: Axes, run: TwinRun) -> None:
+    arrived = [(p.sent, p.arrived - p.sent) for p in run.packets if p.arrived is not None]
+    lost = [p.sent for p in run.packets if p.arrived is None]
+    sent, delay = np.array(arrived, dtype=np.float64).reshape(-1, 2).T
+    top = 1.15 * max([-run.D, *delay, 1e-3])
+    ax.axhline(-run.D, color=MUTED, linewidth=1.0, linestyle=(0, (4, 3)))
+    ax.vlines(sent, 0.0, delay, color=VIRTUAL, linewidth=1.0, alpha=0.5)
+    ax.plot(sent, delay, "o", color=VIRTUAL, markersize=4, label="arrived")
+    if lost:
+        ax.plot(lost, np.full(len(lost), 0.95 * top), "x", color=BAD, markersize=6, label="lost")
+        _legend(ax, columns=2)
+    ax.set_ylim(0.0, top)
+
+
+def _trajectory(ax: Axes, *, run: TwinRun, j: int) -> None:
+    ax.plot(*_thin(run.t, np.degrees(run.q_virtual[:, j])), color=VIRTUAL, linewidth=1.3, label="virtual")
+    ax.plot(*_thin(run.t, np.degrees(run.q_real[:, j])), color=REAL, linewidth=1.3, label="real")
+    _legend(ax, columns=2)
+
+
+def _legend(ax: Axes, columns: int) -> None:
+    ax.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        handlelength=1.0,
+        columnspacing=1.0,
+        handletextpad=0.4,
+        borderaxespad=0.1,
+        labelcolor=INK,
+    )
+
+
+def _thin(t: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
+    """Keep at most MAX_POINTS samples: of every bucket its extremes, so that no peak is lost."""
+    x, y = np.asarray(t, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    if len(x) <= MAX_POINTS:
+        return x, y
+    edges = np.linspace(0, len(x), MAX_POINTS // 2 + 1).astype(int)
+    picks = {0, len(x) - 1}
+    for low, high in pairwise(edges):
+        picks.update((low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))))
+    order = np.array(sorted(picks))
+    return x[order], y[order]
+
+
+def _plot(
+    run: TwinRun,
+    name: str,
+    title: str,
+    unit: str,
+    draw: Callable[[Axes], None],
+    *,
+    size: tuple[float, float] = (5.6, 2.9),
+    note: str = "",
+    is_joint: bool = False,
+) -> Plot:
+    """Draw one plot over user time."""
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    style: dict[Any, Any] = {
+        "svg.fonttype": "none",
+        "svg.hashsalt": "vrs",
+        "font.family": "sans-serif",
+        "font.size": 9.5,
+        "path.simplify": True,
+        "path.simplify_threshold": 0.2,
+        "text.color": INK,
+        "axes.labelcolor": MUTED,
+        "axes.edgecolor": LINE,
+        "xtick.color": MUTED,
+        "ytick.color": MUTED,
+        "grid.color": LINE,
+        "axes.unicode_minus": True,
+    }
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=size)
+        FigureCanvasSVG(figure)
+        ax = figure.add_axes((52.0 / (72 * size[0]), 0.15, 1 - 62.0 / (72 * size[0]), 0.73))
+        figure.patch.set_visible(False)
+        ax.patch.set_visible(False)
+        ax.grid(visible=True, linewidth=0.6)
+        ax.set_axisbelow(True)
+        for side in ("top", "right", "left"):
+            ax.spines[side].set_visible(False)
+        ax.tick_params(length=0, pad=4)
+        ax.locator_params(axis="y", nbins=5)
+        draw(ax)
+        ax.set_xlim(float(run.t[0]), float(run.t[-1]))
+        ax.annotate(unit, (0.0, 1.0), xytext=(-6, 8), textcoords="offset points", xycoords="axes fraction",
+                    ha="right", color=MUTED)  # fmt: skip
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        box = ax.get_position()
+    low, high = ax.get_xlim()
+    return Plot(
+        name,
+        title,
+        _inline(buffer.getvalue(), name, title),
+        float(low),
+        float(high),
+        float(box.x0),
+        float(box.x1),
+        note,
+        is_joint,
+    )
+
+
+def _inline(text: str, name: str, title: str) -> str:
+    """Make a standalone SVG file one that can stand beside others in a page."""
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
+                  rf'<svg viewBox="\1" role="img" aria-label="{title}">', text, count=1)  # fmt: skip
+    text = re.sub(r'\bid="([^"]*)"', rf'id="{name}-\1"', text)
+    text = text.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
+    text = text.replace("xlink:href", "href")
+    text = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font-size: \1", text)
+    for stand_in, colour in _COLOURS.items():
+        text = text.replace(stand_in, colour)
+    return text

@@ -1,0 +1,137 @@
+"""What the report's 3D view needs, as one JSON value: shapes, kinematic chain, joint samples, markers."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from interfaces.runtime.run import TwinRun
+from vrs.errors import InvalidValueError
+from vrs.model import Array, RobotModel
+
+if TYPE_CHECKING:
+    from robots.puma560.shapes import LinkShape
+
+MAX_SAMPLES: Final = 24_000
+"""Most samples of a twin that a page carries; longer runs are thinned."""
+
+Json = dict[str, Any]
+
+
+def scene(run: TwinRun) -> Json:
+    """Describe both twins for the viewer.
+
+    Returns:
+        A JSON value: `links` (meshes in link frames), `base` and `chain` (constant transforms, column-major),
+        `t`, `q_virtual`, `q_real` (base64 of little-endian float32), `D`, `floor`, `box` and `markers`.
+
+    Raises:
+        InvalidValueError: If the model isn't a chain of revolute joints in standard Denavit-Hartenberg frames.
+    """
+    stride = max(1, -(-len(run.t) // MAX_SAMPLES))
+    base, chain = revolute_chain(run.model)
+    shapes = link_shapes(run.model)
+    floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=-0.7)
+    low, high = _box(run, floor)
+    return {
+        "links": [_mesh(shape) for shape in shapes],
+        "base": _column_major(base),
+        "chain": [_column_major(X) for X in chain],
+        "t": _packed(run.t[::stride] - run.t[0]),
+        "t_start": float(run.t[0]),
+        "t_end": float(run.t[::stride][-1]),
+        "q_virtual": _packed(run.q_virtual[::stride]),
+        "q_real": _packed(run.q_real[::stride]),
+        "D": float(run.D),
+        "floor": floor,
+        "box": [low, high],
+        "markers": markers(run),
+    }
+
+
+def revolute_chain(model: RobotModel) -> tuple[Array, Array]:
+    """Split a model's kinematics into constants, so that X_i = X_(i-1) Rz(q_i) A_i.
+
+    Returns:
+        The base pose, (4, 4), and A, (n, 4, 4).
+
+    Raises:
+        InvalidValueError: If the model's links don't move so.
+    """
+    n = model.limits.dof
+    rest = np.asarray(model.links(np.zeros(n)))
+    A = np.linalg.inv(rest[:-1]) @ rest[1:]
+    q = 0.3 + 0.4 * np.arange(n)
+    X = rest[0]
+    for i, angle in enumerate(q):
+        turn = np.eye(4)
+        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        X = X @ turn @ A[i]
+        if not np.allclose(X, np.asarray(model.links(q))[i + 1], atol=1e-9):
+            raise InvalidValueError("model", model.name, "a chain of revolute joints about their z axes")
+    return rest[0], A
+
+
+def link_shapes(model: RobotModel) -> tuple[LinkShape, ...]:
+    """Shapes of the model's links; none for a robot that has no shapes, which then shows as its traces."""
+    if model.name == "puma560":
+        from robots.puma560.shapes import shapes
+
+        return shapes()
+    return ()
+
+
+def markers(run: TwinRun) -> list[Json]:
+    """What the time slider marks, by time: commands as the operator gave them, losses, events."""
+    out: list[Json] = []
+    for receipt in run.receipts_virtual:
+        text = f"command {receipt.command_id}: {receipt.status}"
+        if receipt.reason:
+            text += f" ({receipt.reason})"
+        out.append({"t": receipt.issued_at, "kind": str(receipt.status), "text": text})
+    known_lost = {event.t for event in run.events if event.kind == "lost"}
+    out.extend(
+        {"t": packet.sent, "kind": "lost", "text": f"command {packet.command_id}: packet lost"}
+        for packet in run.packets
+        if packet.arrived is None and packet.sent not in known_lost
+    )
+    out.extend({"t": event.t, "kind": event.kind, "text": event.text} for event in run.events)
+    return sorted(out, key=lambda marker: (marker["t"], marker["kind"], marker["text"]))
+
+
+def _box(run: TwinRun, floor: float) -> tuple[list[float], list[float]]:
+    """Corners of what the camera must see: the pedestal, every link origin of both twins, some margin."""
+    stride = max(1, len(run.t) // 400)
+    q = np.concatenate([run.q_virtual[::stride], run.q_real[::stride]])
+    points = np.asarray(run.model.links(q))[:, :, :3, 3].reshape(-1, 3)
+    low = np.minimum(points.min(axis=0), (-0.2, -0.2, floor)) - 0.05
+    high = np.maximum(points.max(axis=0), (0.2, 0.2, 0.15)) + 0.05
+    low[2] = floor
+    return [float(x) for x in low], [float(x) for x in high]
+
+
+def _mesh(shape: LinkShape) -> Json:
+    palette, index = np.unique(shape.face_colours, axis=0, return_inverse=True)
+    return {
+        "name": shape.name,
+        "vertices": _packed(shape.vertices),
+        "faces": _base64(np.asarray(shape.faces, dtype="<u4")),
+        "colours": _base64(index.astype(np.uint8)),
+        "palette": [[float(x) for x in colour] for colour in palette],
+    }
+
+
+def _column_major(X: Array) -> list[float]:
+    return [float(x) for x in X.T.ravel()]
+
+
+def _packed(values: Array | Sequence[float]) -> str:
+    return _base64(np.asarray(values, dtype="<f4"))
+
+
+def _base64(values: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

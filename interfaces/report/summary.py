@@ -1,0 +1,159 @@
+"""The figures of a run, as `summary.json` and the report show them."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from interfaces.runtime.attribution import CAUSES, Attribution
+from interfaces.runtime.run import TwinRun
+from interfaces.runtime.virtual import QUANTILE, status_counts
+from vrs.commands import Receipt
+from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
+from vrs.model import Array
+
+SCHEMA = "vrs-summary/1"
+DIGITS = 9
+"""Decimals of every figure in the file."""
+MOST_CELLS = 4000
+"""Most cells of a tool path; a longer path has longer cells."""
+
+Json = dict[str, Any]
+
+
+def summarize(run: TwinRun, attributions: tuple[Attribution, ...] = ()) -> Json:
+    """Measure a run.
+
+    Args:
+        run: The record of both twins.
+        attributions: Its measures split among causes; none where no counterfactual was run.
+
+    Returns:
+        A JSON value; `docs/summary.md` describes its fields. The same run gives the same value.
+    """
+    q_timeline = shifted(run.t, run.q_virtual, run.D)
+    lag = best_lag(run.t, q_timeline, run.q_real)
+    aligned = shifted(run.t, q_timeline, -lag)
+    errors = {
+        "timeline_time": agreement(run.model, q_timeline, run.q_real),
+        "lag_removed": agreement(run.model, aligned, run.q_real),
+        "user_time": agreement(run.model, run.q_virtual, run.q_real),
+        "servo": agreement(run.model, run.q_reference, run.q_real),
+    }
+    value = {
+        "schema": SCHEMA,
+        "title": run.title,
+        "robot": run.model.name,
+        "seed": run.seed,
+        "delay": run.delay,
+        "delay_quantile": QUANTILE,
+        "clock_offset_s": run.D,
+        "duration_s": float(run.t[-1]),
+        "commands": _commands(run),
+        "errors": {name: _errors(value) for name, value in errors.items()},
+        "lag_timeline_s": lag,
+        "lag_user_s": lag - run.D,
+        "path": _path(run),
+        "attribution_order": list(CAUSES),
+        "attribution": [_attribution(item) for item in attributions],
+        "receipts_virtual": [_receipt(receipt) for receipt in run.receipts_virtual],
+        "receipts_real": [_receipt(receipt) for receipt in run.receipts_real],
+        "packets": [
+            {
+                "command_id": packet.command_id,
+                "real_id": packet.real_id,
+                "sent_s": packet.sent,
+                "arrived_s": packet.arrived,
+            }
+            for packet in run.packets
+        ],
+        "events": [{"t_s": event.t, "kind": event.kind, "text": event.text} for event in run.events],
+    }
+    rounded = _rounded(value)
+    assert isinstance(rounded, dict)
+    return rounded
+
+
+def to_json(summary: Json) -> str:
+    """Write a summary: sorted keys, two spaces, a final newline; equal values give equal bytes."""
+    return json.dumps(summary, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _commands(run: TwinRun) -> Json:
+    kinds = [event.kind for event in run.events]
+    return {
+        "virtual": status_counts(run.receipts_virtual),
+        "real": status_counts(run.receipts_real),
+        "sent": len(run.packets),
+        "lost": sum(packet.arrived is None for packet in run.packets),
+        "late": kinds.count("late"),
+        "diverged": kinds.count("diverged"),
+    }
+
+
+def _errors(value: Agreement) -> Json:
+    worst = int(np.argmax(value.joint_rms))
+    return {
+        "joint_rms_deg": np.degrees(value.joint_rms).tolist(),
+        "joint_max_deg": np.degrees(value.joint_max).tolist(),
+        "worst_joint": worst + 1,
+        "tool_rms_m": value.tool_rms,
+        "tool_max_m": value.tool_max,
+        "angle_rms_deg": math.degrees(value.angle_rms),
+        "angle_max_deg": math.degrees(value.angle_max),
+    }
+
+
+def _path(run: TwinRun) -> Json:
+    """Tool path and time difference in user time, in the metres and seconds of `docs/summary.md`."""
+    p_virtual, p_real = (run.model.forward(q)[:, :3, 3] for q in (run.q_virtual, run.q_real))
+    steps = np.linalg.norm(np.diff(p_virtual, axis=0), axis=1)
+    cell = max(0.01, float(steps.sum()) / MOST_CELLS)
+    v_max = max(0.5, float(steps.max()) / run.dt)
+    result = compare_paths(run.t, p_virtual, p_real, v_max=v_max, cell=cell)
+    names = PathComparison.__slots__
+    return {"cell": cell, "v_max": v_max, **{name: getattr(result, name) for name in names}}
+
+
+def _attribution(item: Attribution) -> Json:
+    return {
+        "measure": item.measure,
+        "total": item.total,
+        "parts": dict(item.parts),
+        "residual": item.residual,
+    }
+
+
+def _receipt(receipt: Receipt) -> Json:
+    return {
+        "command_id": receipt.command_id,
+        "status": str(receipt.status),
+        "issued_at_s": receipt.issued_at,
+        "asked_at_s": receipt.asked_at,
+        "execute_at_s": receipt.execute_at,
+        "end_s": receipt.end,
+        "q_deg": None if receipt.q is None else _degrees(receipt.q),
+        "reason": receipt.reason,
+        "shifted": list(receipt.shifted),
+        "shift_s": receipt.shift,
+        "superseded": list(receipt.superseded),
+        "superseded_by": receipt.superseded_by,
+    }
+
+
+def _degrees(q: Array) -> list[float]:
+    return [float(angle) for angle in np.degrees(q)]
+
+
+def _rounded(value: Any) -> Any:
+    """The value with plain floats of DIGITS decimals, no negative zero among them."""
+    if isinstance(value, dict):
+        return {str(key): _rounded(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(item) for item in value]
+    if isinstance(value, (float, np.floating)):
+        return round(float(value), DIGITS) + 0.0
+    return int(value) if isinstance(value, np.integer) else value

@@ -1,0 +1,101 @@
+"""The comparison table of a run, for a terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Json = dict[str, Any]
+ROWS = (
+    ("timeline_time", "timeline"),
+    ("lag_removed", "… no lag"),
+    ("user_time", "user"),
+    ("servo", "servo"),
+)
+
+
+def error_table(summary: Json) -> Table:
+    """Joint and tool errors, a row a way of comparing."""
+    from rich.table import Table
+
+    table = Table(title=f"Virtual and real {summary['robot']}, delay {summary['delay']}", title_justify="left")
+    for name in ("at equal", "joint", "rms\ndeg", "max\ndeg"):
+        table.add_column(name, justify="left" if name == "at equal" else "right")
+    for name in ("tool rms\nmm", "max\nmm", "angle\nrms deg", "max\ndeg"):
+        table.add_column(name, justify="right")
+    for key, label in ROWS:
+        row = summary["errors"][key]
+        joint = row["worst_joint"]
+        table.add_row(
+            label,
+            str(joint),
+            f"{row['joint_rms_deg'][joint - 1]:.3f}",
+            f"{row['joint_max_deg'][joint - 1]:.3f}",
+            f"{1e3 * row['tool_rms_m']:.2f}",
+            f"{1e3 * row['tool_max_m']:.2f}",
+            f"{row['angle_rms_deg']:.3f}",
+            f"{row['angle_max_deg']:.3f}",
+        )
+    return table
+
+
+def attribution_table(summary: Json) -> Table:
+    """Errors split among their causes, a row a measure."""
+    from rich.table import Table
+
+    order = summary["attribution_order"]
+    table = Table(title=f"Why: switched off in turn, {', '.join(map(_words, order))}", title_justify="left")
+    for name in ("measure (rms)", "total", *map(_words, order), "residual"):
+        table.add_column(name, justify="left" if name.startswith("measure") else "right")
+    for item in summary["attribution"]:
+        label, scale, unit = MEASURES[item["measure"]]
+        values = [item["total"], *(item["parts"][cause] for cause in order), item["residual"]]
+        table.add_row(f"{label}, {unit}", *(f"{scale * value:.3f}" for value in values))
+    return table
+
+
+MEASURES = {
+    "tool_rms_timeline_m": ("tool, timeline", 1e3, "mm"),
+    "tool_rms_user_m": ("tool, user time", 1e3, "mm"),
+    "joint_rms_timeline_rad": ("joints, timeline", 57.29577951308232, "deg"),
+}
+
+
+def time_lines(summary: Json) -> list[str]:
+    """Time difference, path error and what became of the commands, a sentence each."""
+    path, commands = summary["path"], summary["commands"]
+    lines = [
+        f"Best lag {_seconds(summary['lag_user_s'])} in user time, of which the clock offset is "
+        f"{_seconds(-summary['clock_offset_s'])}.",
+        f"Time difference along the tool path: mean {_seconds(path['time_difference_mean'])}, "
+        f"sd {_seconds(path['time_difference_sd'])}, max {_seconds(path['time_difference_max'])}.",
+        f"Tool path error: mean {_millimetres(path['path_error_mean'])}, "
+        f"95 % {_millimetres(path['path_error_p95'])}, max {_millimetres(path['path_error_max'])}.",
+        f"Commands at the virtual robot: {_counts(commands['virtual'])}; at the real one: "
+        f"{_counts(commands['real'])}; {commands['sent']} sent, {commands['lost']} lost, "
+        f"{commands['late']} late.",
+    ]
+    if path["progress"] is not None and path["progress"] < 0.97:
+        lines.append(
+            f"The real robot reached {path['progress']:.1%} of the path: the means above don't compare; "
+            f"the time difference is at least {_seconds(path['time_difference_bound'])}."
+        )
+    return lines
+
+
+def _words(cause: str) -> str:
+    return cause.replace("_", " ")
+
+
+def _seconds(value: float | None) -> str:
+    return "undefined" if value is None else f"{value:.3f} s"
+
+
+def _millimetres(value: float | None) -> str:
+    return "undefined" if value is None else f"{1e3 * value:.2f} mm"
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{number} {status}" for status, number in counts.items())

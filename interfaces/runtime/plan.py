@@ -1,0 +1,280 @@
+"""Plan files: what the operator does, a JSON object a line. `docs/plan-files.md` is the reference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import msgspec
+import numpy as np
+
+from vrs.commands import Insertion, JointTarget, MotionCommand, PoseTarget, Profile, Target
+from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
+from vrs.model import Array, RobotModel
+
+SCHEMA = "vrs-plan/1"
+LATEST = 3600.0
+"""Latest time that a plan may hold [s]."""
+HEAVIEST = 20.0
+"""Heaviest payload that a plan may hold [kg]."""
+MAX_BYTES = 4 * 1024 * 1024
+MAX_COMMANDS = 5000
+
+ALLOWED = (
+    'a line is a JSON object: {"issue": seconds, "move": target} with optional execute, register, speed, '
+    'profile, insertion; or {"issue": seconds, "payload": {"mass_kg": number}}; or {"issue": seconds, '
+    '"release": true}; or, first, a header with schema, title, start; each with an optional comment'
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMotion:
+    """A motion command of a plan."""
+
+    where: str
+    """File and line, for messages."""
+    registered_at: float
+    """User time at which the command reaches the operator's engine [s], ≥ its issue time."""
+    command: MotionCommand
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedPayload:
+    """The real gripper takes or releases a load, when the robot's own clock reads t."""
+
+    where: str
+    """File and line, for messages."""
+    t: float
+    """Timeline time [s]."""
+    mass: float | None
+    """Mass [kg], > 0; None releases what is held."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """What happens in a run, by time; equal times keep the order of the file."""
+
+    title: str
+    start: Array
+    """Joints at the start [rad], (n,)."""
+    motions: tuple[PlannedMotion, ...]
+    """At least one."""
+    payloads: tuple[PlannedPayload, ...]
+
+
+class _Where(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    pose: str | None = None
+    xyz: list[float] | None = None
+    zyz_deg: list[float] | None = None
+    configuration: str | None = None
+
+
+class _Load(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    mass_kg: float
+
+
+_Move: TypeAlias = list[float] | _Where
+
+
+class _Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    schema: Literal["vrs-plan/1"] | None = None
+    title: str | None = None
+    start: _Move | None = None
+    issue: float | None = None
+    register: float | None = None
+    execute: float | None = None
+    move: _Move | None = None
+    speed: float | None = None
+    profile: Profile | None = None
+    insertion: Insertion | None = None
+    payload: _Load | None = None
+    release: bool | None = None
+    comment: str | None = None
+
+
+_HEADER = ("schema", "title", "start")
+_MOTION = ("register", "execute", "speed", "profile", "insertion")
+
+
+def default_plan(model: RobotModel) -> Plan:
+    """Read the plan of the demo."""
+    source = resources.files("interfaces.runtime").joinpath("default_plan.jsonl")
+    return parse_plan(source.read_bytes(), "default_plan.jsonl", model)
+
+
+def read_plan(path: Path, model: RobotModel) -> Plan:
+    """Read a plan file.
+
+    Raises:
+        FormatError: If it can't be read, or a line is not what it should be; the message names file, line
+            and what is allowed.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
+    return parse_plan(data, str(path), model)
+
+
+def parse_plan(data: bytes, name: str, model: RobotModel) -> Plan:
+    """Parse the bytes of a plan file.
+
+    Args:
+        data: UTF-8 text, at most 4 MiB and 5000 commands.
+        name: Name of the file, for messages.
+        model: The robot, for its limits, named poses and kinematics.
+
+    Raises:
+        FormatError: As `read_plan`.
+    """
+    if len(data) > MAX_BYTES:
+        raise FormatError(name, f"is longer than the {MAX_BYTES} bytes allowed")
+    title, start = Path(name).stem, model.poses["nominal"]
+    motions: list[PlannedMotion] = []
+    payloads: list[PlannedPayload] = []
+    for i, (where, line) in enumerate(_lines(data, name)):
+        try:
+            if any(getattr(line, key) is not None for key in _HEADER):
+                _check_header(line, first=i == 0)
+                title = line.title or title
+                start = start if line.start is None else _start(line.start, model)
+            elif line.move is not None:
+                motions.append(_motion(line, line.move, where, model))
+            elif line.payload is not None or line.release is not None:
+                payloads.append(_payload(line, where))
+            elif any(getattr(line, key) is not None for key in ("issue", *_MOTION)):
+                raise InvalidValueError("line", "issue without an action", "one of move, payload, release")
+        except (InvalidValueError, UnreachablePoseError) as error:
+            raise FormatError(where, str(error)) from None
+        if len(motions) + len(payloads) > MAX_COMMANDS:
+            raise FormatError(where, f"more than the {MAX_COMMANDS} commands allowed")
+    if not motions:
+        raise FormatError(name, f"holds no move; {ALLOWED}")
+    motions.sort(key=lambda motion: motion.registered_at)
+    payloads.sort(key=lambda payload: payload.t)
+    _check_hand(payloads)
+    return Plan(title, start, tuple(motions), tuple(payloads))
+
+
+def _lines(data: bytes, name: str) -> Iterator[tuple[str, _Line]]:
+    decoder = msgspec.json.Decoder(_Line)
+    for number, raw in enumerate(data.removeprefix(b"\xef\xbb\xbf").split(b"\n"), start=1):
+        where = f"{name}:{number}"
+        if not raw.strip():
+            continue
+        try:
+            raw.decode("utf-8")
+            yield where, decoder.decode(raw)
+        except UnicodeDecodeError:
+            raise FormatError(where, f"isn't UTF-8 text; {ALLOWED}") from None
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise FormatError(where, f"{error}; {ALLOWED}") from None
+
+
+def _check_header(line: _Line, *, first: bool) -> None:
+    if not first:
+        raise InvalidValueError("line", "a header below the first line", f"a command; {ALLOWED}")
+    _only(line, (*_HEADER, "comment"), "a header")
+
+
+def _only(line: _Line, allowed: tuple[str, ...], kind: str) -> None:
+    extra = [key for key in line.__struct_fields__ if key not in allowed and getattr(line, key) is not None]
+    if extra:
+        raise InvalidValueError(kind, extra, f"without these fields; it may hold {', '.join(allowed)}")
+
+
+def _time(name: str, value: float | None, earliest: float = 0.0) -> float:
+    if value is None or not earliest <= value <= LATEST:
+        raise InvalidValueError(name, value, f"seconds in [{earliest:g}, {LATEST:g}]")
+    return value
+
+
+def _motion(line: _Line, move: _Move, where: str, model: RobotModel) -> PlannedMotion:
+    _only(line, ("issue", "move", *_MOTION, "comment"), "a move")
+    issue = _time("issue", line.issue)
+    registered = issue if line.register is None else _time("register", line.register, issue)
+    command = MotionCommand(
+        target=_target(move, model),
+        issued_at=issue,
+        execute_at=None if line.execute is None else _time("execute", line.execute),
+        speed=1.0 if line.speed is None else line.speed,
+        profile=line.profile or Profile.PARABOLIC,
+        insertion=line.insertion or Insertion.SPLICE,
+    )
+    return PlannedMotion(where, registered, command)
+
+
+def _payload(line: _Line, where: str) -> PlannedPayload:
+    kind = "payload" if line.payload is not None else "release"
+    _only(line, ("issue", kind, "comment"), f"a {kind}")
+    t = _time("issue", line.issue)
+    if line.payload is None:
+        if line.release is not True:
+            raise InvalidValueError("release", line.release, "true")
+        return PlannedPayload(where, t, None)
+    if not 0 < line.payload.mass_kg <= HEAVIEST:
+        raise InvalidValueError("mass_kg", line.payload.mass_kg, f"in (0, {HEAVIEST:g}] kg")
+    return PlannedPayload(where, t, line.payload.mass_kg)
+
+
+def _check_hand(payloads: list[PlannedPayload]) -> None:
+    held = False
+    for payload in payloads:
+        if held and payload.mass is not None:
+            raise FormatError(payload.where, "a payload is already held: allowed is a release")
+        if not held and payload.mass is None:
+            raise FormatError(payload.where, "nothing is held: allowed is a payload")
+        held = payload.mass is not None
+
+
+def _start(move: _Move, model: RobotModel) -> Array:
+    target = _target(move, model)
+    if isinstance(target, JointTarget):
+        return target.q
+    return model.inverse_near(target.X, model.poses["nominal"], target.configuration)
+
+
+def _target(move: _Move, model: RobotModel) -> Target:
+    if isinstance(move, list):
+        n = model.limits.dof
+        if len(move) != n or not np.isfinite(move).all():
+            raise InvalidValueError("move", move, f"{n} finite joint values [deg]")
+        target = JointTarget(np.radians(move))
+        model.limits.check(target.q)
+        return target
+    if move.pose is not None:
+        if move.xyz is not None or move.zyz_deg is not None or move.configuration is not None:
+            raise InvalidValueError("move", "pose beside other fields", "pose alone, or xyz with zyz_deg")
+        if move.pose not in model.poses:
+            raise InvalidValueError("pose", move.pose, f"one of {', '.join(sorted(model.poses))}")
+        return JointTarget(model.poses[move.pose])
+    X = _pose(move.xyz, move.zyz_deg)
+    target_pose = PoseTarget(X, move.configuration)
+    model.inverse_near(X, model.poses["nominal"], move.configuration)
+    return target_pose
+
+
+def _pose(xyz: list[float] | None, zyz_deg: list[float] | None) -> Array:
+    for name, values, unit in (("xyz", xyz, "m"), ("zyz_deg", zyz_deg, "deg")):
+        if values is None or len(values) != 3 or not np.isfinite(values).all():
+            raise InvalidValueError(name, values, f"three finite numbers [{unit}], beside its partner")
+    X = np.eye(4)
+    X[:3, 3] = xyz or ()
+    a, b, c = (math.radians(angle) for angle in zyz_deg or ())
+    X[:3, :3] = _rot_z(a) @ _rot_y(b) @ _rot_z(c)
+    return X
+
+
+def _rot_z(angle: float) -> Array:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _rot_y(angle: float) -> Array:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

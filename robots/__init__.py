@@ -1,0 +1,1 @@
+"""The robot side: models, kinematics, simulated bodies, and what runs on board. `from robots import puma560`."""

@@ -1,0 +1,131 @@
+"""A chain of revolute joints as a PyBullet multibody, straight from its Denavit-Hartenberg parameters.
+
+A link's PyBullet frame sits at its joint and turns with it; the link's Denavit-Hartenberg frame is fixed in
+it, at Trans_z(d) Trans_x(a) Rot_x(α). No URDF is read: the loader zeroes inertias that break the triangle
+inequality, as Armstrong's links 1 and 3 do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.bullet.world import World
+from vrs.model import Array
+
+_FREE_SPEED = 1e9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidLink:
+    """One link: its joint's geometry, and its mass in its own Denavit-Hartenberg frame."""
+
+    d: float
+    """Joint offset [m]."""
+    a: float
+    """Link length [m]."""
+    alpha: float
+    """Link twist [rad]."""
+    mass: float
+    """Mass [kg], positive: PyBullet's inverse dynamics fail on zero."""
+    centre: Array
+    """Centre of mass [m], (3,)."""
+    inertia: Array
+    """Inertia about the centre of mass [kg m²], (3, 3)."""
+
+    def with_body(self, mass: float, centre: Array, inertia: Array) -> RigidLink:
+        """Return the link with a body rigidly added: mass [kg], centre [m], inertia about it [kg m²]."""
+        total = self.mass + mass
+        middle = (self.mass * self.centre + mass * centre) / total
+        tensor = self.inertia + inertia
+        for m, p in ((self.mass, self.centre - middle), (mass, centre - middle)):
+            tensor = tensor + m * (p @ p * np.eye(3) - np.outer(p, p))
+        return RigidLink(self.d, self.a, self.alpha, total, middle, tensor)
+
+    def principal(self) -> tuple[list[float], Array]:
+        """Return the principal inertias [kg m²] and the rotation from their axes to the link's frame."""
+        if np.count_nonzero(self.inertia - np.diag(np.diag(self.inertia))) == 0:
+            return np.diag(self.inertia).tolist(), np.eye(3)
+        values, axes = np.linalg.eigh(self.inertia)
+        if np.linalg.det(axes) < 0:
+            axes[:, 0] *= -1
+        return values.tolist(), axes
+
+
+def quaternion(R: Array) -> list[float]:
+    """Return a rotation matrix as PyBullet's quaternion (x, y, z, w), by the largest of its four squares."""
+    t = np.trace(R)
+    squares = np.array([*(1 + 2 * np.diag(R) - t), 1 + t])
+    k = int(np.argmax(squares))
+    if k == 3:
+        q = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], squares[3]])
+    else:
+        i, j = (k + 1) % 3, (k + 2) % 3
+        q = np.empty(4)
+        q[k], q[i], q[j] = squares[k], R[i, k] + R[k, i], R[j, k] + R[k, j]
+        q[3] = R[j, i] - R[i, j]
+    return [float(x) for x in q / np.linalg.norm(q)]
+
+
+def load_arm(world: World, links: Sequence[RigidLink]) -> int:
+    """Make a fixed-base arm of revolute joints in a world, without motors, damping, sleep or contact.
+
+    Args:
+        world: The world; the arm's base frame is its origin.
+        links: Links from the base outwards.
+
+    Returns:
+        PyBullet's body id.
+    """
+    bullet, client, n = world.bullet, world.client, len(links)
+    positions: list[list[float]] = [[0.0, 0.0, 0.0]]
+    turns: list[list[float]] = [[0.0, 0.0, 0.0, 1.0]]
+    centres, axes, diagonals = [], [], []
+    for link in links:
+        c, s = math.cos(link.alpha), math.sin(link.alpha)
+        R = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+        p = np.array([link.a, 0.0, link.d])
+        diagonal, R_principal = link.principal()
+        positions.append(p.tolist())
+        turns.append([math.sin(link.alpha / 2), 0.0, 0.0, math.cos(link.alpha / 2)])
+        centres.append((p + R @ link.centre).tolist())
+        axes.append(quaternion(R @ R_principal))
+        diagonals.append(diagonal)
+    body = bullet.createMultiBody(
+        baseMass=0.0,
+        linkMasses=[1.0] * n,
+        linkCollisionShapeIndices=[-1] * n,
+        linkVisualShapeIndices=[-1] * n,
+        linkPositions=positions[:n],
+        linkOrientations=turns[:n],
+        linkInertialFramePositions=centres,
+        linkInertialFrameOrientations=axes,
+        linkParentIndices=list(range(n)),
+        linkJointTypes=[bullet.JOINT_REVOLUTE] * n,
+        linkJointAxis=[[0.0, 0.0, 1.0]] * n,
+        physicsClientId=client,
+    )
+    # Damping first, mass and inertia after it, and all before the first inverse-dynamics or mass-matrix call:
+    # PyBullet caches the tree that answers those and never looks at the masses again.
+    for j in range(n):
+        bullet.changeDynamics(
+            body,
+            j,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            jointDamping=0.0,
+            maxJointVelocity=_FREE_SPEED,
+            physicsClientId=client,
+        )
+    bullet.changeDynamics(
+        body, -1, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client
+    )
+    for j, link in enumerate(links):
+        bullet.changeDynamics(body, j, mass=link.mass, localInertiaDiagonal=diagonals[j], physicsClientId=client)
+    bullet.setJointMotorControlArray(
+        body, list(range(n)), bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=client
+    )
+    return int(body)

@@ -1,0 +1,222 @@
+"""Inverse kinematics of many poses at once: the formulas of `robots.puma560.branches` on arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.puma560.branches import (
+    COS_E3,
+    FOREARM,
+    FOUR_SIDES,
+    MERGE_ELBOW,
+    MERGE_SHOULDER,
+    MERGE_WRIST,
+    ORTHONORMAL,
+    REACH_MAX,
+    REACH_MIN,
+    RESIDUAL_MAX,
+    SIN_E3,
+)
+from robots.puma560.parameters import A2, A3, D3, D4, DOF
+from vrs.commands import finite_array
+from vrs.errors import InvalidValueError
+from vrs.model import Array
+
+BRANCHES = (
+    "RIGHTY ABOVE NOFLIP",
+    "RIGHTY ABOVE FLIP",
+    "RIGHTY BELOW NOFLIP",
+    "RIGHTY BELOW FLIP",
+    "LEFTY ABOVE NOFLIP",
+    "LEFTY ABOVE FLIP",
+    "LEFTY BELOW NOFLIP",
+    "LEFTY BELOW FLIP",
+)
+"""What the second axis of `inverse_batch` runs over."""
+
+CHUNK = 1024
+"""Poses solved at a time; their arrays fit into a core's cache."""
+
+_ALLOWED = "finite homogeneous transforms, (k, 4, 4), their rotations orthonormal to 1e-6"
+_SHOULDER = np.array([1.0, -1.0])[:, None, None]
+_ABOVE = np.array([1.0, -1.0])[:, None]
+
+
+def inverse_batch(X: ArrayLike) -> Array:
+    """Return the principal joint solutions of many poses, each checked forward to 1e-9.
+
+    Args:
+        X: Poses of the last link in the base frame, (k, 4, 4).
+
+    Returns:
+        Joint values in (−π, π] [rad], (k, 8, 6), the second axis as in BRANCHES; NaN where a branch doesn't
+        exist, or is one with another that comes before it. Limits aren't considered. Where joints 4 and 6
+        share an axis, q4 is 0.
+
+    Raises:
+        InvalidValueError: If X has another shape, or holds NaN, infinity, or what isn't a transform.
+    """
+    R, p = _checked(X)
+    q = np.empty((p.shape[1], 8, DOF))
+    for start in range(0, len(q), CHUNK):
+        part = slice(start, start + CHUNK)
+        q[part] = _solved(R[:, :, part], p[:, part])
+    return q
+
+
+def _solved(R: Array, p: Array) -> Array:
+    """Return the solutions of rotations, (3, 3, k), and positions, (3, k): (k, 8, 6)."""
+    out = np.empty((2, 2, 2, DOF, p.shape[1]))
+    with np.errstate(over="ignore", invalid="ignore"):
+        exists, turns = _arms(p, out)
+        error, M = _placed(p, R, turns)
+        regular, turns = _wrists(M, out)
+        # On the sines and cosines whose angles are returned; one check does for both wrists of an arm,
+        # which differ by exact half turns.
+        exists &= error + _turned(M, turns) <= RESIDUAL_MAX**2
+    good = np.stack((exists, exists & regular), axis=2)
+    np.copyto(out, np.nan, where=~good[:, :, :, None])
+    return out.reshape(8, DOF, -1).transpose(2, 0, 1)
+
+
+def _checked(X: ArrayLike) -> tuple[Array, Array]:
+    """Return the nearest orthonormal rotations, (3, 3, k), and the positions, (3, k).
+
+    Components come first, so that every operation runs over contiguous poses.
+    """
+    poses = finite_array("X", X, None, _ALLOWED)
+    if poses.ndim != 3 or poses.shape[1:] != (4, 4):
+        raise InvalidValueError("X", X, _ALLOWED)
+    rows = np.array(poses.transpose(1, 2, 0), order="C")
+    R = rows[:3, :3]
+    n, o, a = R.swapaxes(0, 1)
+    skew = np.zeros(len(poses))
+    for u, v, product in ((n, n, 1.0), (o, o, 1.0), (a, a, 1.0), (n, o, 0.0), (n, a, 0.0), (o, a, 0.0)):
+        np.maximum(skew, np.abs(u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - product), out=skew)
+    volume = a[0] * (n[1] * o[2] - n[2] * o[1])
+    volume += a[1] * (n[2] * o[0] - n[0] * o[2])
+    volume += a[2] * (n[0] * o[1] - n[1] * o[0])
+    bottom = np.abs(rows[3] - np.array([[0.0], [0.0], [0.0], [1.0]]))
+    if not ((skew <= ORTHONORMAL).all() and (volume > 0).all() and (bottom <= ORTHONORMAL).all()):
+        raise InvalidValueError("X", X, _ALLOWED)
+    rough = skew > 1e-14
+    if rough.any():
+        U, _, Vt = np.linalg.svd(poses[rough, :3, :3])
+        R[:, :, rough] = (U @ Vt).transpose(1, 2, 0)
+    return R, rows[:3, 3]
+
+
+def _unit(x: Array, y: Array) -> tuple[Array, Array]:
+    """Return cosine and sine of the direction (x, y)."""
+    h = np.sqrt(x * x + y * y)
+    return x / h, y / h
+
+
+def _arms(p: Array, out: Array) -> tuple[NDArray[np.bool_], tuple[Array, ...]]:
+    """Fill in joints 1 to 3 of the four arms.
+
+    Args:
+        p: Wrist centres, (3, k) [m].
+        out: Joint values, (2, 2, 2, 6, k) [rad], written.
+
+    Returns:
+        Whether each arm exists, (2, 2, k), and cosine and sine of q1, of q2 and of q2 + q3.
+    """
+    px, py, pz = p
+    r = np.sqrt(px * px + py * py)
+    u = np.sqrt(np.maximum((r - D3) * (r + D3), 0.0))
+    u[u < MERGE_SHOULDER] = 0.0
+    w = np.sqrt(u * u + pz * pz)
+    outer, inner = (REACH_MAX - w) * (REACH_MAX + w), (w - REACH_MIN) * (w + REACH_MIN)
+    sin_e = 2 * np.sqrt(np.maximum(outer, 0.0) * np.maximum(inner, 0.0)) / FOUR_SIDES
+    merged = sin_e < MERGE_ELBOW
+    sin_e[merged] = 0.0
+    cos_e = np.where(merged, np.where(inner > outer, 1.0, -1.0), (inner - outer) / FOUR_SIDES)
+    closed = (r >= D3 - RESIDUAL_MAX) & (w >= REACH_MIN - RESIDUAL_MAX) & (w <= REACH_MAX + RESIDUAL_MAX)
+    exists: NDArray[np.bool_] = closed & ((u > 0) | (_SHOULDER > 0)) & (~merged | (_ABOVE > 0))
+
+    u = _SHOULDER * u
+    x, y = px * u - py * D3, py * u + px * D3
+    q1, (c1, s1) = np.arctan2(y, x), _unit(x, y)
+    kx, ky = A2 + FOREARM * cos_e, -_ABOVE * _SHOULDER * (FOREARM * sin_e)
+    x, y = u * kx + pz * ky, pz * kx - u * ky
+    q2, (c2, s2) = np.arctan2(y, x), _unit(x, y)
+    c, s = cos_e * COS_E3, sin_e * COS_E3
+    c3, s3 = c - _ABOVE * (sin_e * SIN_E3), -_ABOVE * s - cos_e * SIN_E3
+    q3 = np.arctan2(s3, c3)
+    c3, s3 = np.stack((c3, c3[::-1])), np.stack((s3, s3[::-1]))
+    out[:, :, :, 0], out[:, :, :, 1] = q1[:, :, None], q2[:, :, None]
+    out[0, :, :, 2], out[1, :, :, 2] = q3[:, None], q3[::-1, None]
+    return exists, (c1, s1, c2, s2, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3)
+
+
+def _placed(p: Array, R: Array, turns: tuple[Array, ...]) -> tuple[Array, Array]:
+    """Return how far the arms miss the wrist centre, squared, (2, 2, k) [m²], and R in their last frames.
+
+    Args:
+        p: Wrist centres, (3, k) [m].
+        R: Rotations, (3, 3, k).
+        turns: Cosine and sine of q1, of q2 and of q2 + q3, (2, 1 or 2, k) each.
+
+    Returns:
+        The squares, and the wanted rotations of the wrists, (3, 3, 2, 2, k).
+    """
+    c1, s1, c2, s2, c23, s23 = turns
+    u = A2 * c2 + A3 * c23 - D4 * s23
+    v = A2 * s2 + A3 * s23 + D4 * c23
+    error: Array = (c1 * u + s1 * D3 - p[0]) ** 2 + (s1 * u - c1 * D3 - p[1]) ** 2 + (v - p[2]) ** 2
+    M = np.empty((3, 3, *v.shape))
+    for j in range(3):
+        t = c1 * R[0, j] + s1 * R[1, j]
+        M[0, j] = c23 * t + s23 * R[2, j]
+        M[1, j] = c1 * R[1, j] - s1 * R[0, j]
+        M[2, j] = c23 * R[2, j] - s23 * t
+    return error, M
+
+
+def _wrists(M: Array, out: Array) -> tuple[NDArray[np.bool_], tuple[Array, ...]]:
+    """Fill in joints 4 to 6, noflip first.
+
+    Args:
+        M: Rotations of the last link in the forearm's frame, (3, 3, 2, 2, k).
+        out: Joint values, (2, 2, 2, 6, k) [rad], written.
+
+    Returns:
+        Whether there are two wrists, (2, 2, k), and cosine and sine of the first one's q4, q5 and q6.
+    """
+    x, y, z = M[0, 2], M[1, 2], M[2, 2]
+    sin5 = np.sqrt(x * x + y * y)
+    regular: NDArray[np.bool_] = sin5 >= MERGE_WRIST
+    least = np.maximum(sin5, MERGE_WRIST)
+    c4, s4 = np.where(regular, x / least, 1.0), np.where(regular, y / least, 0.0)
+    q4, q5 = np.arctan2(s4, c4), np.arctan2(np.where(regular, sin5, 0.0), z)
+    c5, s5 = _unit(z, np.where(regular, -sin5, 0.0))
+    x, y = c4 * M[1, 1] - s4 * M[0, 1], c4 * M[1, 0] - s4 * M[0, 0]
+    q6, (c6, s6) = np.arctan2(y, x), _unit(x, y)
+    first, second = out[:, :, 0], out[:, :, 1]
+    first[:, :, 3], first[:, :, 4], first[:, :, 5] = q4, np.where(regular, -q5, q5), q6
+    second[:, :, 3], second[:, :, 4], second[:, :, 5] = q4 - np.copysign(np.pi, q4), q5, q6 - np.copysign(np.pi, q6)
+    return regular, (c4, s4, c5, s5, c6, s6)
+
+
+def _turned(M: Array, turns: tuple[Array, ...]) -> Array:
+    """Return the sum of squares of the differences of M and the wrists' rotations, (2, 2, k).
+
+    Args:
+        M: Rotations of the last link in the forearm's frame, (3, 3, 2, 2, k).
+        turns: Cosine and sine of q4, q5 and q6, (2, 2, k) each.
+    """
+    c4, s4, c5, s5, c6, s6 = turns
+    c45, s45 = c4 * c5, s4 * c5
+    rotation = (
+        (c45 * c6 - s4 * s6, -c45 * s6 - s4 * c6, -c4 * s5),
+        (s45 * c6 + c4 * s6, c4 * c6 - s45 * s6, -s4 * s5),
+        (s5 * c6, -s5 * s6, c5),
+    )
+    total = np.zeros(c4.shape)
+    for i in range(3):
+        for j in range(3):
+            difference = rotation[i][j] - M[i, j]
+            total += difference * difference
+    return total

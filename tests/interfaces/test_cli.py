@@ -1,0 +1,101 @@
+"""The command line: outputs, one clear line and exit code 2 on bad input, speed of the door."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from interfaces.cli.main import _status
+
+SHORT = '{"issue": 0, "move": [20, 50, -160, 0, 30, 0], "speed": 0.8}\n'
+
+
+@pytest.fixture
+def plan(tmp_path):
+    path = tmp_path / "plan.jsonl"
+    path.write_text(SHORT)
+    return path
+
+
+def run(*arguments, timeout=120.0):
+    return subprocess.run(
+        [sys.executable, "-c", "from interfaces.cli import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+        env={**os.environ, "PYTHONHASHSEED": "random"},
+    )
+
+
+def test_demo_writes_the_same_summary_twice(plan, tmp_path):
+    files = []
+    for name in ("a", "b"):
+        done = run("demo", "--commands", plan, "--delay", "thu", "--seed", 3, "--out", tmp_path / name, "--json")
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout)["seed"] == 3
+        assert done.stdout == (tmp_path / name / "summary.json").read_text()
+        assert (tmp_path / name / "report.html").stat().st_size > 10_000
+        files.append((tmp_path / name / "summary.json").read_bytes())
+    assert files[0] == files[1]
+    for item in json.loads(files[0])["attribution"]:
+        assert sum(item["parts"].values()) + item["residual"] == pytest.approx(item["total"], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["demo", "--delay", "soon"], "constant:S"),
+        (["demo", "--seed", "-1"], "--seed"),
+        (["demo", "--seed", "x"], "--seed"),
+        (["demo", "--nonsense"], "--nonsense"),
+        (["demo", "--commands", "{tmp}/missing"], "missing: can't be read"),
+        (["demo", "--commands", "{tmp}"], "can't be read"),
+        (["demo", "--commands", "{tmp}/empty"], "holds no move"),
+        (["demo", "--commands", "{tmp}/binary"], "binary:1: "),
+        (["demo", "--commands", "{tmp}/plan.jsonl", "--out", "{tmp}/binary"], "can't hold the results"),
+        (["demo", "--commands", "{tmp}/plan.jsonl", "--out", "{tmp}/binary/sub"], "can't hold the results"),
+        (["demo", "--delay", "trace:{tmp}/missing"], "missing: can't be read"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(plan, tmp_path, capsys, arguments, said):
+    (tmp_path / "empty").touch()
+    (tmp_path / "binary").write_bytes(bytes(range(256)))
+    assert _status([argument.format(tmp=tmp_path) for argument in arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("vrs: ")
+    assert said in captured.err
+
+
+def test_help_and_version(capsys):
+    for arguments in ([], ["--help"], ["demo", "--help"], ["doctor", "--help"]):
+        assert _status(arguments) == 0
+    assert _status(["--version"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("vrs-teleop ")
+
+
+def test_ctrl_c_ends_with_130_and_one_line(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from interfaces.cli import main; main()", "demo", "--out", str(tmp_path / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    # The results' directory appears when arguments have been read and the run is about to start.
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "out").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert err.strip().splitlines()[-1] == "vrs: interrupted"

@@ -1,0 +1,56 @@
+"""The checks of `vrs doctor` can fail, and say what to mend."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from interfaces.cli import doctor
+from interfaces.cli.main import _status
+
+
+def test_this_machine_is_fine(capsys):
+    assert _status(["doctor", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["ok"] is True
+    assert {check["name"] for check in report["checks"]} >= {
+        "python", "pybullet", "browser", "ports", "clock", "names",
+    }  # fmt: skip
+
+
+def test_text_says_fine(capsys):
+    assert _status(["doctor"]) == 0
+    assert "This machine is fine." in capsys.readouterr().out
+
+
+def test_a_missing_browser_is_optional(monkeypatch, capsys):
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
+    assert _status(["doctor"]) == 0
+    assert "to mend: install chromium" in capsys.readouterr().out
+
+
+def test_a_package_of_the_same_name_is_found(monkeypatch, capsys):
+    real = doctor.importlib.util.find_spec
+
+    def find_spec(name, package=None):
+        return real("json") if name == "robots" else real(name, package)
+
+    monkeypatch.setattr(doctor.importlib.util, "find_spec", find_spec)
+    assert _status(["doctor"]) == 1
+    assert "robots is" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("code", "stdout", "found"),
+    [(0, "0\n", "without NumPy"), (-11, "", "crashed while loading"), (1, "", "No module named pybullet")],
+)
+def test_a_broken_pybullet_is_found(monkeypatch, code, stdout, found):
+    stderr = "Traceback\nNo module named pybullet\n" if code == 1 else ""
+    done = subprocess.CompletedProcess([sys.executable], code, stdout, stderr)
+    monkeypatch.setattr(doctor.subprocess, "run", lambda *args, **kwargs: done)
+    check = doctor.check_pybullet()
+    assert not check.ok
+    assert check.found == found

@@ -1,0 +1,147 @@
+"""Plan files: what they mean, and that every mistake is named by file and line."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from interfaces.runtime.plan import default_plan, parse_plan, read_plan
+from robots import puma560
+from vrs import Insertion, JointTarget, PoseTarget, Profile
+from vrs.errors import FormatError
+
+model = puma560.model()
+MOVE = '{"issue": 1, "move": [10, 60, -170, 0, 30, 0]}'
+
+
+def parse(*lines):
+    return parse_plan("\n".join(lines).encode(), "plan.jsonl", model)
+
+
+def test_every_field_reaches_its_command():
+    plan = parse(
+        '{"schema": "vrs-plan/1", "title": "T", "start": {"pose": "ready"}, "comment": "c"}',
+        '{"issue": 3, "register": 4.5, "execute": 3.5, "move": [10, 60, -170, 0, 30, 0], "speed": 0.5, '
+        '"profile": "jerk-limited", "insertion": "replace"}',
+        "",
+        '{"issue": 2, "move": {"pose": "nominal"}, "comment": "earlier"}',
+        '{"issue": 5, "payload": {"mass_kg": 2.5}}',
+        '{"issue": 6, "release": true}',
+        '{"comment": "nothing"}',
+    )
+    assert plan.title == "T"
+    assert np.array_equal(plan.start, model.poses["ready"])
+    first, second = plan.motions
+    assert first.where == "plan.jsonl:4"
+    assert first.registered_at == first.command.issued_at == 2
+    assert first.command.execute_at is None
+    assert first.command.target == JointTarget(model.poses["nominal"])
+    assert second.registered_at == 4.5
+    assert (second.command.issued_at, second.command.execute_at, second.command.speed) == (3, 3.5, 0.5)
+    assert second.command.target == JointTarget(np.radians([10, 60, -170, 0, 30, 0]))
+    assert (second.command.profile, second.command.insertion) == (Profile.JERK_LIMITED, Insertion.REPLACE)
+    assert [(item.t, item.mass) for item in plan.payloads] == [(5, 2.5), (6, None)]
+
+
+def test_a_pose_is_zyz_about_the_base():
+    target = parse('{"issue": 0, "move": {"xyz": [0.45, -0.15, 0.1], "zyz_deg": [30, 180, 0]}}').motions[0]
+    X = target.command.target.X
+    assert isinstance(target.command.target, PoseTarget)
+    assert X[:3, 3] == pytest.approx([0.45, -0.15, 0.1])
+    c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
+    assert X[:3, :3] == pytest.approx(np.array([[-c, -s, 0], [-s, c, 0], [0, 0, -1]]))
+
+
+@pytest.mark.parametrize(
+    ("line", "allowed"),
+    [
+        ("{", "a line is a JSON object"),
+        ("[]", "a line is a JSON object"),
+        ("\x00\x01", "a line is a JSON object"),
+        ('{"issue": 1, "mvoe": [0,0,0,0,0,0]}', "mvoe"),
+        ('{"issue": "1", "move": [0,0,0,0,0,0]}', "issue"),
+        ('{"issue": 1e999, "move": [0,0,0,0,0,0]}', "issue"),
+        ('{"issue": NaN, "move": [0,0,0,0,0,0]}', "a line is a JSON object"),
+        ('{"issue": -1, "move": [0,0,0,0,0,0]}', "issue must be seconds in"),
+        ('{"move": [0,0,0,0,0,0]}', "issue must be seconds in"),
+        ('{"issue": 1}', "one of move, payload, release"),
+        ('{"speed": 1}', "one of move, payload, release"),
+        ('{"issue": 1, "move": [0,0,0,0,0]}', "6 finite joint values"),
+        ('{"issue": 1, "move": [0,0,0,0,0,"a"]}', "float"),
+        ('{"issue": 1, "move": [170,0,0,0,0,0]}', "joint 1 must be within"),
+        ('{"issue": 1, "move": {"pose": "nowhere"}}', "one of nominal, ready, stretch, zero"),
+        ('{"issue": 1, "move": {"pose": "ready", "xyz": [0,0,0]}}', "pose alone"),
+        ('{"issue": 1, "move": {"xyz": [0.4,0,0]}}', "zyz_deg must be three finite numbers"),
+        ('{"issue": 1, "move": {"xyz": [9,0,0], "zyz_deg": [0,0,0]}}', "unreachable pose"),
+        ('{"issue": 1, "move": {"xyz": [0.45,0,0], "zyz_deg": [0,180,0], "configuration": "UP"}}', "UP"),
+        ('{"issue": 1, "move": [0,0,0,0,0,0], "speed": 0}', "speed must be a number in"),
+        ('{"issue": 1, "move": [0,0,0,0,0,0], "speed": 1.1}', "speed must be a number in"),
+        ('{"issue": 1, "move": [0,0,0,0,0,0], "profile": "fast"}', "profile"),
+        ('{"issue": 1, "move": [0,0,0,0,0,0], "insertion": "push"}', "insertion"),
+        ('{"issue": 1, "move": [0,0,0,0,0,0], "execute": 1e9}', "execute must be seconds in"),
+        ('{"issue": 2, "register": 1, "move": [0,0,0,0,0,0]}', r"register must be seconds in \[2"),
+        ('{"issue": 1, "move": [0,0,0,0,0,0], "release": true}', "it may hold issue, move"),
+        ('{"issue": 1, "payload": {"mass_kg": 0}}', "mass_kg must be in"),
+        ('{"issue": 1, "payload": {"mass_kg": 1}, "speed": 1}', "it may hold issue, payload"),
+        ('{"issue": 1, "release": false}', "release must be true"),
+        ('{"issue": 1, "release": true}', "allowed is a payload"),
+        ('{"schema": "vrs-plan/1"}', "below the first line"),
+        ('{"title": "late"}', "below the first line"),
+    ],
+)
+def test_each_mistake_is_named_by_file_and_line(line, allowed):
+    with pytest.raises(FormatError, match=r"^plan\.jsonl:2: ") as caught:
+        parse(MOVE, line)
+    assert caught.match(allowed)
+
+
+@pytest.mark.parametrize("header", ['{"schema": "vrs-plan/2"}', '{"title": 3}', '{"title": "x", "issue": 1}'])
+def test_a_bad_header_is_refused(header):
+    with pytest.raises(FormatError, match=r"^plan\.jsonl:1: "):
+        parse(header, MOVE)
+
+
+def test_two_payloads_at_once_are_refused():
+    load = '{"issue": 1, "payload": {"mass_kg": 1}}'
+    with pytest.raises(FormatError, match=r"plan\.jsonl:3: .*allowed is a release"):
+        parse(MOVE, load, load)
+
+
+@pytest.mark.parametrize("data", [b"", b"\n\n", b'{"comment": "x"}', b'{"title": "x"}'])
+def test_a_plan_without_moves_is_refused(data):
+    with pytest.raises(FormatError, match="holds no move"):
+        parse_plan(data, "plan.jsonl", model)
+
+
+def test_unreadable_and_binary_files_are_one_typed_error(tmp_path):
+    binary = tmp_path / "binary"
+    binary.write_bytes(bytes(range(256)))
+    for path in (tmp_path / "missing", tmp_path, binary):
+        with pytest.raises(FormatError, match=str(path)):
+            read_plan(path, model)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.one_of(
+        st.binary(max_size=200), st.text(alphabet='{}[]":,0123456789.-eissuemov \n', max_size=120).map(str.encode)
+    )
+)
+def test_any_bytes_give_a_plan_or_a_typed_error(data):
+    with contextlib.suppress(FormatError):
+        assert parse_plan(data, "plan.jsonl", model).motions
+
+
+def test_deep_nesting_is_one_typed_error():
+    with pytest.raises(FormatError, match=r"^plan\.jsonl:1: "):
+        parse_plan(b'{"move":' + b"[" * 100_000, "plan.jsonl", model)
+
+
+def test_the_default_plan_is_one():
+    plan = default_plan(model)
+    assert len(plan.motions) > 15
+    assert {item.mass for item in plan.payloads} == {2.5, None}

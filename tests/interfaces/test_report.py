@@ -1,0 +1,276 @@
+"""The report's file: whole, escaped, repeatable; and its page in a real browser without a network."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from interfaces.report.html import render, write_report
+from interfaces.report.plots import equal_timeline_time, plots
+from interfaces.report.scene import revolute_chain, scene
+from interfaces.report.summary import summarize
+from interfaces.runtime.run import Event, Packet, TwinRun
+from robots import puma560
+from vrs.commands import Receipt, Status
+from vrs.model import Array
+
+EVIL = '</script><script>window.evil = 1</script><!-- <img src=x onerror="window.evil=2"> & \u2028'
+FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+
+
+def curve(t: Array) -> Array:
+    frequency = np.array([0.11, 0.07, 0.09, 0.21, 0.17, 0.3])
+    return np.array([0, 0.7, -2.2, 0, 0.2, 0]) + 0.6 * np.sin(2 * np.pi * frequency * t[:, None])
+
+
+def make_run(title: str = "Sines", reason: str = "late", k: int = 401, D: float = -0.6) -> TwinRun:
+    t = np.linspace(0.0, 20.0, k)
+    real = curve(np.maximum(t + D, 0.0))
+    answers = (
+        Receipt(1, Status.ACCEPTED, 0.5, 1.0, 1.0, 4.0),
+        Receipt(2, Status.POSTPONED, 5.0, 4.9, 5.0, 8.0, reason=reason),
+        Receipt(3, Status.REJECTED, 9.0, 8.0, reason=reason),
+    )
+    packets = (Packet(1, 0.5, 0.9), Packet(2, 5.0, None), Packet(3, 9.0, 9.4))
+    events = (Event(3.0, "payload", reason),)
+    return TwinRun(puma560.model(), title, 7, "thu", D, t, curve(t), real, real, answers, answers, packets, events)
+
+
+@pytest.fixture(scope="module")
+def report() -> str:
+    run = make_run()
+    return render(run, summarize(run))
+
+
+def test_the_same_run_gives_the_same_bytes_and_a_small_file(report: str, tmp_path: Path) -> None:
+    run = make_run()
+    write_report(tmp_path / "report.html", run, summarize(run))
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == report
+    assert (tmp_path / "report.html").stat().st_size < 8e6
+
+
+def test_it_says_what_was_run(report: str) -> None:
+    for fact in ("Sines", "thu", "−0.600 s", "network, then payload and friction, then servo", "puma560"):
+        assert fact in report
+    for word in ("joint 6 rms [deg]", "tool rms [mm]", "time difference mean", "postponed", "rejected"):
+        assert word in report
+
+
+def test_it_names_no_outside_resource(report: str) -> None:
+    own = re.sub(r"<script>.*?</script>", "", report, flags=re.DOTALL)
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#|data:)|@import|url\((?!#|data:)""", own)
+    assert "20" + "26-" not in own
+
+
+def test_ids_are_unique(report: str) -> None:
+    own = re.sub(r"<script>.*?</script>", "", report, flags=re.DOTALL)
+    ids = re.findall(r'\sid="([^"]+)"', own)
+    assert len(ids) == len(set(ids))
+    for used in re.findall(r'(?:url\(|href=")#([^)"]+)', own):
+        assert used in ids
+
+
+def test_texts_of_users_stay_texts() -> None:
+    run = make_run(title=EVIL, reason=EVIL)
+    page = render(run, summarize(run))
+    assert "<script>window.evil" not in page
+    assert "<img src=x" not in page
+    assert page.count("</script>") == 3
+
+
+def test_a_summary_of_other_names_is_still_shown() -> None:
+    page = render(make_run(), {"novel_m": 0.5, "nested": {"share": 0.25, "list": [1.0, 2.0]}, "note": "<b>hi"})
+    assert "500.000 mm" in page
+    assert "nested: share" in page
+    assert "&lt;b&gt;hi" in page
+    assert render(make_run(), {}).count("<h1>") == 1
+
+
+def test_the_chain_rebuilds_the_models_links() -> None:
+    model = puma560.model()
+    base, A = revolute_chain(model)
+    q = np.random.default_rng(3).uniform(-2, 2, 6)
+    X = base
+    for i in range(6):
+        turn = np.eye(4)
+        turn[:2, :2] = [[np.cos(q[i]), -np.sin(q[i])], [np.sin(q[i]), np.cos(q[i])]]
+        X = X @ turn @ A[i]
+        np.testing.assert_allclose(X, model.links(q)[i + 1], atol=1e-12)
+
+
+def test_equal_timeline_time_takes_the_clock_offset_out() -> None:
+    tau, q_virtual, q_real = equal_timeline_time(make_run(k=2001))
+    assert tau[-1] == pytest.approx(20.0 - 0.6)
+    np.testing.assert_allclose(q_real, q_virtual, atol=1e-9)
+
+
+def test_plots_cover_errors_delays_and_every_joint() -> None:
+    names = [plot.name for plot in plots(make_run())]
+    assert names == ["joint-errors", "tool-error", "delays", *(f"joint-{j}" for j in range(1, 7))]
+
+
+def test_a_run_of_an_hour_still_gives_a_small_file(tmp_path: Path) -> None:
+    run = make_run(k=180_000)
+    write_report(tmp_path / "long.html", run, {})
+    assert (tmp_path / "long.html").stat().st_size < 8e6
+    assert scene(run)["t_end"] <= 20.0
+
+
+def chromium() -> str:
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("no Chromium: install the program chromium")
+        pytest.skip("no Chromium: install the program chromium")
+    return found
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    program = chromium()
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        instance = playwright.chromium.launch(executable_path=program, args=FLAGS)
+        yield instance
+        instance.close()
+
+
+@pytest.fixture
+def open_page(browser: Any, tmp_path: Path) -> Iterator[Any]:
+    """Opens a report offline; at the end no request, console message or error may have been seen."""
+    seen: list[str] = []
+    contexts = []
+
+    def start(page_text: str, width: int = 1280, scheme: str = "light") -> Any:
+        path = tmp_path / "report.html"
+        path.write_text(page_text, encoding="utf-8")
+        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda m: seen.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda e: seen.append(str(e)))
+        page.on("request", lambda r: seen.append(r.url) if r.url.startswith(("http", "ws")) else None)
+        page.goto(path.as_uri())
+        page.wait_for_function("window.report !== undefined")
+        return page
+
+    yield start
+    for context in contexts:
+        context.close()
+    assert seen == []
+
+
+def shares(page: Any) -> list[float]:
+    """Shares of the 3D view's pixels that show the bright solid, and the blue ghost, after a render."""
+    found: list[float] = page.evaluate(
+        """() => { const v = report.scene.viewer; v.render(); const gl = v.renderer.getContext();
+        const n = gl.drawingBufferWidth * gl.drawingBufferHeight, p = new Uint8Array(4 * n);
+        gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, p);
+        let solid = 0, ghost = 0;
+        for (let i = 0; i < p.length; i += 4) {
+          if (Math.min(p[i], p[i + 1], p[i + 2]) > 150 && p[i + 3] > 200) solid++;
+          if (p[i + 2] > p[i] + 40 && p[i + 3] > 60) ghost++;
+        }
+        return [solid / n, ghost / n]; }"""
+    )
+    return found
+
+
+def test_both_twins_are_drawn_where_the_model_puts_them(open_page: Any, report: str) -> None:
+    page = open_page(report)
+    run, at = make_run(), 200
+    t = float(run.t[at])
+    page.evaluate(f"report.seek({t})")
+    for twin, q in (("virtual", run.q_virtual[at]), ("real", run.q_real[at])):
+        drawn = page.evaluate(f"() => report.links(report.joints('{twin}', {t})).map((X) => Array.from(X))")
+        expected = [X.T.ravel() for X in run.model.links(q)]
+        np.testing.assert_allclose(drawn, expected, atol=1e-5)
+        shown = page.evaluate(
+            f"""() => {{ let out; report.scene.viewer.scene.traverse((o) => {{ if (o.name === '{twin}' &&
+            o.children.length === 7) out = o.children.map((c) => c.matrix.toArray()); }}); return out; }}"""
+        )
+        np.testing.assert_allclose(shown, expected, atol=1e-5)
+    page.evaluate("report.scene.viewer.scene_tree.find(['Grid']).object.visible = false")
+    both = shares(page)
+    assert min(both) > 0.005
+    page.evaluate("report.scene.viewer.scene_tree.find(['twins']).object.visible = false")
+    assert max(shares(page)) < 0.2 * min(both)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_fits_its_window(open_page: Any, report: str, width: int, scheme: str) -> None:
+    page = open_page(report, width, scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("[document.querySelector('#pane canvas').clientWidth, pane.clientWidth]") == (
+        [page.evaluate("pane.clientWidth")] * 2
+    )
+    light = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(246, 247, 249)"
+    assert light == (scheme == "light")
+
+
+def test_the_view_follows_a_resized_pane(open_page: Any, report: str) -> None:
+    page = open_page(report)
+    page.set_viewport_size({"width": 700, "height": 900})
+    page.wait_for_function("document.querySelector('#pane canvas').clientWidth === pane.clientWidth")
+    aspect = page.evaluate("[report.scene.viewer.camera.aspect, pane.clientWidth / pane.clientHeight]")
+    assert aspect[0] == pytest.approx(aspect[1])
+
+
+def test_slider_play_rate_and_markers_move_time(open_page: Any, report: str) -> None:
+    page = open_page(report)
+    page.locator("#time").fill("12.5")
+    assert page.locator("#clock").text_content() == "12.50 s"
+    plot, line = (page.locator(f"#plot-joint-2 {part}").bounding_box() for part in (".plot", ".cursor"))
+    drawn = next(plot for plot in plots(make_run()) if plot.name == "joint-2")
+    share = drawn.left + 12.5 / 20.0 * (drawn.right - drawn.left)
+    assert line["x"] - plot["x"] == pytest.approx(share * plot["width"], abs=1.5)
+    assert "command 3: rejected" in page.locator("#now").text_content()
+    marks = page.locator("#marks .mark")
+    assert marks.count() == 5
+    assert page.locator("#marks .mark-lost").count() == 1
+    page.locator("#marks .mark-payload").click()
+    assert page.locator("#clock").text_content() == "3.00 s"
+    page.locator("#rate").select_option("8")
+    page.locator("#play").click()
+    page.wait_for_function("report.time() > 4")
+    page.locator("#play").click()
+    stopped = page.evaluate("report.time()")
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.evaluate("report.time()") == stopped
+
+
+def test_aligned_clocks_bring_the_twins_together(open_page: Any, report: str) -> None:
+    page = open_page(report)
+    page.evaluate("report.seek(8)")
+    first = """() => { const out = {}; report.scene.viewer.scene.traverse((o) => { if (o.children.length === 7
+        && ['virtual', 'real'].includes(o.name)) out[o.name] = o.children[6].matrix.toArray().slice(12, 15); });
+        return Math.hypot(...out.real.map((x, k) => x - out.virtual[k])); }"""
+    assert page.evaluate(first) > 0.02
+    page.locator("#align").check()
+    assert page.evaluate(first) < 1e-3
+
+
+def test_evil_texts_do_not_run(open_page: Any) -> None:
+    run = make_run(title=EVIL, reason=EVIL)
+    page = open_page(render(run, summarize(run)))
+    assert page.evaluate("window.evil === undefined")
+    assert page.locator("h1").text_content().startswith("</script>")
+    page.evaluate("report.seek(6)")
+    assert "</script>" in page.locator("#now").text_content()

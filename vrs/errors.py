@@ -1,0 +1,70 @@
+"""Errors of the engine.
+
+    VrsError
+    ├── InvalidValueError          a value of the wrong shape, type or range (also a ValueError)
+    │   ├── NonFiniteTimeError     a time that is NaN or infinite
+    │   └── OutOfLimitsError       joint values outside the position limits
+    ├── UnreachablePoseError       no arm solution puts the tool there (also a ValueError)
+    ├── UnknownCommandError        a command id that no receipt carries (also a LookupError)
+    ├── PlanningError              no motion within the limits exists or was found
+    └── FormatError                bytes, JSON or a file that is not what it should be (also a ValueError)
+
+Misuse raises; outcomes that a user must expect (postponed, rejected) are values: see `vrs.commands.Receipt`.
+"""
+
+from __future__ import annotations
+
+
+class VrsError(Exception):
+    """Root of every error that this project raises on purpose."""
+
+
+class InvalidValueError(VrsError, ValueError):
+    """A value of the wrong type, shape or range."""
+
+    def __init__(self, name: str, given: object, allowed: str) -> None:
+        self.name, self.given, self.allowed = name, given, allowed
+        super().__init__(f"{name} must be {allowed}; given: {given!r}")
+
+
+class NonFiniteTimeError(InvalidValueError):
+    """A time that is NaN or infinite."""
+
+    def __init__(self, given: object) -> None:
+        super().__init__("time", given, "finite seconds")
+
+
+class OutOfLimitsError(InvalidValueError):
+    """Joint values outside the position limits."""
+
+    def __init__(self, joint: int, given: float, low: float, high: float) -> None:
+        self.joint, self.low, self.high = joint, low, high
+        super().__init__(f"joint {joint + 1}", given, f"within [{low:.6g}, {high:.6g}] rad")
+
+
+class UnreachablePoseError(VrsError, ValueError):
+    """A pose that no arm solution within the limits reaches."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"unreachable pose: {reason}")
+
+
+class UnknownCommandError(VrsError, LookupError):
+    """A command id that the engine never gave out."""
+
+    def __init__(self, command_id: int, newest: int) -> None:
+        self.command_id, self.newest = command_id, newest
+        super().__init__(f"no command {command_id}: ids run from 1 to {newest}")
+
+
+class PlanningError(VrsError):
+    """No motion within the limits from this state to this target."""
+
+
+class FormatError(VrsError, ValueError):
+    """Bytes, JSON or a file that is not what it should be."""
+
+    def __init__(self, where: str, problem: str) -> None:
+        self.where, self.problem = where, problem
+        super().__init__(f"{where}: {problem}")

@@ -1,0 +1,107 @@
+"""What a robot must be for the engine: kinematics, limits, named poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vrs.errors import InvalidValueError, OutOfLimitsError
+
+Array = NDArray[np.float64]
+
+
+def frozen_array(values: ArrayLike) -> Array:
+    """Copy values into a read-only float64 array."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Joint limits, each of shape (n,)."""
+
+    q_min: Array
+    """Lowest position [rad]."""
+    q_max: Array
+    """Highest position [rad], above q_min."""
+    qd_max: Array
+    """Largest speed [rad/s], positive."""
+    qdd_max: Array
+    """Largest acceleration [rad/s²], positive."""
+    qddd_max: Array = field(default_factory=lambda: np.empty(0))
+    """Largest jerk [rad/s³], positive; qdd_max / 0.1 s unless given (an assumption)."""
+
+    def __post_init__(self) -> None:
+        if np.size(self.qddd_max) == 0:
+            object.__setattr__(self, "qddd_max", np.asarray(self.qdd_max, dtype=np.float64) / 0.1)
+        shape = np.shape(self.q_min)
+        for item in fields(self):
+            value = frozen_array(getattr(self, item.name))
+            if value.ndim != 1 or value.shape != shape or not np.isfinite(value).all():
+                raise InvalidValueError(item.name, getattr(self, item.name), f"finite, of shape {shape}")
+            object.__setattr__(self, item.name, value)
+        if not (self.q_min < self.q_max).all():
+            raise InvalidValueError("q_max", self.q_max, f"above q_min = {self.q_min}")
+        for name in ("qd_max", "qdd_max", "qddd_max"):
+            if not (getattr(self, name) > 0).all():
+                raise InvalidValueError(name, getattr(self, name), "positive")
+
+    @property
+    def dof(self) -> int:
+        """Number of joints, n."""
+        return len(self.q_min)
+
+    def check(self, q: Array) -> None:
+        """Raise OutOfLimitsError unless q, shape (n,) [rad], lies within the position limits."""
+        outside = (q < self.q_min) | (q > self.q_max)
+        if outside.any():
+            j = int(np.argmax(outside))
+            raise OutOfLimitsError(j, float(q[j]), float(self.q_min[j]), float(self.q_max[j]))
+
+
+@runtime_checkable
+class RobotModel(Protocol):
+    """Kinematics and limits of an arm of n joints. Poses are of the last link in the base frame."""
+
+    @property
+    def name(self) -> str:
+        """Short name, as in `robots.<name>`."""
+
+    @property
+    def limits(self) -> Limits:
+        """Joint limits."""
+
+    @property
+    def poses(self) -> Mapping[str, Array]:
+        """Named joint positions, each (n,) [rad]."""
+
+    @property
+    def tool_speed(self) -> float:
+        """Nominal linear speed of the tool [m/s]."""
+
+    def forward(self, q: ArrayLike) -> Array:
+        """Pose of the last link, (4, 4), or (k, 4, 4) for q of shape (k, n)."""
+
+    def links(self, q: ArrayLike) -> Array:
+        """Poses of base and links, (n + 1, 4, 4), or (k, n + 1, 4, 4) for q of shape (k, n)."""
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """Geometric Jacobian in the base frame, (6, n): linear rows, then angular rows."""
+
+    def inverse(self, X: ArrayLike, within_limits: bool = True) -> Array:
+        """Every joint solution of one pose, (m, n); m is 0 where none exists."""
+
+    def inverse_near(self, X: ArrayLike, q: ArrayLike, configuration: str | None = None) -> Array:
+        """The solution within limits nearest to q, (n,), of the asked configuration, else of q's own first.
+
+        Raises:
+            UnreachablePoseError: If no solution exists within the limits.
+        """
+
+    def configuration(self, q: ArrayLike) -> str:
+        """Name of the arm configuration at q, for example `RIGHTY ABOVE NOFLIP`."""
