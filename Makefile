@@ -4,7 +4,7 @@ STAMP := .venv/.installed
 DEV_STAMP := .venv/.installed-dev
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types bench clean
+.PHONY: demo test lint types bench wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
@@ -32,6 +32,10 @@ $(STAMP): pyproject.toml constraints.txt | $(PY)
 $(DEV_STAMP): $(STAMP)
 	$(PIP) -e '.[dev]'
 	@touch $@
+
+# The wheel, in an empty environment outside the checkout, does the main job.
+wheel: $(DEV_STAMP)
+	@sh .ci/wheel
 
 clean:
 	rm -rf .venv build dist *.egg-info out

@@ -43,7 +43,7 @@ class State:
 class Chunk:
     """Up to CAPACITY segments that move together. Never changed once it's made."""
 
-    __slots__ = ("coefficients", "durations", "ids", "starts")
+    __slots__ = ("_stack", "_times", "coefficients", "durations", "ids", "starts")
 
     def __init__(
         self, starts: list[float], durations: list[float], coefficients: list[Array], ids: list[int]
@@ -52,16 +52,28 @@ class Chunk:
         self.durations = durations
         self.coefficients = coefficients
         self.ids = ids
+        self._stack: Array | None = None
+        self._times: Array | None = None
 
     def part(self, low: int, high: int) -> Chunk:
         """Segments low to high − 1."""
         cut = slice(low, high)
         return Chunk(self.starts[cut], self.durations[cut], self.coefficients[cut], self.ids[cut])
 
+    @property
+    def times(self) -> Array:
+        """The starts as an array, (m,), made once."""
+        if self._times is None:
+            self._times = np.asarray(self.starts)
+        return self._times
+
+    @property
     def stacked(self) -> Array:
-        """All coefficients, padded to the chunk's highest degree: (m, K, n)."""
-        order = max(len(a) for a in self.coefficients)
-        stack = np.zeros((len(self.starts), order, self.coefficients[0].shape[1]))
-        for row, a in zip(stack, self.coefficients, strict=True):
-            row[: len(a)] = a
-        return stack
+        """All coefficients, padded to the chunk's highest degree: (m, K, n), made once."""
+        if self._stack is None:
+            order = max(len(a) for a in self.coefficients)
+            stack = np.zeros((len(self.starts), order, self.coefficients[0].shape[1]))
+            for row, a in zip(stack, self.coefficients, strict=True):
+                row[: len(a)] = a
+            self._stack = stack
+        return self._stack

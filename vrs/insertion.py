@@ -35,15 +35,19 @@ class Edit:
     notes: str = ""
 
 
-def move_bounds(timeline: Timeline, index: int) -> tuple[int, int]:
-    """First and one-past-last index of the move that a segment belongs to."""
+def end_of_move(timeline: Timeline, index: int) -> int:
+    """One past the last segment of the move that a segment belongs to.
+
+    A move is one command's segments; the hold in which it spends slack before its joining move is part of it.
+    """
     owner = timeline.owner_of(index)
-    low, high = index, index + 1
-    while low > 0 and timeline.owner_of(low - 1) == owner:
-        low -= 1
-    while high < len(timeline) and timeline.owner_of(high) == owner:
-        high += 1
-    return low, high
+    last = len(timeline) - 1
+    while index < last:
+        step = 2 if timeline.owner_of(index + 1) == HOLD and index + 1 < last else 1
+        if timeline.owner_of(index + step) != owner:
+            break
+        index += step
+    return index + 1
 
 
 def insert(
@@ -87,7 +91,7 @@ def insert(
         elif t < timeline.start:
             dropped_to = tail = 0
         else:
-            dropped_to = tail = move_bounds(timeline, index)[1]
+            dropped_to = tail = end_of_move(timeline, index)
     cut = timeline.owners(index, dropped_to)
     new = Piece(plan.durations.tolist(), plan.rows(), command_id)
     if tail is None or not timeline.owners(tail, len(timeline)):

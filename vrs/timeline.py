@@ -207,16 +207,17 @@ class Timeline:
         values = np.empty((len(moments), self.dof))
         chunk_of = np.searchsorted(self._first, moments, side="right") - 1
         chunk_of[moments >= self._end] = len(self._chunks)
-        for c in np.unique(chunk_of):
-            rows = np.flatnonzero(chunk_of == c)
+        order_of = np.argsort(chunk_of, kind="stable")
+        present, first = np.unique(chunk_of[order_of], return_index=True)
+        for c, rows in zip(present.tolist(), np.split(order_of, first[1:]), strict=True):
             if c < 0 or c == len(self._chunks):
                 values[rows] = self._at(float(moments[rows[0]]), order)
                 continue
             offset, chunk = self._offsets[c], self._chunks[c]
-            starts = np.asarray(chunk.starts)
-            index = np.searchsorted(offset + starts, moments[rows], side="right") - 1
-            u = np.maximum((moments[rows] - offset) - starts[index], 0.0)
-            values[rows] = evaluate(chunk.stacked()[index], u, order)
+            starts = offset + chunk.times
+            index = np.searchsorted(starts, moments[rows], side="right") - 1
+            u = np.maximum(moments[rows] - starts[index], 0.0)
+            values[rows] = evaluate(chunk.stacked[index], u, order)
         return values
 
     def _at(self, t: float, order: int) -> Array:
@@ -224,7 +225,7 @@ class Timeline:
         if 0 <= index < len(self):
             c, i = self._locate(index)
             chunk = self._chunks[c]
-            u = (t - self._offsets[c]) - chunk.starts[i]
+            u = t - (self._offsets[c] + chunk.starts[i])
             return evaluate(chunk.coefficients[i], max(u, 0.0), order)
         if order:
             return np.zeros(self.dof)
@@ -252,7 +253,7 @@ class Timeline:
             return State(self.final(), rest, rest)
         c, i = self._locate(index)
         chunk = self._chunks[c]
-        u = min((t - self._offsets[c]) - chunk.starts[i], chunk.durations[i])
+        u = min(t - (self._offsets[c] + chunk.starts[i]), chunk.durations[i])
         a = chunk.coefficients[i]
         q, qd, qdd = (evaluate(a, u, order) for order in range(3))
         qd = np.where(np.abs(qd) < 1e-11, 0.0, qd)
@@ -335,10 +336,11 @@ class Timeline:
     def _join(chunks: list[Chunk], offsets: list[float], chunk: Chunk, offset: float) -> None:
         """Append a chunk, merged with the one before it where both are small."""
         if chunks and len(chunks[-1].starts) + len(chunk.starts) <= CAPACITY:
+            # Absolute starts: a start that is a command's time stays that time to the bit.
             last, base = chunks[-1], offsets[-1]
-            starts = [offset + s - base for s in chunk.starts]
+            offsets[-1] = 0.0
             chunks[-1] = Chunk(
-                last.starts + starts,
+                [base + s for s in last.starts] + [offset + s for s in chunk.starts],
                 last.durations + chunk.durations,
                 last.coefficients + chunk.coefficients,
                 last.ids + chunk.ids,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, Final
 
-from interfaces.report.tables import MEASURES, ROWS
+from interfaces.report.tables import MEASURES
 from vrs.commands import Receipt
 
 Json = Mapping[str, Any]
@@ -34,6 +34,13 @@ UNITS: Final = {
     "path_error": "mm", "time_difference": "s", "speed_error": "m/s", "progress": "%", "cell": "m", "v_max": "m/s",
 }  # fmt: skip
 """Units of the figures on the tool path, by the start of their names."""
+COMPARISONS: Final = {
+    "timeline_time": "equal timeline time",
+    "lag_removed": "best lag removed",
+    "user_time": "as the user sees it",
+    "servo": "real against its reference",
+}
+"""Heads of the error table."""
 SUFFIXES: Final = {"_deg": "deg", "_rad": "rad", "_m": "mm", "_s": "s"}
 SCALES: Final = {"mm": 1e3, "%": 100.0}
 
@@ -132,7 +139,6 @@ def words(name: str) -> str:
 
 
 def _errors(errors: Json) -> str:
-    labels = {key: label.removeprefix("… ") for key, label in ROWS}
     columns = [str(key) for key in errors]
     names: dict[str, None] = {str(name): None for key in columns for name in errors[key]}
     rows: list[list[object]] = []
@@ -145,7 +151,7 @@ def _errors(errors: Json) -> str:
         for j in range(size):
             label = _label(name.replace("joint_", f"joint_{j + 1}_", 1), unit)
             rows.append([label, *(_scaled(v[j], unit) if isinstance(v, list) else None for v in values)])
-    return table(("", *(labels.get(key, words(key)) for key in columns)), rows)
+    return table(("", *(COMPARISONS.get(key, words(key)) for key in columns)), rows)
 
 
 def _attribution(items: Sequence[Json], order: Sequence[str]) -> str:

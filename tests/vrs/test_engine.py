@@ -132,6 +132,20 @@ class TestInsertion:
         assert r.execute_at == 1.4
         assert 3 not in [s.command_id for s in mid.timeline.segments]
 
+    def test_stamps_stay_exact_in_a_tail_that_was_shifted(self, offline):
+        for q in (B, C, D, A, B, C):
+            offline.execute(to(q, offline.timeline.end + 0.3))
+        rng = np.random.default_rng(8)
+        for k in range(300):
+            t = float(offline.timeline.end * rng.random())
+            first = offline.execute(to(rng.permutation([B, C, D])[0] + 1e-3 * k % 0.1, t))
+            starts = [s.start for s in offline.timeline.segments if s.command_id == first.command_id]
+            assert starts[0] == t
+            second = offline.execute(to(A, t))
+            assert first.command_id in second.superseded
+            owners = [s.command_id for s in offline.timeline.segments]
+            assert first.command_id not in owners
+
     def test_a_command_to_where_the_arm_stands_is_true_until_something_moves_it(self, offline):
         still = offline.execute(to(A, 10.0))
         assert still.end == still.execute_at
