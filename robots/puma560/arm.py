@@ -103,6 +103,10 @@ def pose_rows(X: ArrayLike) -> Pose:
 
 def _six(q: ArrayLike) -> Joints:
     """Return q, shape (6,), as floats."""
+    if isinstance(q, np.ndarray) and q.shape == (DOF,) and q.dtype is _FLOAT:
+        q1, q2, q3, q4, q5, q6 = q.tolist()
+        if isfinite(q1 + q2 + q3 + q4 + q5 + q6):
+            return q1, q2, q3, q4, q5, q6
     try:
         array = np.asarray(q)
     except ValueError:
