@@ -152,7 +152,11 @@ class MotionCommand:
 
     target: Target
     issued_at: float | None = None
-    """Issue time t_iss [s]; None is stamped by whoever registers the command."""
+    """Issue time t_iss [s]; None is stamped by whoever registers the command.
+
+    An engine in real-time mode stamps its present time; a command for an earlier t_exec then is rejected, so one
+    that was issued in time and comes late must carry its own stamp to be postponed.
+    """
     execute_at: float | None = None
     """Execution time t_exec [s]; None means as soon as possible: now, or the end of the plan when offline."""
     speed: float = 1.0

@@ -5,6 +5,7 @@ Source: Doulgeri, Zikos, Delopoulos, section II.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import overload
@@ -35,6 +36,10 @@ from vrs.planning.parabolic import brake
 from vrs.timeline import Timeline
 
 _LIMIT_NAMES = ("qd_max", "qdd_max", "qddd_max")
+
+
+UNDO_DEPTH = 1000
+"""Commands that can be taken back, one after the other; each keeps a timeline alive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +101,7 @@ class Engine:
             raise InvalidValueError("timeline", timeline, f"a Timeline of {n} joints")
         self._timeline = timeline
         self._receipts: dict[int, Receipt] = {}
-        self._changes: list[_Change] = []
+        self._changes: deque[_Change] = deque(maxlen=UNDO_DEPTH)
         self._newest = max(timeline.owners(0, len(timeline)), default=0)
         self._stills: list[int] = []
 
