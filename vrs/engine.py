@@ -37,7 +37,6 @@ from vrs.timeline import Timeline
 
 _LIMIT_NAMES = ("qd_max", "qdd_max", "qddd_max")
 
-
 UNDO_DEPTH = 1000
 """Commands that can be taken back, one after the other; each keeps a timeline alive."""
 

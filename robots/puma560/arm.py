@@ -103,15 +103,11 @@ def pose_rows(X: ArrayLike) -> Pose:
 
 def _six(q: ArrayLike) -> Joints:
     """Return q, shape (6,), as floats."""
-    if isinstance(q, np.ndarray) and q.shape == (DOF,) and q.dtype is _FLOAT:
-        q1, q2, q3, q4, q5, q6 = q.tolist()
-        if isfinite(q1 + q2 + q3 + q4 + q5 + q6):
-            return q1, q2, q3, q4, q5, q6
     try:
         array = np.asarray(q)
     except ValueError:
         raise InvalidValueError("q", q, _SIX_ALLOWED) from None
-    if array.shape == (DOF,) and array.dtype.kind in "iuf":
+    if array.shape == (DOF,) and (array.dtype is _FLOAT or array.dtype.kind in "iuf"):
         q1, q2, q3, q4, q5, q6 = array.tolist()
         if isfinite(q1 + q2 + q3 + q4 + q5 + q6):
             return q1, q2, q3, q4, q5, q6
