@@ -2,9 +2,10 @@
 PY := .venv/bin/python
 STAMP := .venv/.installed
 DEV_STAMP := .venv/.installed-dev
+BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types bench wheel clean
+.PHONY: demo test lint types bench soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
@@ -19,8 +20,9 @@ lint: $(DEV_STAMP)
 types: $(DEV_STAMP)
 	.venv/bin/mypy
 
-bench: $(DEV_STAMP)
-	$(PY) -m benchmarks
+# Beside the peers; writes benchmarks/RESULTS.md. Takes some ten minutes.
+bench: $(BENCH_STAMP)
+	$(PY) -m benchmarks --write
 
 $(PY):
 	@sh .ci/venv
@@ -32,6 +34,16 @@ $(STAMP): pyproject.toml constraints.txt | $(PY)
 $(DEV_STAMP): $(STAMP)
 	$(PIP) -e '.[dev]'
 	@touch $@
+
+$(BENCH_STAMP): $(STAMP)
+	$(PIP) -e '.[bench]'
+	@touch $@
+
+# A million random edits of every kind, each held to every law; VRS_SOAK_EDITS and VRS_SOAK_SEED change what is drawn.
+soak: export VRS_SOAK_EDITS ?= 1000000
+soak: $(DEV_STAMP)
+	$(PY) tests/vrs/test_soak.py
+	$(PY) -m pytest tests/vrs/test_machine.py
 
 # The wheel, in an empty environment outside the checkout, does the main job.
 wheel: $(DEV_STAMP)

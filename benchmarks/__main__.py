@@ -1,22 +1,43 @@
-"""Runs every benchmark: `make bench`, or `python -m benchmarks NAME ...` for some."""
+"""Every benchmark: `python -m benchmarks NAME ...` prints some or all, `--write` writes RESULTS.md from all."""
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import sys
+import time
+from pathlib import Path
 
-NAMES = ("kinematics", "engine", "physics")
+from benchmarks import machine, page
+from benchmarks.running import run
+
+PARTS = ("sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "physics")
+"""Benchmarks that give results."""
+DETAILS = ("timeline", "planning", "lines", "steering")
+"""Benchmarks that print more about one thing."""
 
 
-def main(names: list[str]) -> int:
-    unknown = [name for name in names if name not in NAMES]
+def main(words: list[str]) -> int:
+    """Run what the command line asks for."""
+    parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
+    names = [*PARTS, *DETAILS]
+    parser.add_argument("name", nargs="*", help=f"{', '.join(PARTS)} (all by default), {', '.join(DETAILS)}")
+    parser.add_argument("--write", action="store_true", help=f"write {page.PAGE}, its plots and {page.DATA}")
+    asked = parser.parse_args(words)
+    unknown = [name for name in asked.name if name not in names]
     if unknown:
-        print(f"benchmarks: unknown {', '.join(unknown)}; there are {', '.join(NAMES)}", file=sys.stderr)
-        return 2
-    for name in names or NAMES:
-        print(f"== {name}")
-        importlib.import_module(f"benchmarks.{name}").main()
-    return 0
+        parser.error(f"unknown {', '.join(unknown)}; there are {', '.join(names)}")
+    if asked.write and asked.name:
+        parser.error("--write runs everything: name nothing")
+    for name in asked.name:
+        if name in DETAILS:
+            importlib.import_module(f"benchmarks.{name}").main()
+    parts = [name for name in asked.name or PARTS if name in PARTS]
+    facts, start = machine.facts(), time.monotonic()
+    found = run(parts)
+    if asked.write:
+        print(page.write(found, facts, (time.monotonic() - start) / 60, Path(__file__).parent))
+    return any(isinstance(part, str) for part in found.values())
 
 
 if __name__ == "__main__":

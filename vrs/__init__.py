@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from vrs.clock import Clock, ManualClock, OffsetClock, WallClock
 from vrs.commands import (
+    Cancel,
     DriveCommand,
+    Frame,
     Insertion,
+    InsertVia,
     JointTarget,
     Lateness,
     Motion,
@@ -15,19 +18,26 @@ from vrs.commands import (
     Position,
     PositionQuery,
     Profile,
-    Receipt,
-    Status,
+    Resume,
+    Retime,
+    ScaleTime,
+    SteerCommand,
+    Stop,
 )
 from vrs.engine import Engine
 from vrs.model import Limits, RobotModel
+from vrs.receipt import Receipt, Status
 from vrs.segment import ArcSegment, PolynomialSegment, Segment
 from vrs.timeline import Timeline
 
 __all__ = [
     "ArcSegment",
+    "Cancel",
     "Clock",
     "DriveCommand",
     "Engine",
+    "Frame",
+    "InsertVia",
     "Insertion",
     "JointTarget",
     "Lateness",
@@ -43,9 +53,14 @@ __all__ = [
     "PositionQuery",
     "Profile",
     "Receipt",
+    "Resume",
+    "Retime",
     "RobotModel",
+    "ScaleTime",
     "Segment",
     "Status",
+    "SteerCommand",
+    "Stop",
     "Timeline",
     "WallClock",
 ]

@@ -1,4 +1,4 @@
-"""Commands, their parts, and the receipts that answer them.
+"""Commands and their parts.
 
 Stamps are seconds on the timeline of the engine that receives the command.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,12 +53,16 @@ class Lateness(enum.StrEnum):
     REJECT = "reject"
 
 
-class Status(enum.StrEnum):
-    """Outcome of a motion command."""
+class Frame(enum.StrEnum):
+    """Where a twist is expressed."""
 
-    ACCEPTED = "accepted"
-    POSTPONED = "postponed"
-    REJECTED = "rejected"
+    BASE = "base"
+    """The robot's base frame."""
+    TOOL = "tool"
+    """The frame of the last link."""
+
+
+_Kind = TypeVar("_Kind", bound=enum.StrEnum)
 
 
 def finite(name: str, value: object, allowed: str = "a finite number") -> float:
@@ -164,6 +168,8 @@ class MotionCommand:
     motion: Motion = Motion.JOINT
     profile: Profile = Profile.PARABOLIC
     insertion: Insertion = Insertion.SPLICE
+    deviation: float = 0.0
+    """How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.target, (JointTarget, PoseTarget)):
@@ -173,13 +179,9 @@ class MotionCommand:
         if not 1e-3 <= speed <= 1:
             raise InvalidValueError("speed", self.speed, "a number in (0, 1], at least 0.001 so that it arrives")
         object.__setattr__(self, "speed", speed)
+        object.__setattr__(self, "deviation", _deviation(self.deviation))
         for name, kind in (("motion", Motion), ("profile", Profile), ("insertion", Insertion)):
-            value = getattr(self, name)
-            try:
-                object.__setattr__(self, name, kind(value))
-            except ValueError:
-                words = ", ".join(str(item) for item in kind)
-                raise InvalidValueError(name, value, f"one of {words}") from None
+            object.__setattr__(self, name, _word(name, getattr(self, name), kind))
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +227,150 @@ class DriveCommand:
         _check_stamps(self)
 
 
-def _check_stamps(command: MotionCommand | DriveCommand) -> None:
+@dataclass(frozen=True, slots=True)
+class SteerCommand:
+    """Move as a hand on a joystick asks: joint rates, or a twist of the tool; it ends by itself."""
+
+    rates: Array | None = None
+    """Joint rates [rad/s], (n,)."""
+    twist: Array | None = None
+    """Twist of the tool, (6,): linear [m/s], then angular [rad/s]; instead of rates."""
+    frame: Frame = Frame.BASE
+    """Frame of the twist."""
+    issued_at: float | None = None
+    """Issue time t_iss [s]; an input older than 0.2 s moves nothing."""
+    execute_at: float | None = None
+    """Execution time t_exec [s]; None means as soon as possible."""
+
+    def __post_init__(self) -> None:
+        if (self.rates is None) == (self.twist is None):
+            raise InvalidValueError("steering", (self.rates, self.twist), "either rates or a twist")
+        if self.rates is not None:
+            rates = finite_array("rates", self.rates, None, "finite joint rates [rad/s], shape (n,)")
+            if rates.ndim != 1:
+                raise InvalidValueError("rates", self.rates, "finite joint rates [rad/s], shape (n,)")
+            object.__setattr__(self, "rates", rates)
+        if self.twist is not None:
+            object.__setattr__(self, "twist", finite_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
+        object.__setattr__(self, "frame", _word("frame", self.frame, Frame))
+        _check_stamps(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Retime:
+    """Let a scheduled move begin at another time."""
+
+    command_id: int
+    execute_at: float
+    """New start [s]."""
+    issued_at: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_id(self.command_id)
+        finite("execute_at", self.execute_at, "finite seconds")
+        _check_stamps(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """Take a scheduled move out of the plan; one under way brakes."""
+
+    command_id: int
+    issued_at: float | None = None
+    execute_at: float | None = None
+    """When [s]; None means as soon as possible."""
+
+    def __post_init__(self) -> None:
+        _check_id(self.command_id)
+        _check_stamps(self)
+
+
+@dataclass(frozen=True, slots=True)
+class InsertVia:
+    """Let a scheduled move, or what is left of one under way, go by another place."""
+
+    command_id: int
+    target: Target
+    deviation: float = 0.0
+    """How far the tool may stay away from the via [m], so as not to stop there; 0 stops."""
+    issued_at: float | None = None
+    execute_at: float | None = None
+    """When a move under way turns to the via [s]; None means as soon as possible."""
+
+    def __post_init__(self) -> None:
+        _check_id(self.command_id)
+        if not isinstance(self.target, (JointTarget, PoseTarget)):
+            raise InvalidValueError("target", self.target, "a JointTarget or a PoseTarget")
+        object.__setattr__(self, "deviation", _deviation(self.deviation))
+        _check_stamps(self)
+
+
+@dataclass(frozen=True, slots=True)
+class ScaleTime:
+    """Run what is scheduled `factor` times as fast: the path stays, holds are scaled too."""
+
+    factor: float
+    """Ratio of the new pace to the present one, 0.001 to 1000."""
+    issued_at: float | None = None
+    execute_at: float | None = None
+    """When it begins [s]; None means as soon as possible (offline: the start of the timeline)."""
+
+    def __post_init__(self) -> None:
+        factor = finite("factor", self.factor, "a number from 0.001 to 1000")
+        if not 1e-3 <= factor <= 1e3:
+            raise InvalidValueError("factor", self.factor, "a number from 0.001 to 1000")
+        object.__setattr__(self, "factor", factor)
+        _check_stamps(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Stop along the present motion as fast as the limits allow, and drop what is scheduled."""
+
+    issued_at: float | None = None
+    execute_at: float | None = None
+    """When [s]; None means as soon as possible. A late stop stops at once, whatever the lateness policy."""
+
+    def __post_init__(self) -> None:
+        _check_stamps(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """Go on with what a stop interrupted and dropped."""
+
+    issued_at: float | None = None
+    execute_at: float | None = None
+    """When [s]; None means as soon as possible."""
+
+    def __post_init__(self) -> None:
+        _check_stamps(self)
+
+
+PlanEdit: TypeAlias = Retime | Cancel | InsertVia | ScaleTime | Stop | Resume
+"""Edits of what is scheduled."""
+
+
+def _check_id(command_id: object) -> None:
+    if isinstance(command_id, bool) or not isinstance(command_id, (int, np.integer)) or command_id < 1:
+        raise InvalidValueError("command_id", command_id, "a command's id, an integer from 1")
+
+
+def _deviation(value: object) -> float:
+    deviation = finite("deviation", value, "metres ≥ 0")
+    if deviation < 0:
+        raise InvalidValueError("deviation", value, "metres ≥ 0")
+    return deviation
+
+
+def _word(name: str, value: object, kind: type[_Kind]) -> _Kind:
+    try:
+        return kind(value)  # type: ignore[arg-type]
+    except ValueError:
+        raise InvalidValueError(name, value, f"one of {', '.join(str(item) for item in kind)}") from None
+
+
+def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdit) -> None:
     for name in ("issued_at", "execute_at"):
         value = getattr(command, name)
         if value is not None:
@@ -235,7 +380,7 @@ def _check_stamps(command: MotionCommand | DriveCommand) -> None:
             object.__setattr__(command, name, stamp)
 
 
-Command: TypeAlias = MotionCommand | DriveCommand | PositionQuery | ParameterChange
+Command: TypeAlias = MotionCommand | DriveCommand | SteerCommand | PlanEdit | PositionQuery | ParameterChange
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -248,36 +393,3 @@ class Position:
     """Joint values [rad], (n,)."""
     X: Array
     """Pose of the last link in the base frame, (4, 4)."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Receipt:
-    """What became of a motion command; it belongs to one version of the timeline."""
-
-    command_id: int
-    """Id of the command, from 1; rejected commands have one too."""
-    status: Status
-    issued_at: float | None
-    """Issue time [s]; None where none was given to an offline engine."""
-    asked_at: float | None
-    """Execution time that was asked for [s]; None where none was."""
-    execute_at: float | None = None
-    """Start of the motion [s]; None when rejected."""
-    end: float | None = None
-    """Arrival [s]; None when rejected."""
-    q: Array | None = None
-    """Joints of the target [rad], (n,), poses resolved; None when rejected."""
-    reason: str = ""
-    """Why it was postponed or rejected, or what else the user must know."""
-    version: int = 0
-    """Version of the timeline that the command made, or left when rejected."""
-    shifted: tuple[int, ...] = ()
-    """Ids of commands whose moves now come later."""
-    shift: float = 0.0
-    """Δ by which they were shifted [s]."""
-    superseded: tuple[int, ...] = ()
-    """Ids of commands that will not arrive any more, wholly or in part."""
-    superseded_by: int | None = None
-    """Id of the later command that cut this one short or dropped it; None while it stands."""
-    undone: bool = False
-    """Whether it was taken back."""

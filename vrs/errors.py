@@ -7,6 +7,7 @@
     ├── UnreachablePoseError       no arm solution puts the tool there (also a ValueError)
     ├── UnknownCommandError        a command id that no receipt carries (also a LookupError)
     ├── PlanningError              no motion within the limits exists or was found
+    │   └── UnresolvedError        a straight line too near a singularity for the joints to be smooth along it
     └── FormatError                bytes, JSON or a file that is not what it should be (also a ValueError)
 
 Misuse raises; outcomes that a user must expect (postponed, rejected) are values: see `vrs.commands.Receipt`.
@@ -60,6 +61,17 @@ class UnknownCommandError(VrsError, LookupError):
 
 class PlanningError(VrsError):
     """No motion within the limits from this state to this target."""
+
+
+class UnresolvedError(PlanningError):
+    """The joints along a line are no smooth functions of the way: a singularity is there, or next to it."""
+
+    def __init__(self, joint: int, place: str) -> None:
+        self.joint, self.place = joint, place
+        super().__init__(
+            f"no straight line: it passes too near a singularity, where joint {joint + 1} turns too fast, "
+            f"at {place}"
+        )
 
 
 class FormatError(VrsError, ValueError):

@@ -4,19 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
 from vrs.chunk import HOLD, Piece, State
 from vrs.commands import Insertion
 from vrs.model import Array
-from vrs.planning import Plan
+from vrs.planning import Plan, empty
 from vrs.timeline import Timeline
 
-MovePlanner = Callable[[State], tuple[Plan, str]]
-"""Plans the new move from the state at its start."""
+MovePlanner = Callable[[State], tuple[Plan, Array, str]]
+"""Plans the new move from the state at its start: the plan, the joints where it ends, what the user must know."""
 JoinPlanner = Callable[[Array, State], tuple[Plan, str]]
 """Plans from rest at the new target to the state in which the tail begins."""
+
+_SLIVER = 1e-12
+"""Duration [s] below which a segment is only rounding."""
+
+_SAME = 1e-12
+"""Difference of coefficients [rad / s**power] that's only rounding."""
+
+_ROUNDED_MOST = 64
+"""Segments of a move that the next one may overlap."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Where a move goes: what stays before it and what follows it."""
+
+    cut: float
+    """What lies before stays [s]."""
+    start: float
+    """Start of the move [s], at or after the cut."""
+    state: State
+    """At the start."""
+    tail: int | None
+    """Index of the first segment that follows; None for none."""
+    lead: tuple[Piece, ...] = ()
+    """What comes between the cut and the start."""
+    note: str = ""
+    """What the user must know of that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,30 +52,40 @@ class Edit:
     """What an insertion makes."""
 
     timeline: Timeline
+    start: float
+    """When the new move begins [s]."""
     arrival: float
-    """When the new move is at its target [s]."""
+    """When it's at its target [s]."""
+    target: Array
+    """Where it arrives [rad], (n,)."""
     shift: float = 0.0
     """Δ of the tail [s]."""
-    shifted: tuple[int, ...] = ()
-    """Commands whose moves come later."""
-    cut: tuple[int, ...] = ()
-    """Commands of which segments were dropped or shortened."""
+    tail: int | None = None
+    """Index, in the timeline before, of the first segment that follows; None for none."""
+    dropped: tuple[int, ...] | None = ()
+    """Commands of which segments were dropped or shortened; None for all that arrive later."""
     notes: str = ""
+
+
+def next_move(timeline: Timeline, index: int) -> int | None:
+    """The first segment from an index on that isn't a hold; None if there's none."""
+    if index < len(timeline) and timeline.owner_of(index) == HOLD:
+        index = timeline.end_of_run(index)
+    return index if index < len(timeline) else None
 
 
 def end_of_move(timeline: Timeline, index: int) -> int:
     """One past the last segment of the move that a segment belongs to.
 
-    A move is one command's segments; the hold in which it spends slack before its joining move is part of it.
+    A move is one command's segments; holds in which it spends slack before its joining move are part of it.
     """
     owner = timeline.owner_of(index)
-    last = len(timeline) - 1
-    while index < last:
-        step = 2 if timeline.owner_of(index + 1) == HOLD and index + 1 < last else 1
-        if timeline.owner_of(index + step) != owner:
-            break
-        index += step
-    return index + 1
+    while True:
+        end = timeline.end_of_run(index)
+        following = next_move(timeline, end)
+        if following is None or timeline.owner_of(following) != owner:
+            return end
+        index = following
 
 
 def insert(
@@ -61,8 +99,7 @@ def insert(
     """Put a move into the timeline at t.
 
     The past stays; the interrupted move's rest is dropped; with SPLICE the moves after it follow, shifted as a
-    whole by one Δ ≥ 0, behind a joining move. Slack is spent at rest: at the tail's first state or, if that
-    state moves, at the new target.
+    whole by one Δ ≥ 0, behind a joining move.
 
     Args:
         timeline: What is scheduled.
@@ -75,51 +112,138 @@ def insert(
     Raises:
         PlanningError: If a planner has no plan.
     """
-    state = timeline.state_before(t)
-    plan, note = plan_move(state)
-    target = _end_position(plan, state)
-    arrival = t + plan.duration
-    index = max(timeline.index_at(t), 0) if t < timeline.end else len(timeline)
-    dropped_to = len(timeline)
-    tail = None
-    if index < len(timeline):
+    gap, dropped = gap_at(timeline, t, how)
+    return fill(timeline, gap, command_id, plan_move, plan_join, dropped)
+
+
+def gap_at(timeline: Timeline, t: float, how: Insertion) -> tuple[Gap, tuple[int, ...] | None]:
+    """The gap that a move at t makes for itself, and the commands that lose segments to it; see Edit."""
+    tail: int | None = None
+    dropped: tuple[int, ...] | None = ()
+    if t < timeline.end and len(timeline):
+        index = max(timeline.index_at(t), 0)
         if how is Insertion.REPLACE:
-            tail = None
+            dropped = None
         elif timeline.owner_of(index) == HOLD:
-            dropped_to = index if t < timeline.start else index + 1
-            tail = dropped_to
+            tail = index if t < timeline.start else index + 1
         elif t < timeline.start:
-            dropped_to = tail = 0
+            tail = 0
         else:
-            dropped_to = tail = end_of_move(timeline, index)
-    cut = timeline.owners(index, dropped_to)
-    new = Piece(plan.durations.tolist(), plan.rows(), command_id)
-    if tail is None or not timeline.owners(tail, len(timeline)):
-        return Edit(timeline.edited(t, [new]), arrival, cut=cut, notes=note)
+            tail = end_of_move(timeline, index)
+            dropped = (timeline.owner_of(index),)
+    return Gap(t, t, timeline.state_before(t), tail), dropped
+
+
+def move_before(timeline: Timeline, t: float, earliest: float) -> tuple[Plan, float, int] | None:
+    """The move that ends at rest at t, as far as it begins at `earliest` or later; when, and its command."""
+    index = len(timeline) if t >= timeline.end else timeline.index_at(t)
+    last = index - 1
+    if last < 0 or timeline.start_of(index) != t or timeline.owner_of(last) == HOLD:
+        return None
+    owner, low = timeline.owner_of(last), last
+    while low > 0 and timeline.owner_of(low - 1) == owner and last - low < _ROUNDED_MOST:
+        low -= 1
+    segments = [timeline.segment(i) for i in range(low, index) if timeline.start_of(i) >= earliest]
+    if not segments or timeline.state_before(t).qd.any():
+        return None
+    stack = np.zeros((len(segments), max(len(s.coefficients) for s in segments), timeline.dof))
+    for row, segment in zip(stack, segments, strict=True):
+        row[: len(segment.coefficients)] = segment.coefficients
+    return Plan(np.array([s.duration for s in segments]), stack), segments[0].start, owner
+
+
+def fill(
+    timeline: Timeline,
+    gap: Gap,
+    command_id: int,
+    plan_move: MovePlanner,
+    plan_join: JoinPlanner,
+    dropped: tuple[int, ...] | None = (),
+) -> Edit:
+    """Put a move into a gap, with a joining move to what follows.
+
+    Slack is spent at rest: at the tail's first state or, if that state moves, at the new target.
+
+    Args:
+        timeline: What is scheduled.
+        gap: Where the move goes.
+        command_id: Owner of the new segments.
+        plan_move: See MovePlanner.
+        plan_join: See JoinPlanner.
+        dropped: Commands that lose segments to the gap; see Edit.
+
+    Raises:
+        PlanningError: If a planner has no plan.
+    """
+    plan, target, note = plan_move(gap.state)
+    arrival = gap.start + plan.duration
+    pieces = [*gap.lead, piece(plan, command_id)]
+    tail = gap.tail
+    if tail is None or next_move(timeline, tail) is None:
+        after = timeline.edited(gap.cut, pieces)
+        return Edit(after, gap.start, arrival, target, dropped=dropped, notes=joined(gap.note, note))
     scheduled = timeline.start_of(tail)
     goal = timeline.state_after(tail)
     join, join_note = plan_join(target, goal)
-    joining = Piece(join.durations.tolist(), join.rows(), command_id)
+    joining = piece(join, command_id)
     ready = arrival + join.duration
     slack = scheduled - ready
-    pieces = [new, joining]
     if slack > 0:
         moving = bool(goal.qd.any())
-        rest = np.array(target if moving else goal.q)[None]
-        rest.flags.writeable = False
-        pieces.insert(1 if moving else 2, Piece([slack], [rest], HOLD))
-    begin = scheduled if slack >= 0 else ready
-    after = timeline.edited(t, pieces, tail, begin)
-    late = begin - scheduled
-    shifted = timeline.owners(tail, len(timeline)) if late > 0 else ()
-    return Edit(after, arrival, late, shifted, cut, "; ".join(text for text in (note, join_note) if text))
+        rest = hold(slack, target if moving else goal.q)
+        pieces += [rest, joining] if moving else [joining, rest]
+    else:
+        pieces.append(joining)
+    after = timeline.edited(gap.cut, pieces, tail, scheduled if slack >= 0 else ready)
+    notes = joined(gap.note, note, join_note)
+    return Edit(after, gap.start, arrival, target, max(-slack, 0.0), tail, dropped, notes)
 
 
-def _end_position(plan: Plan, state: State) -> Array:
-    if len(plan) == 0:
-        return state.q
-    a, h = plan.coefficients[-1], float(plan.durations[-1])
-    value = a[-1]
-    for row in a[-2::-1]:
-        value = value * h + row
-    return np.asarray(value)
+def stay(note: str) -> MovePlanner:
+    """Plan to stay where the arm is."""
+    return lambda state: (empty(len(state.q)), state.q, note)
+
+
+def piece(plan: Plan, command_id: int) -> Piece:
+    """A plan as a piece for an edit, without segments too short to end later than they start."""
+    durations, rows = plan.durations.tolist(), plan.rows()
+    if durations and min(durations) < _SLIVER:
+        kept = [i for i, h in enumerate(durations) if h >= _SLIVER]
+        durations, rows = [durations[i] for i in kept], [rows[i] for i in kept]
+    return Piece(durations, rows, command_id)
+
+
+def lengthened(timeline: Timeline, t: float, new: Piece) -> Timeline:
+    """Put a piece at t; where its first segment goes on as the command's present one, that one is lengthened."""
+    index = timeline.index_at(t)
+    if new.durations and 0 <= index < len(timeline) and timeline.owner_of(index) == new.command_id:
+        present = timeline.segment(index)
+        late = t - present.start
+        goes_on = shifted(present.coefficients, late)
+        first = new.coefficients[0]
+        if late > 0 and goes_on.shape == first.shape and np.abs(goes_on - first).max() <= _SAME:
+            durations = [late + new.durations[0], *new.durations[1:]]
+            rows = [present.coefficients, *new.coefficients[1:]]
+            return timeline.edited(present.start, [Piece(durations, rows, new.command_id)])
+    return timeline.edited(t, [new])
+
+
+def shifted(coefficients: Array, u: float) -> Array:
+    """Coefficients (K, n) in powers of the time since u [s] after their own start."""
+    K = len(coefficients)
+    M = [[comb(j, k) * u ** (j - k) if j >= k else 0.0 for j in range(K)] for k in range(K)]
+    moved: Array = np.array(M) @ coefficients
+    moved.flags.writeable = False
+    return moved
+
+
+def hold(duration: float, q: Array) -> Piece:
+    """A hold at q, (n,) [rad], for a duration [s]."""
+    rest = np.array(q)[None]
+    rest.flags.writeable = False
+    return Piece([duration], [rest], HOLD)
+
+
+def joined(*texts: str) -> str:
+    """Texts that aren't empty, as one."""
+    return "; ".join(text for text in texts if text)

@@ -84,6 +84,14 @@ class RobotModel(Protocol):
     def tool_speed(self) -> float:
         """Nominal linear speed of the tool [m/s]."""
 
+    @property
+    def tool_turn_speed(self) -> float:
+        """Nominal angular speed of the tool [rad/s]."""
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length [m] by which linear rows of the Jacobian are divided before its condition number is taken."""
+
     def forward(self, q: ArrayLike) -> Array:
         """Pose of the last link, (4, 4), or (k, 4, 4) for q of shape (k, n)."""
 
@@ -91,7 +99,10 @@ class RobotModel(Protocol):
         """Poses of base and links, (n + 1, 4, 4), or (k, n + 1, 4, 4) for q of shape (k, n)."""
 
     def jacobian(self, q: ArrayLike) -> Array:
-        """Geometric Jacobian in the base frame, (6, n): linear rows, then angular rows."""
+        """Geometric Jacobian in the base frame, linear rows, then angular rows.
+
+        (6, n), or (k, 6, n) for q of shape (k, n).
+        """
 
     def inverse(self, X: ArrayLike, within_limits: bool = True) -> Array:
         """Every joint solution of one pose, (m, n); m is 0 where none exists."""
@@ -101,6 +112,14 @@ class RobotModel(Protocol):
 
         Raises:
             UnreachablePoseError: If no solution exists within the limits.
+        """
+
+    def follow(self, X: ArrayLike, q: ArrayLike, configuration: str | None = None) -> Array:
+        """Inverse kinematics along a path: solutions of poses in a row, (k, 4, 4), that go on from q, (n,).
+
+        They keep q's configuration, or that which is asked for, and no joint jumps; position limits aren't
+        considered. (k, n), NaN from the first pose on that isn't reached. At a pose that leaves joints free,
+        they may be anything.
         """
 
     def configuration(self, q: ArrayLike) -> str:

@@ -37,6 +37,14 @@ def _check_span(start: float, duration: float) -> tuple[float, float]:
     return start, duration
 
 
+def _check_owner(command_id: object) -> None:
+    if command_id is None:
+        return
+    whole = isinstance(command_id, (int, np.integer)) and not isinstance(command_id, bool)
+    if not whole or not -(2**63) <= command_id < 2**63:  # type: ignore[operator]
+        raise InvalidValueError("command_id", command_id, "None or an integer of 64 bits")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PolynomialSegment:
     """Joints on polynomials of t − start, valid on [start, end). Source: Doulgeri et al., eq. (3)."""
@@ -48,7 +56,7 @@ class PolynomialSegment:
     coefficients: Array
     """a, shape (degree + 1, n), ascending powers of t − start, [rad / s**power]."""
     command_id: int | None = None
-    """The command that made it; None for a hold."""
+    """The command that made it, an integer of 64 bits; None for a hold."""
 
     def __post_init__(self) -> None:
         start, duration = _check_span(self.start, self.duration)
@@ -59,6 +67,7 @@ class PolynomialSegment:
         if coefficients.ndim != 2 or 0 in coefficients.shape:
             raise InvalidValueError("coefficients", self.coefficients, allowed)
         object.__setattr__(self, "coefficients", coefficients)
+        _check_owner(self.command_id)
 
     @property
     def end(self) -> float:
@@ -109,7 +118,7 @@ class ArcSegment:
     w: float
     """Angular speed [rad/s], to the left positive."""
     command_id: int | None = None
-    """The command that made it; None for standing."""
+    """The command that made it, an integer of 64 bits; None for standing."""
 
     def __post_init__(self) -> None:
         start, duration = _check_span(self.start, self.duration)
@@ -119,6 +128,7 @@ class ArcSegment:
         object.__setattr__(self, "posture", tuple(float(value) for value in posture))
         object.__setattr__(self, "v", finite("v", self.v, "finite m/s"))
         object.__setattr__(self, "w", finite("w", self.w, "finite rad/s"))
+        _check_owner(self.command_id)
 
     @property
     def end(self) -> float:

@@ -7,7 +7,7 @@ from html import escape
 from typing import Any, Final
 
 from interfaces.report.tables import MEASURES
-from vrs.commands import Receipt
+from vrs.receipt import Receipt
 
 Json = Mapping[str, Any]
 

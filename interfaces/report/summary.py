@@ -11,9 +11,9 @@ import numpy as np
 from interfaces.runtime.attribution import CAUSES, Attribution
 from interfaces.runtime.run import TwinRun
 from interfaces.runtime.virtual import QUANTILE, status_counts
-from vrs.commands import Receipt
 from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
 from vrs.model import Array
+from vrs.receipt import Receipt
 
 SCHEMA = "vrs-summary/1"
 DIGITS = 9

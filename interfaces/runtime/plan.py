@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 import msgspec
 import numpy as np
 
-from vrs.commands import Insertion, JointTarget, MotionCommand, PoseTarget, Profile, Target
+from vrs.commands import Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Profile, Target
 from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
 from vrs.model import Array, RobotModel
 
@@ -26,7 +26,7 @@ MAX_COMMANDS = 5000
 
 ALLOWED = (
     'a line is a JSON object: {"issue": seconds, "move": target} with optional execute, register, speed, '
-    'profile, insertion; or {"issue": seconds, "payload": {"mass_kg": number}}; or {"issue": seconds, '
+    'motion, profile, insertion; or {"issue": seconds, "payload": {"mass_kg": number}}; or {"issue": seconds, '
     '"release": true}; or, first, a header with schema, title, start; each with an optional comment'
 )
 
@@ -89,6 +89,7 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     execute: float | None = None
     move: _Move | None = None
     speed: float | None = None
+    motion: Motion | None = None
     profile: Profile | None = None
     insertion: Insertion | None = None
     payload: _Load | None = None
@@ -97,7 +98,7 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 _HEADER = ("schema", "title", "start")
-_MOTION = ("register", "execute", "speed", "profile", "insertion")
+_MOTION = ("register", "execute", "speed", "motion", "profile", "insertion")
 
 
 def default_plan(model: RobotModel) -> Plan:
@@ -203,6 +204,7 @@ def _motion(line: _Line, move: _Move, where: str, model: RobotModel) -> PlannedM
         issued_at=issue,
         execute_at=None if line.execute is None else _time("execute", line.execute),
         speed=1.0 if line.speed is None else line.speed,
+        motion=line.motion or Motion.JOINT,
         profile=line.profile or Profile.PARABOLIC,
         insertion=line.insertion or Insertion.SPLICE,
     )

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vrs.commands import Receipt
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
+from vrs.receipt import Receipt
 
 
 @dataclass(frozen=True, slots=True)

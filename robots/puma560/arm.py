@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import dist, isfinite, tau
+from math import dist, isfinite, sin, tau
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.puma560 import turns
+from robots.puma560.batch import inverse_along
 from robots.puma560.branches import (
     ORTHONORMAL,
+    TIE,
     Asked,
     Branch,
     Joints,
@@ -29,7 +31,7 @@ from robots.puma560.branches import (
     spell,
 )
 from robots.puma560.kinematics import geometric_jacobian, link_poses
-from robots.puma560.parameters import DOF, POSES, TOOL_SPEED, default_limits
+from robots.puma560.parameters import A2, DOF, POSES, TOOL_SPEED, TOOL_TURN_SPEED, default_limits
 from vrs.commands import finite, finite_array
 from vrs.errors import InvalidValueError, UnreachablePoseError
 from vrs.model import Array, Limits
@@ -42,6 +44,7 @@ _BOTTOM: Final = [0.0, 0.0, 0.0, 1.0]
 _FLOAT: Final = np.dtype(np.float64)
 _TURNS_MAX: Final = 2 * tau
 _X_ALLOWED: Final = f"a homogeneous transform, (4, 4), its rotation orthonormal to {ORTHONORMAL:g}"
+_ROW_ALLOWED: Final = "finite homogeneous transforms, shape (k, 4, 4)"
 _SIX_ALLOWED: Final = "finite joint values [rad], shape (6,)"
 _Q_ALLOWED: Final = "finite joint values [rad], shape (6,) or (k, 6)"
 
@@ -134,6 +137,8 @@ class Puma560:
     """Joint limits, n = 6; positions within ±4π rad."""
     tool_speed: float = TOOL_SPEED
     """Nominal linear speed of the tool [m/s], positive."""
+    tool_turn_speed: float = TOOL_TURN_SPEED
+    """Nominal angular speed of the tool [rad/s], positive."""
     _low: Joints = field(init=False, repr=False)
     _high: Joints = field(init=False, repr=False)
 
@@ -143,10 +148,12 @@ class Puma560:
         low, high = _six(self.limits.q_min), _six(self.limits.q_max)
         if max(map(abs, low + high)) > _TURNS_MAX:
             raise InvalidValueError("limits", self.limits, "position limits within ±4π rad")
-        speed = finite("tool_speed", self.tool_speed, "a positive number [m/s]")
-        if speed <= 0:
-            raise InvalidValueError("tool_speed", self.tool_speed, "a positive number [m/s]")
-        object.__setattr__(self, "tool_speed", speed)
+        for name, unit in (("tool_speed", "m/s"), ("tool_turn_speed", "rad/s")):
+            given, allowed = getattr(self, name), f"a positive number [{unit}]"
+            speed = finite(name, given, allowed)
+            if speed <= 0:
+                raise InvalidValueError(name, given, allowed)
+            object.__setattr__(self, name, speed)
         object.__setattr__(self, "_low", low)
         object.__setattr__(self, "_high", high)
 
@@ -159,6 +166,11 @@ class Puma560:
     def poses(self) -> Mapping[str, Array]:
         """Joint values of `ready`, `zero`, `nominal` and `stretch`, each (6,) [rad]."""
         return POSES
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length of the upper arm, and of the forearm but for its offset [m]."""
+        return A2
 
     def forward(self, q: ArrayLike) -> Array:
         """Return the pose of the last link in the base frame.
@@ -251,6 +263,35 @@ class Puma560:
                 return np.array(quick)
         return np.array(self._best(pose_rows(X), near, asked, strict=configuration is not None))
 
+    def follow(self, X: ArrayLike, q: ArrayLike, configuration: str | None = None) -> Array:
+        """Return the joint solutions of poses in a row that go on from q, in q's own configuration.
+
+        A straight wrist is in both NOFLIP and FLIP; the one whose joint 4 is nearer to q's is taken.
+
+        Args:
+            X: Poses of the last link in the base frame, (k, 4, 4), so close together that no joint turns by π
+                from one to the next.
+            q: Joint values to go on from, (6,) [rad].
+            configuration: Words such as `LEFTY BELOW FLIP`, or some of them, that go before q's own.
+
+        Returns:
+            Joint values [rad], (k, 6), within the limits or not, turns counted on from q; NaN from the first
+            pose on that the arm doesn't reach to 1e-9. Where joints 4 and 6 share an axis, joint 4 stays where
+            it was.
+
+        Raises:
+            InvalidValueError: If an argument has the wrong shape, holds NaN or infinity, or an unknown word.
+        """
+        near = _six(q)
+        poses = finite_array("X", X, None, _ROW_ALLOWED)
+        if poses.ndim != 3 or poses.shape[1:] != (4, 4):
+            raise InvalidValueError("X", X, _ROW_ALLOWED)
+        righty, above, noflip = signs(near)
+        own: Asked = righty, above, (None if abs(sin(near[4])) <= TIE else noflip)
+        asked = (None, None, None) if configuration is None else parse_configuration(configuration)
+        first, second, third = (b if a is None else a for a, b in zip(asked, own, strict=True))
+        return inverse_along(poses, np.array(near), (first, second, third))
+
     def _one(self, X: Array, near: Joints, asked: Asked) -> Joints | None:
         """Solve one branch; None where anything is out of the ordinary.
 
@@ -313,17 +354,21 @@ class Puma560:
         return spell(*signs(_six(q)))
 
 
-def model(limits: Limits | None = None, tool_speed: float | None = None) -> Puma560:
+def model(
+    limits: Limits | None = None, tool_speed: float | None = None, tool_turn_speed: float | None = None
+) -> Puma560:
     """Return a PUMA 560.
 
     Args:
         limits: Joint limits; None means the documented ones of `robots.puma560.parameters`.
         tool_speed: Nominal linear speed of the tool [m/s]; None means 0.5.
+        tool_turn_speed: Nominal angular speed of the tool [rad/s]; None means π/2.
 
     Raises:
-        InvalidValueError: If the limits aren't of six joints within ±4π rad, or the speed isn't positive.
+        InvalidValueError: If the limits aren't of six joints within ±4π rad, or a speed isn't positive.
     """
     return Puma560(
         limits=default_limits() if limits is None else limits,
         tool_speed=TOOL_SPEED if tool_speed is None else tool_speed,
+        tool_turn_speed=TOOL_TURN_SPEED if tool_turn_speed is None else tool_turn_speed,
     )

@@ -17,6 +17,7 @@ from robots.puma560.branches import (
     REACH_MIN,
     RESIDUAL_MAX,
     SIN_E3,
+    Asked,
 )
 from robots.puma560.parameters import A2, A3, D3, D4, DOF
 from vrs.commands import finite_array
@@ -107,9 +108,108 @@ def _checked(X: ArrayLike) -> tuple[Array, Array]:
     return R, rows[:3, 3]
 
 
+def inverse_along(X: Array, q: Array, wanted: Asked) -> Array:
+    """Return the joint solutions of poses in a row that go on from q, in one branch.
+
+    Args:
+        X: Poses of the last link in the base frame, (k, 4, 4), close enough together for turns to be told.
+        q: Joint values to go on from, (6,) [rad].
+        wanted: Signs righty, above and noflip; None for the wrist means the one whose joint 4 is nearer to q's
+            at the first pose where the wrist isn't straight.
+
+    Returns:
+        Joint values [rad], (k, 6), turns counted on from q; NaN from the first pose on that isn't reached to 1e-9.
+        Where joints 4 and 6 share an axis, joint 4 stays where the pose before left it.
+    """
+    righty, above, noflip = wanted
+    R, p = X[:, :3, :3].transpose(1, 2, 0), X[:, :3, 3].T
+    # Components in rows of their own, for contiguous operations.
+    R, p = np.ascontiguousarray(R), np.ascontiguousarray(p)
+    out = np.empty((DOF, len(X)))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        triangle, closed = _triangles(p)
+        turns = _one_arm(p, triangle, righty is not False, above is not False, out)
+        error, M = _placed(p, R, turns)
+        x, y, z = M[0, 2], M[1, 2], M[2, 2]
+        sin5 = np.sqrt(x * x + y * y)
+        straight = sin5 < MERGE_WRIST
+        q4 = np.arctan2(y, x)
+        if noflip is None:
+            free = np.flatnonzero(~straight)
+            noflip = not len(free) or bool(np.cos(q4[free[0]] - q[3]) >= 0)
+        for i in np.flatnonzero(straight):
+            q4[i] = q4[i - 1] if i else q[3] - (0.0 if noflip else np.pi)
+        c4, s4 = np.cos(q4), np.sin(q4)
+        # Joint 5 from the joint 4 that was taken; joint 6 from both, so that rounding in joint 4 cancels.
+        bend = np.where(straight, 0.0, sin5)
+        c5, s5 = _unit(z, -bend)
+        x, y = c4 * M[1, 1] - s4 * M[0, 1], c4 * M[1, 0] - s4 * M[0, 0]
+        c6, s6 = _unit(x, y)
+        error = error + _turned(M, (c4, s4, c5, s5, c6, s6))
+    out[3], out[4], out[5] = q4, np.arctan2(s5, c5), np.arctan2(s6, c6)
+    if not noflip:
+        out[3] += np.pi
+        out[4] *= -1.0
+        out[5] += np.pi
+    lost = np.flatnonzero(~(closed & (error <= RESIDUAL_MAX**2)))
+    steps = np.diff(out, axis=1, prepend=q[:, None])
+    steps[~np.isfinite(steps)] = 0.0
+    out -= 2.0 * np.pi * np.cumsum(np.round(steps / (2.0 * np.pi)), axis=1)
+    if len(lost):
+        out[:, lost[0] :] = np.nan
+    return np.ascontiguousarray(out.T)
+
+
+def _triangles(p: Array) -> tuple[tuple[Array, Array, Array], NDArray[np.bool_]]:
+    """Return |u|, |sin e| and cos e of wrist centres, (3, k) [m], and whether the triangles close, (k,)."""
+    px, py, pz = p
+    r = np.sqrt(px * px + py * py)
+    u = np.sqrt(np.maximum((r - D3) * (r + D3), 0.0))
+    u[u < MERGE_SHOULDER] = 0.0
+    w = np.sqrt(u * u + pz * pz)
+    outer, inner = (REACH_MAX - w) * (REACH_MAX + w), (w - REACH_MIN) * (w + REACH_MIN)
+    sin_e = 2 * np.sqrt(np.maximum(outer, 0.0) * np.maximum(inner, 0.0)) / FOUR_SIDES
+    merged = sin_e < MERGE_ELBOW
+    sin_e[merged] = 0.0
+    cos_e = np.where(merged, np.where(inner > outer, 1.0, -1.0), (inner - outer) / FOUR_SIDES)
+    closed: NDArray[np.bool_] = (r >= D3 - RESIDUAL_MAX) & (w >= REACH_MIN - RESIDUAL_MAX)
+    return (u, sin_e, cos_e), closed & (w <= REACH_MAX + RESIDUAL_MAX)
+
+
+def _one_arm(
+    p: Array, triangle: tuple[Array, Array, Array], righty: bool, above: bool, out: Array
+) -> tuple[Array, ...]:
+    """Fill in joints 1 to 3 of one arm.
+
+    Args:
+        p: Wrist centres, (3, k) [m].
+        triangle: |u|, |sin e| and cos e, (k,) each.
+        righty: Shoulder.
+        above: Elbow.
+        out: Joint values, (6, k) [rad], written.
+
+    Returns:
+        Cosine and sine of q1, of q2 and of q2 + q3, (k,) each.
+    """
+    px, py, pz = p
+    u, sin_e, cos_e = triangle
+    if not righty:
+        u = -u
+    if righty == above:
+        sin_e = -sin_e
+    x, y = px * u - py * D3, py * u + px * D3
+    out[0], (c1, s1) = np.arctan2(y, x), _unit(x, y)
+    kx, ky = A2 + FOREARM * cos_e, FOREARM * sin_e
+    x, y = u * kx + pz * ky, pz * kx - u * ky
+    out[1], (c2, s2) = np.arctan2(y, x), _unit(x, y)
+    c3, s3 = cos_e * COS_E3 + sin_e * SIN_E3, sin_e * COS_E3 - cos_e * SIN_E3
+    out[2] = np.arctan2(s3, c3)
+    return c1, s1, c2, s2, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
+
+
 def _unit(x: Array, y: Array) -> tuple[Array, Array]:
     """Return cosine and sine of the direction (x, y)."""
-    h = np.sqrt(x * x + y * y)
+    h: Array = np.sqrt(x * x + y * y)
     return x / h, y / h
 
 
@@ -124,16 +224,8 @@ def _arms(p: Array, out: Array) -> tuple[NDArray[np.bool_], tuple[Array, ...]]:
         Whether each arm exists, (2, 2, k), and cosine and sine of q1, of q2 and of q2 + q3.
     """
     px, py, pz = p
-    r = np.sqrt(px * px + py * py)
-    u = np.sqrt(np.maximum((r - D3) * (r + D3), 0.0))
-    u[u < MERGE_SHOULDER] = 0.0
-    w = np.sqrt(u * u + pz * pz)
-    outer, inner = (REACH_MAX - w) * (REACH_MAX + w), (w - REACH_MIN) * (w + REACH_MIN)
-    sin_e = 2 * np.sqrt(np.maximum(outer, 0.0) * np.maximum(inner, 0.0)) / FOUR_SIDES
-    merged = sin_e < MERGE_ELBOW
-    sin_e[merged] = 0.0
-    cos_e = np.where(merged, np.where(inner > outer, 1.0, -1.0), (inner - outer) / FOUR_SIDES)
-    closed = (r >= D3 - RESIDUAL_MAX) & (w >= REACH_MIN - RESIDUAL_MAX) & (w <= REACH_MAX + RESIDUAL_MAX)
+    (u, sin_e, cos_e), closed = _triangles(p)
+    merged = sin_e == 0.0
     exists: NDArray[np.bool_] = closed & ((u > 0) | (_SHOULDER > 0)) & (~merged | (_ABOVE > 0))
 
     u = _SHOULDER * u

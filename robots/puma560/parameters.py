@@ -44,6 +44,8 @@ FLANGE: Final = 0.05625
 
 TOOL_SPEED: Final = 0.5
 """Nominal linear speed of the tool [m/s], an assumption."""
+TOOL_TURN_SPEED: Final = math.pi / 2
+"""Nominal angular speed of the tool [rad/s], an assumption: what the slow joints, 1 to 3, about manage."""
 
 Q_MIN_DEG: Final = (-160.0, -45.0, -225.0, -110.0, -100.0, -266.0)
 """Lowest joint positions [deg]."""

@@ -18,8 +18,8 @@ from interfaces.report.scene import revolute_chain, scene
 from interfaces.report.summary import summarize
 from interfaces.runtime.run import Event, Packet, TwinRun
 from robots import puma560
-from vrs.commands import Receipt, Status
 from vrs.model import Array
+from vrs.receipt import Receipt, Status
 
 EVIL = '</script><script>window.evil = 1</script><!-- <img src=x onerror="window.evil=2"> & \u2028'
 FLAGS = [

@@ -297,7 +297,7 @@ class TestRefusals:
             (to(too_far), "joint 5 must be within"),
             (MotionCommand(PoseTarget(far)), "unreachable"),
             (MotionCommand(PoseTarget(MODEL.forward(A), "SIDEWAYS")), "configuration"),
-            (to(B, motion=Motion.LINE), "motion"),
+            (to(B + np.eye(6)[0] * 3, motion=Motion.LINE), "joint 1"),
         ):
             r = offline.execute(command)
             assert r.status is Status.REJECTED

@@ -6,11 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import puma560
-from vrs import Engine, JointTarget, MotionCommand, Profile
+from vrs import Engine, JointTarget, Limits, MotionCommand, Profile
 from vrs.chunk import State
-from vrs.planning import jerk_limited, move, parabolic, run_up, violation
+from vrs.errors import InvalidValueError, PlanningError
+from vrs.planning import jerk_limited, move, overlapped, parabolic, run_up, violation
+from vrs.planning.blend import _certified, _Move, _quickest, _Times, blend
+from vrs.planning.bounds import bounds
 from vrs.planning.online import online
-from vrs.planning.plan import Plan, end_state, integrate
+from vrs.planning.plan import Plan, empty, end_state, integrate
 
 LIMITS = puma560.model().limits
 ZERO = np.zeros(6)
@@ -24,6 +27,25 @@ def reachable_state(rng: np.random.Generator) -> State:
     i = int(rng.integers(len(plan)))
     h = float(plan.durations[i] * rng.random())
     return end_state(Plan(np.array([h]), plan.coefficients[i : i + 1]))
+
+
+def jumps(plan: Plan, order: int) -> np.ndarray:
+    """Jumps of a derivative at the inner knots, (m − 1,)."""
+    found = []
+    for i in range(len(plan) - 1):
+        before = end_state(Plan(plan.durations[i : i + 1], plan.coefficients[i : i + 1]))
+        after = plan.coefficients[i + 1]
+        states = ((before.q, after[0]), (before.qd, after[1]), (before.qdd, 2 * after[2]))
+        found.append(np.abs(states[order][0] - states[order][1]).max())
+    return np.array(found)
+
+
+def values(plan: Plan, t: np.ndarray) -> np.ndarray:
+    """Positions at times from 0 to the end, (k, n), by NumPy's own polynomials."""
+    ends = np.cumsum(plan.durations)
+    which = np.minimum(np.searchsorted(ends, t, side="right"), len(plan) - 1)
+    u = t - (ends - plan.durations)[which]
+    return np.array([np.polyval(plan.coefficients[i, ::-1], x) for i, x in zip(which, u, strict=True)])
 
 
 def test_from_rest_it_is_the_papers_three_segments():
@@ -169,3 +191,182 @@ def test_integration_follows_the_control():
             assert np.allclose(before.qd, after[1])
             if order == 3:
                 assert np.allclose(before.qdd, 2 * after[2])
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_plans_are_smooth_to_rounding(profile: Profile):
+    rng = np.random.default_rng(8)
+    worst = [0.0, 0.0, 0.0]
+    for _ in range(200):
+        state, goal = reachable_state(rng), rng.uniform(LIMITS.q_min, LIMITS.q_max)
+        if profile is Profile.JERK_LIMITED:
+            plan, _ = move(State(goal, ZERO, ZERO), state.q, 1.0, profile, LIMITS)
+            state = end_state(Plan(plan.durations[:1], plan.coefficients[:1]))
+        plan, note = move(state, goal, float(rng.uniform(0.05, 1.0)), profile, LIMITS)
+        assert not note
+        for order in range(2 if profile is Profile.PARABOLIC else 3):
+            worst[order] = max(worst[order], jumps(plan, order).max(initial=0.0))
+    assert max(worst) < 1e-11
+
+
+def test_a_state_that_needs_all_of_its_jerk_isnt_braked():
+    """On the way to full speed the jerk limit leaves no margin: the speed limit would be passed."""
+    start, goal = np.full(6, -0.7), np.full(6, 0.7)
+    plan = jerk_limited.rest_to_rest(start, goal, 1.0, LIMITS)
+    t, ramp = float(plan.durations[0]), 2
+    for share in (0.1, 0.5, 0.9):
+        h = share * float(plan.durations[ramp])
+        state = end_state(Plan(np.array([h]), plan.coefficients[ramp : ramp + 1]))
+        again, note = move(state, goal + 0.01, 1.0, Profile.JERK_LIMITED, LIMITS)
+        assert not note
+        assert violation(again, LIMITS, jerk=True) is None
+        assert again.duration < plan.duration - t
+
+
+def test_redirections_are_hardly_longer_than_time_optimal_ones():
+    ruckig = pytest.importorskip("ruckig")
+    rng = np.random.default_rng(11)
+    ratios = []
+    for _ in range(300):
+        start, first, goal = rng.uniform(LIMITS.q_min, LIMITS.q_max, (3, 6))
+        way = parabolic.rest_to_rest(start, first, 1.0, LIMITS)
+        state = end_state(Plan(way.durations[:1] * rng.random(), way.coefficients[:1]))
+        problem, best = ruckig.InputParameter(6), ruckig.Trajectory(6)
+        problem.current_position, problem.current_velocity = state.q.tolist(), state.qd.tolist()
+        problem.target_position = goal.tolist()
+        problem.max_velocity, problem.max_acceleration = LIMITS.qd_max.tolist(), LIMITS.qdd_max.tolist()
+        problem.max_jerk = [np.inf] * 6
+        assert ruckig.Ruckig(6).calculate(problem, best) == ruckig.Result.Working
+        ratios.append(move(state, goal, 1.0, Profile.PARABOLIC, LIMITS)[0].duration / best.duration)
+    assert np.median(ratios) < 1.0005
+    assert np.percentile(ratios, 95) < 1.05
+    assert max(ratios) < 2.0
+
+
+def test_a_blends_own_certificate_is_the_general_one():
+    rng = np.random.default_rng(12)
+    kinds = set()
+    for _ in range(300):
+        state, speed = reachable_state(rng), float(rng.uniform(0.05, 1.0))
+        goal = np.where(rng.random(6) < 0.3, LIMITS.q_max, rng.uniform(LIMITS.q_min, LIMITS.q_max))
+        plan = blend(state, goal, speed, LIMITS)
+        if plan is not None:
+            kinds.add(len(plan))
+            assert violation(plan, LIMITS, jerk=False) is None
+            assert np.array_equal(plan.coefficients[0, :2], [state.q, state.qd])
+            assert np.abs(end_state(plan).q - goal).max() < 1e-13
+            assert np.abs(end_state(plan).qd).max() < 1e-13
+    assert kinds == {2, 3}
+
+
+def test_a_blend_is_certified_apart_from_the_search():
+    """One joint at 1 rad/s turns round at 4 rad/s² and goes back at 1 rad/s."""
+    one = np.ones(1)
+    bound = bounds(Limits(-3 * one, 3 * one, one, 4 * one))
+    back = _Move([0.0], [1.0], [-2.0], [1.0], bound)
+    assert _quickest(back) == pytest.approx((2.625, 0.5, 2.25))
+    assert len(_certified(back, _Times(2.625, 0.5, 2.25))) == 3
+    for b, last, L in ((0.4, 0.25, 2.2), (0.5, 0.2, 2.25), (0.5, 0.25, 2.0)):
+        assert _certified(back, _Times(L + 0.5 * (b + last), b, L)) is None
+    # It would turn at 0.125 rad.
+    near = _Move([2.9], [1.0], [1.0], [1.0], bound)
+    assert _certified(near, _Times(2.525, 0.5, 2.15)) is None
+    # A line of 1e-10 s is left out, and nothing jumps.
+    short = _certified(_Move([0.0], [1.0], [0.075], [1.0], bound), _Times(0.35 + 0.35 - 1e-10, 0.5, 0.35))
+    assert len(short) == 2
+    assert jumps(short, 0).max() < 1e-15
+
+
+def test_a_turn_beyond_a_limit_is_planned_another_way():
+    """Joint 1 runs to its limit and can only just stop; the quickest blend would turn beyond it."""
+    qd = np.array([LIMITS.qd_max[0], 0, 0, 0, 0, 0])
+    q = ZERO.copy()
+    q[0] = LIMITS.q_max[0] - LIMITS.qd_max[0] ** 2 / (2 * LIMITS.qdd_max[0]) - 1e-6
+    goal = np.array([0.5, 2.0, -2.0, 2.0, 1.0, 3.0])
+    plan, _ = move(State(q, qd, ZERO), goal, 1.0, Profile.PARABOLIC, LIMITS)
+    assert violation(plan, LIMITS, jerk=False) is None
+    assert np.abs(end_state(plan).q - goal).max() < 1e-10
+    q[0] += 2e-6
+    with pytest.raises(PlanningError, match="joint 1 would pass its position limit"):
+        move(State(q, qd, ZERO), goal, 1.0, Profile.PARABOLIC, LIMITS)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_positions_outside_the_limits_are_refused_from_rest_too(profile: Profile):
+    outside = ZERO.copy()
+    outside[3] = LIMITS.q_max[3] + 1e-6
+    for start, goal in ((outside, ZERO), (ZERO, outside)):
+        with pytest.raises(PlanningError, match="joint 4 would pass its position limit"):
+            move(State(start, ZERO, ZERO), goal, 1.0, profile, LIMITS)
+
+
+def test_going_on_to_the_same_target_costs_no_time():
+    q = np.array([1.0, 0.5, -0.7, 0.2, 0.1, -1.0])
+    for profile, planner in zip(PROFILES, (parabolic, jerk_limited), strict=True):
+        plan = planner.rest_to_rest(ZERO, q, 1.0, LIMITS)
+        for i in range(len(plan)):
+            elapsed = plan.durations[:i].sum() + 0.4 * plan.durations[i]
+            state = end_state(Plan(0.4 * plan.durations[i : i + 1], plan.coefficients[i : i + 1]))
+            again, note = move(state, q, 1.0, profile, LIMITS)
+            assert not note
+            assert again.duration == pytest.approx(plan.duration - elapsed, rel=3e-5)
+
+
+def test_rows_are_read_only_and_without_leading_zeros():
+    a = np.zeros((4, 4, 6))
+    a[0, 3, 2], a[1, 1, 0], a[2, 0, 0] = 1.0, 1.0, 1.0
+    rows = Plan(np.ones(4), a).rows()
+    assert [len(row) for row in rows] == [4, 2, 1, 1]
+    assert not any(row.flags.writeable for row in rows)
+    assert np.array_equal(rows[1], a[1, :2])
+
+
+@pytest.mark.parametrize("planner", [parabolic, jerk_limited])
+def test_overlapped_moves_superpose_exactly(planner):
+    rng = np.random.default_rng(13)
+    for share in (0.0, 1e-15, 0.3, 0.999, 1.0):
+        start, via, goal = rng.uniform(LIMITS.q_min, LIMITS.q_max, (3, 6))
+        first, second = (planner.rest_to_rest(a, b, 0.8, LIMITS) for a, b in ((start, via), (via, goal)))
+        delta = share * min(first.duration, second.duration)
+        plan = overlapped(first, second, delta)
+        begin = first.duration - delta
+        assert plan.duration == pytest.approx(begin + second.duration, abs=1e-12)
+        t = np.linspace(0, plan.duration, 700)
+        one = values(first, np.minimum(t, first.duration))
+        two = values(second, np.maximum(t - begin, 0.0))
+        assert np.abs(values(plan, t) - (one + two - via)).max() < 1e-12
+        assert jumps(plan, 0).max() < 1e-11
+        assert jumps(plan, 1).max() < 1e-11
+        assert np.array_equal(plan.coefficients[0, 0], start)
+        assert np.abs(end_state(plan).q - goal).max() < 1e-12
+        assert np.abs(end_state(plan).qd).max() < 1e-12
+        assert (plan.durations > 0).all()
+
+
+def test_overlaps_that_cannot_be_are_refused():
+    q = np.full(6, 0.3)
+    first, second = parabolic.rest_to_rest(ZERO, q, 1.0, LIMITS), parabolic.rest_to_rest(q, ZERO, 0.5, LIMITS)
+    for delta in (-1e-9, first.duration * 1.001, np.nan):
+        with pytest.raises(InvalidValueError, match="delta must be from 0 to"):
+            overlapped(first, second, delta)
+    for other in (
+        parabolic.rest_to_rest(q + 1e-6, ZERO, 0.5, LIMITS),
+        Plan(second.durations[1:], second.coefficients[1:]),
+    ):
+        with pytest.raises(InvalidValueError, match="both at rest"):
+            overlapped(first, other, 0.01)
+    assert overlapped(first, empty(6), 0.0) is first
+    assert overlapped(empty(6), second, 0.0) is second
+    with pytest.raises(InvalidValueError, match="delta"):
+        overlapped(first, empty(6), 0.1)
+
+
+def test_overlapping_takes_pieces_of_any_degree():
+    """One piece of degree 5, rest to rest, overlapped with three of degree 2."""
+    s = np.array([0, 0, 0, 10.0, -15.0, 6.0])
+    first = Plan(np.array([2.0]), (s / 2.0 ** np.arange(6))[None, :, None] * np.full(6, 0.5))
+    second = parabolic.rest_to_rest(np.full(6, 0.5), ZERO, 0.3, LIMITS)
+    plan = overlapped(first, second, 1.1)
+    t = np.linspace(0, plan.duration, 500)
+    want = values(first, np.minimum(t, 2.0)) + values(second, np.maximum(t - 0.9, 0.0)) - 0.5
+    assert np.abs(values(plan, t) - want).max() < 1e-12

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from vrs.chunk import State
 from vrs.commands import Profile
 from vrs.model import Array, Limits
 from vrs.planning import jerk_limited, parabolic
-from vrs.planning.online import online as _online
+from vrs.planning.overlap import overlapped
 from vrs.planning.plan import Plan, empty, violation
 
-__all__ = ["Plan", "empty", "move", "run_up", "violation"]
+__all__ = ["Plan", "empty", "move", "overlapped", "run_up", "violation"]
 
 
 def move(state: State, q: Array, speed: float, profile: Profile, limits: Limits) -> tuple[Plan, str]:
@@ -51,13 +49,6 @@ def run_up(q: Array, goal: State, speed: float, profile: Profile, limits: Limits
     Raises:
         PlanningError: If no plan keeps the limits.
     """
-    jerky = profile is Profile.JERK_LIMITED
-    if not goal.qd.any():
-        planner = jerk_limited.rest_to_rest if jerky else parabolic.rest_to_rest
-        return planner(q, goal.q, speed, limits), ""
-    still = np.zeros_like(q)
-    plan = _online(State(q, still, still), goal, speed, limits, order=3 if jerky else 2)
-    if plan is not None:
-        return plan, ""
-    note = "the joining move accelerates with parabolas" if jerky else ""
-    return parabolic.from_rest(q, goal, speed, limits), note
+    if profile is Profile.PARABOLIC:
+        return parabolic.from_rest(q, goal, speed, limits), ""
+    return jerk_limited.from_rest(q, goal, speed, limits)

@@ -8,10 +8,13 @@ from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits
 from vrs.planning.online import online
-from vrs.planning.parabolic import NEGLIGIBLE, brake
-from vrs.planning.plan import Plan, empty, end_state, integrate, violation
+from vrs.planning.parabolic import brake
+from vrs.planning.parabolic import from_rest as parabolic_from_rest
+from vrs.planning.plan import Plan, empty, end_state, violation
+from vrs.planning.straight import follow, rates
 
 BRAKED_FIRST = "braked with parabolas first: no jerk-limited plan from this state keeps the limits"
+JOINED_BY_PARABOLAS = "the joining move accelerates with parabolas"
 
 
 def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan, str]:
@@ -29,9 +32,9 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan,
     Raises:
         PlanningError: If no plan keeps the limits.
     """
-    still = np.zeros_like(q)
-    if not state.qd.any() and not state.qdd.any():
+    if not any(state.qd.tolist()) and not any(state.qdd.tolist()):
         return rest_to_rest(state.q, q, speed, limits), ""
+    still = np.zeros_like(q)
     plan = online(state, State(q, still, still), speed, limits, order=3)
     if plan is not None:
         return plan, ""
@@ -44,16 +47,41 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan,
     return plan, BRAKED_FIRST
 
 
+def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[Plan, str]:
+    """Plan from rest to a moving state.
+
+    Args:
+        start: Where it begins [rad], (n,).
+        goal: State to meet, its acceleration included; v is raised as far as it demands.
+        speed: Share v of the speed limits, in (0, 1].
+        limits: Limits that hold at every instant.
+
+    Returns:
+        The plan, and what the user must know of it (empty if nothing).
+
+    Raises:
+        PlanningError: If no plan keeps the limits.
+    """
+    if not any(goal.qd.tolist()):
+        return rest_to_rest(start, goal.q, speed, limits), ""
+    still = np.zeros_like(start)
+    plan = online(State(start, still, still), goal, speed, limits, order=3)
+    if plan is not None:
+        return plan, ""
+    return parabolic_from_rest(start, goal, speed, limits), JOINED_BY_PARABOLAS
+
+
 def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
-    """The seven-segment profile on the straight line of joint space, in the least time."""
-    d = q - start
-    reach = np.abs(d)
-    if reach.max() <= NEGLIGIBLE:
+    """The seven-segment profile on the straight line of joint space, in the least time.
+
+    Raises:
+        PlanningError: If either position lies outside the limits.
+    """
+    allowed = rates(start.tolist(), q.tolist(), speed, limits)
+    if allowed is None:
         return empty(len(q))
-    moving = reach > 0
     # One part in 1e12 inside, so that rounding can't pass a limit.
-    bounds = (speed * limits.qd_max, limits.qdd_max, limits.qddd_max)
-    rate, growth, jerk = (float((bound[moving] / reach[moving]).min()) * (1 - 1e-12) for bound in bounds)
+    rate, growth, jerk = (value * (1.0 - 1e-12) for value in allowed)
     if rate * jerk >= growth * growth:
         ramp, steady = growth / jerk, rate / growth - growth / jerk
     else:
@@ -66,12 +94,22 @@ def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
         steady = whole - 2.0 * ramp
         if steady < 0:
             ramp, steady = (0.5 / jerk) ** (1.0 / 3.0), 0.0
-    h = np.array([ramp, steady, ramp, cruise, ramp, steady, ramp])
-    signs = np.array([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0])
-    kept = h > 1e-12 * ramp
-    h, signs = h[kept], signs[kept]
-    # The jerk that covers the way exactly, whatever the knots were rounded to.
-    zero = np.zeros(1)
-    unit = integrate(State(zero, zero, zero), h, signs[:, None], 3)
-    still = np.zeros_like(d)
-    return integrate(State(start, still, still), h, signs[:, None] * (d / end_state(unit).q), 3)
+    # Of the jerk 1, then scaled to cover the way exactly, whatever the durations were rounded to.
+    durations, share = [], []
+    s = sd = sdd = 0.0
+    for h, sddd in (
+        (ramp, 1.0),
+        (steady, 0.0),
+        (ramp, -1.0),
+        (cruise, 0.0),
+        (ramp, -1.0),
+        (steady, 0.0),
+        (ramp, 1.0),
+    ):
+        if h > 1e-12 * ramp:
+            durations.append(h)
+            share.append([s, sd, 0.5 * sdd, sddd / 6.0])
+            s += h * (sd + h * (0.5 * sdd + h * sddd / 6.0))
+            sd += h * (sdd + 0.5 * h * sddd)
+            sdd += h * sddd
+    return follow(start, q, durations, [[value / s for value in row] for row in share])

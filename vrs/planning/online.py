@@ -7,17 +7,26 @@ the result is certified; where it can't be, there's no plan.
 
 from __future__ import annotations
 
+import math
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from vrs.chunk import State
 from vrs.model import Array, Limits
+from vrs.planning.bounds import Bounds, bounds
+from vrs.planning.cubics import Cubics, integrated
 from vrs.planning.plan import Plan, end_state, integrate, violation
 
-_MARGINS = (1e-7, 1e-5, 1e-3)
+_MARGINS = (0.0, 1e-7, 1e-5, 1e-3)
+"""Of the limits. First none: a joint may need all of its jerk to stay below its speed limit."""
 _KNOT = 1e-9
+_TIME = itemgetter(0)
 _END_ERROR = 2e-10
+"""Root of the sum of squares of position [rad], speed [rad/s] and acceleration [rad/s²] missing at a plan's end."""
+_AIM = 1e-11
+"""The same, where repairs can reach it; in moves of minutes rounding leaves more."""
 
 
 def online(start: State, goal: State, speed: float, limits: Limits, *, order: int) -> Plan | None:
@@ -25,7 +34,7 @@ def online(start: State, goal: State, speed: float, limits: Limits, *, order: in
 
     Args:
         start: Where it begins.
-        goal: Where it ends; its speed may raise the speed limit of the move, never beyond limits.qd_max.
+        goal: Where it ends; what it demands may raise the speed limit of the move, never beyond limits.qd_max.
         speed: Share v of the speed limits.
         limits: Limits that hold at every instant.
         order: 2 for bounded acceleration, 3 for bounded jerk.
@@ -34,86 +43,148 @@ def online(start: State, goal: State, speed: float, limits: Limits, *, order: in
         A certified plan, or None where Ruckig has none or it passes a limit.
     """
     for margin in _MARGINS:
-        plan = _attempt(start, goal, speed, limits, margin, order)
-        if plan is not None and violation(plan, limits, jerk=order == 3) is None:
+        found = _attempt(start, goal, speed, bounds(limits), margin, order)
+        made = None if found is None else _exact(start, goal, *found, order)
+        if made is None:
+            continue
+        if isinstance(made, Cubics):
+            sure, plan = made.keeps(limits), made.plan()
+        else:
+            sure, plan = False, made
+        problem = None if sure else violation(plan, limits, jerk=order == 3)
+        if problem is None:
             return plan
+        if "position" in problem:
+            # A way round that a margin of the other limits doesn't shorten.
+            return None
     return None
 
 
-def _attempt(start: State, goal: State, speed: float, limits: Limits, margin: float, order: int) -> Plan | None:
+def _attempt(
+    start: State, goal: State, speed: float, bound: Bounds, margin: float, order: int
+) -> tuple[Array, Array] | None:
+    """Ruckig's motion on one grid: durations (m,), controls (m, n); None where it has none."""
     import ruckig
 
     n = len(start.q)
-    # Made for each call: nanobind reports instances that outlive the interpreter as leaks.
-    planner, trajectory = ruckig.Ruckig(n), ruckig.Trajectory(n)
+    # Made for each call, 4 µs: nanobind reports instances that outlive the interpreter as leaks.
+    planner, trajectory, problem = ruckig.Ruckig(n), ruckig.Trajectory(n), ruckig.InputParameter(n)
     inside = 1.0 - margin
-    allowed = speed * limits.qd_max
-    present = np.where(np.abs(start.qd) <= allowed * (1.0 + 1e-9), np.abs(start.qd), 0.0)
-    problem = ruckig.InputParameter(n)
-    problem.current_position = start.q.tolist()
-    problem.current_velocity = start.qd.tolist()
-    problem.target_position = goal.q.tolist()
-    problem.target_velocity = goal.qd.tolist()
-    problem.max_velocity = np.maximum(np.maximum(allowed * inside, present), np.abs(goal.qd)).tolist()
-    problem.max_acceleration = (limits.qdd_max * inside).tolist()
+    qd, qd_end = start.qd.tolist(), goal.qd.tolist()
+    problem.current_position, problem.target_position = start.q.tolist(), goal.q.tolist()
+    problem.current_velocity, problem.target_velocity = qd, qd_end
+    greatest, hardest = bound.qdd_max, bound.qddd_max
+    if margin:
+        greatest, hardest = (tuple(limit * inside for limit in rate) for rate in (greatest, hardest))
+    problem.max_acceleration = greatest
     if order == 3:
-        problem.current_acceleration = start.qdd.tolist()
-        problem.target_acceleration = goal.qdd.tolist()
-        problem.max_jerk = (limits.qddd_max * inside).tolist()
-        if (np.abs(goal.qdd) > limits.qdd_max * inside).any():
+        qdd = start.qdd.tolist()
+        # A little beyond is rounding, which the repair makes good; Ruckig allows for none.
+        qdd_end = [min(max(a, -g), g) for a, g in zip(goal.qdd.tolist(), greatest, strict=True)]
+        if math.dist(qdd_end, goal.qdd.tolist()) > _AIM:
             return None
+        problem.current_acceleration, problem.target_acceleration = qdd, qdd_end
+        problem.max_jerk = hardest
+        ahead, before = map(_peak, qd, qdd, hardest), map(_peak, qd_end, [-a for a in qdd_end], hardest)
     else:
         problem.max_jerk = [np.inf] * n
+        ahead, before = map(abs, qd), map(abs, qd_end)
+    fastest = []
+    for limit, soon, just in zip(bound.qd_max, ahead, before, strict=True):
+        top = speed * limit
+        # A joint that is too fast already is left to slow down at once.
+        allowed = soon if top * inside < soon <= top * (1.0 + 1e-9) else top * inside
+        fastest.append(allowed if allowed > just else just)
+    problem.max_velocity = fastest
     try:
         result = planner.calculate(problem, trajectory)
     except ruckig.RuckigError:
         return None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished) or not trajectory.duration > _KNOT:
         return None
-    h, control = _on_one_grid(trajectory.profiles[0], trajectory.duration, order)
-    return _repaired(start, goal, h, control, order)
+    return _on_one_grid(trajectory.profiles[0], trajectory.duration, order)
+
+
+def _peak(qd: float, qdd: float, jerk: float) -> float:
+    """Speed [rad/s] that a state can't but reach; with its acceleration reversed, that it can't but come from."""
+    # A little more, or Ruckig's own rounding finds it beyond.
+    return (abs(qd) + 0.5 * qdd * qdd / jerk) * (1.0 + 1e-12) if qd * qdd > 0.0 else abs(qd)
 
 
 def _on_one_grid(profiles: list[Any], total: float, order: int) -> tuple[Array, Array]:
     """Every joint's phases on the union of their knots: durations (m,), controls (m, n)."""
-    lasting, values = [], []
-    for profile in profiles:
-        braking, after = profile.brake, profile.accel
-        lasting.append([*braking.t, *profile.t, *after.t])
+    changes: list[tuple[float, int, float]] = []
+    current = [0.0] * len(profiles)
+    for joint, profile in enumerate(profiles):
+        times, values = profile.t, profile.j if order == 3 else profile.a
+        before, after = profile.brake, profile.accel
+        if before.duration > 0.0:
+            times, values = before.t + times, (before.j if order == 3 else before.a) + values
+        if after.duration > 0.0:
+            times, values = times + after.t, values[: len(times)] + (after.j if order == 3 else after.a)
+        begin = present = 0.0
+        # Ruckig gives one acceleration more than times.
+        for lasting, value in zip(times, values, strict=False):
+            if lasting > 0.0:
+                if value != present:
+                    present = value
+                    if begin > _KNOT:
+                        changes.append((begin, joint, value))
+                    else:
+                        current[joint] = value
+                begin += lasting
+        changes.append((begin, joint, 0.0))
+    # Sorting by one float takes half as long as by tuples.
+    changes.sort(key=_TIME)
+    durations: list[float] = []
+    controls: list[float] = []
+    knot = 0.0
+    last = total - _KNOT
+    for begin, joint, value in changes:
+        if begin > knot + _KNOT:
+            if begin >= last:
+                break
+            durations.append(begin - knot)
+            controls += current
+            knot = begin
+        current[joint] = value
+    durations.append(total - knot)
+    controls += current
+    return np.array(durations), np.array(controls).reshape(-1, len(profiles))
+
+
+def _exact(start: State, goal: State, h: Array, control: Array, order: int) -> Cubics | Plan | None:
+    """What these controls make, changed as little as meets the goal; None where they can't."""
+    aim = [*goal.q.tolist(), *goal.qd.tolist(), *goal.qdd.tolist()][: order * len(goal.q)]
+    least = None
+    for _ in range(4):
+        made: Cubics | Plan
         if order == 3:
-            values.append([*braking.j, *profile.j, *after.j, 0.0])
+            made = integrated(start, h, control)
+            end = made.end
         else:
-            values.append([*braking.a, *profile.a[:7], *after.a, 0.0])
-    ends = np.cumsum(np.array(lasting), axis=1)
-    knots = np.sort(ends.ravel())
-    knots = knots[(knots > _KNOT) & (knots < total - _KNOT)]
-    if len(knots):
-        knots = knots[np.concatenate([[True], np.diff(knots) > _KNOT])]
-    grid = np.concatenate([[0.0], knots, [total]])
-    middle = 0.5 * (grid[1:] + grid[:-1])
-    phase = (ends[:, None, :] <= middle[:, None]).sum(2)
-    return np.diff(grid), np.take_along_axis(np.array(values), phase, axis=1).T
+            made = integrate(start, h, control, 2)
+            last = end_state(made)
+            end = np.array([last.q, last.qd])
+        error = math.dist(aim, end.ravel().tolist())
+        if error <= _AIM:
+            return made
+        least = _least_change(h, order) if least is None else least
+        control = control + least @ (np.array(aim).reshape(end.shape) - end)
+    return made if error <= _END_ERROR else None
 
 
-def _repaired(start: State, goal: State, h: Array, control: Array, order: int) -> Plan | None:
-    """Change the controls as little as meets the goal at these knots; None where they can't."""
-    T = float(h.sum())
-    left = T - np.cumsum(h)
+def _least_change(h: Array, order: int) -> Array:
+    """Pseudoinverse, (m, order), of what the controls do to q, qd (and qdd) at the end."""
+    T = sum(h.tolist())
+    share = h * (1.0 / T)
+    middle = (1.0 + 0.5 * share) - share.cumsum()
+    # In units of T.
+    weights = np.ones((order, len(h)))
+    weights[-2] = middle
     if order == 3:
-        effect = [h**3 / 6 + h * h * left / 2 + h * left * left / 2, h * h / 2 + h * left, h]
-        scale = np.array([T**-3, T**-2, 1 / T])
-    else:
-        effect = [h * h / 2 + h * left, h]
-        scale = np.array([T**-2, 1 / T])
-    M = np.array(effect) * scale[:, None]
-    plan = integrate(start, h, control, order)
-    for _ in range(2):
-        end = end_state(plan)
-        error = np.array([goal.q - end.q, goal.qd - end.qd, goal.qdd - end.qdd][:order])
-        if not error.any():
-            break
-        control = control + np.linalg.lstsq(M, error * scale[:, None], rcond=1e-12)[0]
-        plan = integrate(start, h, control, order)
-    end = end_state(plan)
-    short = max(np.abs(goal.q - end.q).max(), np.abs(goal.qd - end.qd).max())
-    return plan if short <= _END_ERROR else None
+        weights[0] = 0.5 * middle * middle + (1.0 / 24.0) * share * share
+    weights *= share
+    # Not the normal equations: where one long cruise outweighs the rest, they're nearly singular.
+    inverse = np.linalg.pinv(weights, rcond=1e-12)
+    return np.asarray(inverse * [T**-power for power in range(order, 0, -1)])

@@ -1,0 +1,321 @@
+"""The ledger: receipts, and what later edits made of them.
+
+An edit in the middle of a long plan moves or drops thousands of commands. Writing that into each receipt would
+take longer than planning, so an edit leaves one `Change` behind, and a receipt is worked out when it's asked for.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from math import inf
+from typing import TypeAlias
+
+import numpy as np
+
+from vrs.commands import MotionCommand
+from vrs.errors import UnknownCommandError
+from vrs.receipt import Receipt, Status
+from vrs.timeline import Timeline
+
+UNDO_DEPTH = 1000
+"""Commands that can be taken back, one after the other; each keeps a timeline alive."""
+
+ARRIVED = 1e-9
+"""A command that's this near to its end [s] has arrived: ends are sums of durations, and rounded."""
+
+TimeMap: TypeAlias = Callable[[float], float]
+"""New time of what was scheduled at a time."""
+Entry: TypeAlias = tuple[Receipt, MotionCommand | None]
+"""A receipt, and the motion command that it answers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an edit did to commands other than its own."""
+
+    version: int
+    """Version of the timeline that the edit made."""
+    by: int
+    """Command that did it."""
+    at: float
+    """Commands that arrived before this time [s] aren't touched."""
+    dropped: frozenset[int] | None = frozenset()
+    """Commands cut short or dropped; None for all of them."""
+    moved: TimeMap | None = None
+    """New times of the others; None where they stay."""
+    since: float = -inf
+    """Commands that begin before this time [s] are dropped too."""
+    stills: bool = True
+    """Whether commands to where the arm stood anyway are dropped too: they have no segments that could be kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """What is needed to take an edit back."""
+
+    command_id: int
+    at: float
+    """Nothing before this time was edited [s]."""
+    before: Timeline
+    changes: tuple[int, tuple[Change, ...]]
+    """Where in the log it wrote, and what stood there."""
+    overwritten: dict[int, Entry | None]
+    """Entries as they were; None for what wasn't there."""
+    stills: tuple[tuple[int, tuple[tuple[float, int], ...]], ...]
+    """Where in the list of stills it changed something, and what stood there; put back one after the other."""
+
+
+class Ledger:
+    """Receipts by command id, as later edits left them."""
+
+    def __init__(self, newest: int) -> None:
+        self.newest = newest
+        """Highest id given out."""
+        self._entries: dict[int, Entry] = {}
+        self._changes: list[Change] = []
+        self._versions: list[int] = []
+        self._stills: list[tuple[float, int]] = []
+        self._undo: deque[Undo] = deque(maxlen=UNDO_DEPTH)
+
+    def __contains__(self, command_id: object) -> bool:
+        return command_id in self._entries
+
+    def receipt(self, command_id: int) -> Receipt:
+        """The current truth of a command.
+
+        Raises:
+            UnknownCommandError: If there's no receipt of that id.
+        """
+        try:
+            receipt = self._entries[command_id][0]
+        except (KeyError, TypeError):
+            raise UnknownCommandError(command_id, self.newest) from None
+        for change in self._changes[bisect_left(self._versions, receipt.version + 1) :]:
+            if not receipt.stands:
+                break
+            receipt = _after(receipt, change)
+        return receipt
+
+    def arrived(self, command_id: int, t: float) -> bool:
+        """Whether a command was at its target, or was to be when it was cut short, at t or before."""
+        entry = self._entries.get(command_id)
+        if entry is None:
+            return False
+        start, end = entry[0].execute_at, entry[0].end
+        if start is None or end is None:
+            return True
+        for change in self._changes[bisect_left(self._versions, entry[0].version + 1) :]:
+            if end > change.at + ARRIVED:
+                if change.dropped is None or command_id in change.dropped or start < change.since:
+                    break
+                if change.moved is not None:
+                    start, end = change.moved(start), change.moved(end)
+        return end <= t + ARRIVED
+
+    def before(self, command_id: int, version: int) -> Receipt | None:
+        """A receipt as it was before a version of the timeline; None where there's none."""
+        if command_id not in self._entries:
+            return None
+        receipt = self._entries[command_id][0]
+        for change in self._changes:
+            if receipt.version < change.version < version and receipt.stands:
+                receipt = _after(receipt, change)
+        return receipt
+
+    def command(self, command_id: int) -> MotionCommand | None:
+        """The motion command of an id; None where it was something else or isn't known."""
+        entry = self._entries.get(command_id)
+        return None if entry is None else entry[1]
+
+    def all(self) -> tuple[Receipt, ...]:
+        """Every receipt, in the order of the ids."""
+        receipts = [receipt for receipt, _ in self._entries.values()]
+        if not self._changes:
+            return tuple(receipts)
+        # One pass over the changes with all receipts at once: plans and logs may both be long.
+        end = np.array([np.nan if not r.stands or r.end is None else r.end for r in receipts])
+        version = np.array([r.version for r in receipts])
+        for change in self._changes:
+            for i in np.flatnonzero((end >= change.at) & (version < change.version)).tolist():
+                receipts[i] = _after(receipts[i], change)
+                now = receipts[i].end
+                end[i] = now if receipts[i].stands and now is not None else np.nan
+        return tuple(receipts)
+
+    def reject(self, issued: float | None, asked: float | None, reason: str, version: int) -> Receipt:
+        """Give out a receipt for a command that can't be."""
+        self.newest += 1
+        receipt = Receipt(self.newest, Status.REJECTED, issued, asked, reason=reason, version=version)
+        self._entries[self.newest] = receipt, None
+        return receipt
+
+    def accept(
+        self,
+        receipt: Receipt,
+        command: MotionCommand | None,
+        before: Timeline,
+        change: Change | None,
+        others: Iterable[Entry] = (),
+    ) -> Receipt:
+        """Write down an accepted edit.
+
+        Args:
+            receipt: Its receipt, of a new id or of one that's written over.
+            command: The motion command, where it's one.
+            before: The timeline before it.
+            change: What it did to other commands; None for nothing.
+            others: Receipts of other commands that were planned anew.
+
+        Returns:
+            The receipt; commands to where the arm stood anyway are added to what it superseded.
+        """
+        at = change.at if change is not None else receipt.execute_at or before.end
+        first = bisect_left(self._stills, (at, 0))
+        later = tuple(self._stills[first:])
+        if change is not None and later:
+            if change.stills:
+                dropped = (*receipt.superseded, *(i for _, i in later))
+                receipt = replace(receipt, superseded_names=dropped)
+                del self._stills[first:]
+            elif change.moved is not None:
+                self._stills[first:] = [(change.moved(t), i) for t, i in later]
+        overwritten = self._write((*others, (receipt, command)))
+        self._undo.append(
+            Undo(receipt.command_id, at, before, (len(self._changes), ()), overwritten, ((first, later),))
+        )
+        if change is not None:
+            self._write_log(len(self._changes), (change,))
+        self.newest = max(self.newest, receipt.command_id)
+        return receipt
+
+    def reinstate(
+        self, receipt: Receipt, before: Timeline, change: Change, others: Iterable[Entry] = ()
+    ) -> Receipt:
+        """Write down an edit that brings back what the newest one dropped.
+
+        Args:
+            receipt: Its receipt.
+            before: The timeline before it.
+            change: Where the commands that come back are now; it takes the place of the change that dropped them.
+                Commands to where the arm stood anyway don't come back.
+            others: Receipts of commands that were planned anew.
+        """
+        stop = self._undo[-1]
+        index, _ = stop.changes
+        log = tuple(self._changes[index:])
+        self._write_log(index, (change,))
+        stills = tuple(i for _, there in stop.stills for _, i in there)
+        if stills:
+            receipt = replace(receipt, superseded_names=(*receipt.superseded, *stills))
+        # The stop itself isn't moved.
+        stopped = replace(self._entries[stop.command_id][0], version=change.version), None
+        overwritten = self._write((*others, stopped, (receipt, None)))
+        at = receipt.execute_at or change.at
+        self._undo.append(Undo(receipt.command_id, at, before, (index, log), overwritten, ()))
+        self.newest = max(self.newest, receipt.command_id)
+        return receipt
+
+    def _note_still(self, receipt: Receipt) -> None:
+        if receipt.is_still and receipt.stands and receipt.end is not None:
+            insort(self._stills, (receipt.end, receipt.command_id))
+
+    def _write(self, entries: Iterable[Entry]) -> dict[int, Entry | None]:
+        """Write entries down, and return what they write over."""
+        overwritten = {}
+        for entry in entries:
+            key = entry[0].command_id
+            overwritten[key] = self._entries.get(key)
+            self._entries[key] = entry
+            self._note_still(entry[0])
+        return overwritten
+
+    def _write_log(self, index: int, changes: tuple[Change, ...]) -> None:
+        """Let the log go on with these changes from an index on."""
+        self._changes[index:] = changes
+        self._versions[index:] = [change.version for change in changes]
+
+    def rewrite(self, receipt: Receipt) -> None:
+        """Write over a receipt of a command that goes on, without a way back."""
+        old, command = self._entries[receipt.command_id]
+        if old.is_still and old.end is not None and (old.end, old.command_id) in self._stills:
+            self._stills.remove((old.end, old.command_id))
+        self._entries[receipt.command_id] = receipt, command
+        self._note_still(receipt)
+
+    @property
+    def last(self) -> Undo | None:
+        """The newest edit that can be taken back."""
+        return self._undo[-1] if self._undo else None
+
+    def take_back(self, version: int) -> Receipt:
+        """Forget the newest edit; its own command's receipt says that it's undone.
+
+        Args:
+            version: Version of the timeline that the undoing makes.
+        """
+        undo = self._undo.pop()
+        mine, command = self.receipt(undo.command_id), self.command(undo.command_id)
+        self._write_log(*undo.changes)
+        for first, stills in undo.stills:
+            self._stills[first:] = stills
+        for command_id, entry in undo.overwritten.items():
+            if entry is not None:
+                self._entries[command_id] = entry
+        if undo.overwritten[undo.command_id] is not None:
+            return self.receipt(undo.command_id)
+        mine = replace(mine, reason="undone", version=version, undone=True)
+        self._entries[undo.command_id] = mine, command
+        return mine
+
+    def fuse(self) -> None:
+        """Make the newest two edits one, to be taken back together."""
+        second, first = self._undo.pop(), self._undo.pop()
+        self._undo.append(
+            replace(
+                first,
+                at=min(first.at, second.at),
+                overwritten={**second.overwritten, **first.overwritten},
+                stills=(*second.stills, *first.stills),
+            )
+        )
+
+    def break_off(self, change: Change, note: str) -> Receipt:
+        """Write down that the newest edit is taken back from `change.at` on, and all that was scheduled with it.
+
+        Args:
+            change: What that does to other commands.
+            note: What the user must know of it besides.
+        """
+        undo = self._undo.pop()
+        # What came before it can't be taken back any more: its timeline has another past.
+        self._undo.clear()
+        self._write_log(len(self._changes), (change,))
+        del self._stills[bisect_left(self._stills, (change.at, 0)) :]
+        mine = replace(
+            self.receipt(undo.command_id),
+            reason=f"undone from {change.at:.6g} s on" + (f"; {note}" if note else ""),
+            version=change.version,
+            undone=True,
+        )
+        self._entries[undo.command_id] = mine, self._entries[undo.command_id][1]
+        return mine
+
+
+def _after(receipt: Receipt, change: Change) -> Receipt:
+    """A standing receipt after one more edit."""
+    start, end = receipt.execute_at, receipt.end
+    if start is None or end is None:
+        return receipt
+    still = receipt.is_still
+    if end < change.at if still else end <= change.at + ARRIVED:
+        return receipt
+    gone = change.dropped is None or receipt.command_id in change.dropped or start < change.since
+    if gone or (still and change.stills):
+        return replace(receipt, superseded_by=change.by, version=change.version)
+    if change.moved is None:
+        return receipt
+    start, end = change.moved(start), change.moved(end)
+    return replace(receipt, execute_at=start, end=end, version=change.version)

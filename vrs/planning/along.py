@@ -1,0 +1,327 @@
+"""Plans along a path of the joints: a time law within the limits, put into polynomials and certified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vrs.errors import PlanningError
+from vrs.model import Array, Limits, RobotModel
+from vrs.planning.fit import fit_parts
+from vrs.planning.path import Path
+from vrs.planning.plan import Plan, violation
+from vrs.planning.time_law import Law, fastest, few_knots, parabolas, smoothed
+
+TOLERANCE: Final = 1e-10
+"""Largest deviation of the polynomials from the path [rad]."""
+
+_SAMPLES: Final = 128
+_KNOTS: Final = (0.1, 0.02, 0.005)
+"""Tolerances with which knots are chosen; the next is taken where the law is slower than _SLOWER times the best."""
+_SLOWER: Final = 1.03
+_SLOWER_SMOOTH: Final = 1.06
+"""The same for a law that's smoothed afterwards, each knot becoming two."""
+_WIDTHS: Final = (0.6, 0.9, 1.2, 1.6, 2.2)
+"""Times of the moving average to try, in times of what the acceleration limit takes at the jerk limit."""
+_JOININGS: Final = ((1.0, 0.02), (1.4, 0.1), (1.4, 0.3), (2.2, 0.5))
+"""Such times for lines that go on from a blend, with shares of the limits that the fastest law leaves unused."""
+_ROOM: Final = 1e-3
+"""Relative overshoot of samples that's left to the certificate."""
+_LEAST: Final = 8
+"""Samples of the line that a blend must leave."""
+_LOOKS: Final = 5
+"""Samples of each piece of a smooth law."""
+_MARGINS: Final = (2e-3, 1e-2, 5e-2)
+_STRETCHES: Final = (0.0, 1e-6, 1e-4, 1e-3, 1e-2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """Samples of a path, pieces' ends included, increasing."""
+
+    s: Array
+    """Parameters, (k,)."""
+    joints: Array
+    """q and its first three derivatives by the parameter, (k, 4, n)."""
+
+
+def grid(path: Path) -> Grid:
+    """Sample a path densely enough to judge it."""
+    m = len(path.edges) - 1
+    x = np.linspace(-1.0, 1.0, max(8, -(-_SAMPLES // m)) + 1)
+    s, joints = path.sample(x)
+    inner = joints[:, :-1].reshape(-1, *joints.shape[2:])
+    return Grid(np.append(s[:, :-1].ravel(), path.edges[-1]), np.concatenate([inner, joints[-1:, -1]]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Journey:
+    """A path to travel, and under which limits."""
+
+    path: Path
+    grid: Grid
+    start: Array
+    """q at the beginning [rad], (n,)."""
+    end: Array
+    """q at the end [rad], (n,)."""
+    speed: float
+    """Share v of the speeds."""
+    model: RobotModel
+    limits: Limits
+    qd: Array | None = None
+    """Velocity at the beginning [rad/s], (n,), that of a blend; None for rest."""
+    qdd: Array | None = None
+    """Acceleration at the beginning [rad/s²], (n,), that of a smooth blend; None leaves it to the path."""
+    rate: float = 0.0
+    """Speed of the parameter at the beginning [1/s]."""
+
+    def caps(self, margin: float) -> Array:
+        """Largest squares of the parameter's speed at the samples, (k,).
+
+        On a blend the arm may be faster than v allows: it was when it came.
+        """
+        s, first = self.grid.s, np.abs(self.grid.joints[:, 1])
+        linear, angular = self.path.course.speeds(s)
+        v = np.full(len(s), self.speed)
+        tool, turn = np.full(len(s), self.model.tool_speed), np.full(len(s), self.model.tool_turn_speed)
+        tool, turn = tool * v, turn * v
+        if self.qd is not None:
+            blend = s < 1.0
+            v[blend] = 1.0
+            tool[blend] = np.maximum(tool[blend], self.rate * linear[0])
+            turn[blend] = np.maximum(turn[blend], self.rate * angular[0])
+        with np.errstate(divide="ignore"):
+            fastest_joints = (self.limits.qd_max * (1.0 - margin) / first).min(1) * v
+            speed = np.minimum(fastest_joints, np.minimum(tool / linear, turn / angular))
+        if self.qd is not None:
+            speed[0] = max(speed[0], self.rate * (1.0 + 1e-9))
+        cap: Array = speed * speed
+        return cap
+
+    def law(self, margin: float, slower: float = _SLOWER) -> Law:
+        """The fastest time law, of few parabolas.
+
+        Args:
+            margin: Share of the joint limits that is left unused.
+            slower: How many times the least duration it may take.
+
+        Raises:
+            PlanningError: If the arm is too fast for the path.
+        """
+        s, first, second = self.grid.s, self.grid.joints[:, 1], self.grid.joints[:, 2]
+        acceleration = self.limits.qdd_max * (1.0 - margin)
+        cap, square = self.caps(margin), self.rate**2
+        edges = self.path.course.edges
+        marks = np.unique(np.searchsorted(s, np.clip(edges, s[0], s[-1])))
+        every = np.unique(np.concatenate([np.arange(0, len(s), 2), marks]))
+        best = fastest(s, every, first, second, acceleration, cap, square)
+        least = parabolas(s[every], best)
+        cap[every[1:-1]] = np.minimum(cap[every[1:-1]], best[1:-1])
+        for tolerance in _KNOTS:
+            knots = every[few_knots(s[every], best, np.searchsorted(every, marks), tolerance)]
+            try:
+                law = parabolas(s[knots], fastest(s, knots, first, second, acceleration, cap, square))
+            except PlanningError:
+                continue
+            if law.duration <= slower * least.duration:
+                return law
+        return least
+
+    def polynomials(self, law: Law) -> Plan:
+        """The joints under a time law, not certified."""
+        edges = self.path.edges
+        law = split(law, edges)
+        last = len(law.durations) - 1
+        ends = law.value(np.arange(last + 1), law.durations)[0]
+        inside = 0.5 * (law.coefficients[:, 0] + ends)
+        # At a place where the path bends, each part looks at its own side.
+        marks = self.path.course.edges
+        stretch = np.searchsorted(marks, inside, side="right")
+        part_low = np.searchsorted(edges, marks[stretch - 1])
+        part_high = np.searchsorted(edges, marks[stretch]) - 1
+        shared = 3 if law.smooth else 2
+
+        def motion(part: NDArray[np.intp], u: Array) -> tuple[Array, Array, Array]:
+            values = law.value(part, u)
+            # Where parts meet, rounding must not tell one's end from the next one's start.
+            ending = np.flatnonzero((u == law.durations[part]) & (part < last))
+            following = part[ending] + 1
+            values[:shared, ending] = law.value(following, np.zeros(len(ending)))[:shared]
+            s, rate, growth, _ = values
+            joints = self.path.value(s, part_low[part], part_high[part])
+            bending = ending[part_high[part[ending]] < part_low[following]]
+            if len(bending):
+                beyond = part[bending] + 1
+                other_side = self.path.value(s[bending], part_low[beyond], part_high[beyond])
+                joints[bending, :shared] = other_side[:, :shared]
+            q = joints[:, 0]
+            qd = joints[:, 1] * rate[:, None]
+            qdd = joints[:, 1] * growth[:, None] + joints[:, 2] * (rate * rate)[:, None]
+            first, final = (part == 0) & (u == 0.0), (part == last) & (u == law.durations[last])
+            q[first], q[final] = self.start, self.end
+            qd[first], qd[final] = (0.0 if self.qd is None else self.qd), 0.0
+            if self.qdd is not None:
+                qdd[first] = self.qdd
+            return q, qd, qdd
+
+        return fit_parts(motion, law.durations, max(TOLERANCE, self.path.tolerance))
+
+    def parabolic(self) -> Plan:
+        """The fastest plan of bounded acceleration, certified.
+
+        Raises:
+            PlanningError: If there's none.
+        """
+        problem: str | None = None
+        if self.qd is None:
+            return self.stretched(self.polynomials(self.law(0.0)), jerk=False)
+        for margin in _MARGINS:
+            plan = self.polynomials(self.law(margin))
+            problem = violation(plan, self.limits, jerk=False)
+            if problem is None:
+                return plan
+        raise PlanningError(f"no blend onto the line: {problem}")
+
+    def jerk_limited(self) -> Plan:
+        """A plan from rest to rest of bounded jerk and continuous acceleration, certified.
+
+        Raises:
+            PlanningError: If there's none.
+        """
+        unit = float((self.limits.qdd_max / self.limits.qddd_max).max())
+        fast = self.law(0.0, _SLOWER_SMOOTH)
+        laws = [smoothed(fast, share * unit) for share in _WIDTHS]
+        needed = [law.duration * factor for law, factor in zip(laws, self._factors(laws), strict=True)]
+        return self.stretched(self.polynomials(laws[int(np.argmin(needed))]), jerk=True)
+
+    def joined_smoothly(self) -> Plan:
+        """The blend at an even rate, then the line, with bounded jerk and continuous acceleration; certified.
+
+        Raises:
+            PlanningError: If none is found.
+        """
+        unit = float((self.limits.qdd_max / self.limits.qddd_max).max())
+        problem: str | None = "the arm is too fast for the line"
+        for share, margin in _JOININGS:
+            try:
+                law = self._onward(share * unit, margin)
+            except PlanningError:
+                # Those that follow ask for more.
+                break
+            if self._factors([law])[0] > 1.0 + _ROOM:
+                continue
+            blend = [0.0, self.rate, 0.0, 0.0]
+            whole = Law(
+                np.append(1.0 / self.rate, law.durations), np.vstack([blend, law.coefficients]), smooth=True
+            )
+            plan = self.polynomials(whole)
+            problem = violation(plan, self.limits, jerk=True)
+            if problem is None:
+                return plan
+        raise PlanningError(f"no smooth blend onto the line: {problem}")
+
+    def _onward(self, width: float, margin: float) -> Law:
+        """The law from the end of a blend on: smooth, begun at the blend's rate and without acceleration."""
+        lead = 1.0 + 0.5 * width * self.rate
+        later = self.grid.s > lead + 1e-9
+        if np.count_nonzero(later) < _LEAST:
+            raise PlanningError("the line is too short for its blend")
+        begin = np.array([lead])
+        s = np.concatenate([begin, self.grid.s[later]])
+        joints = np.concatenate([self.path.value(begin), self.grid.joints[later]])
+        after = replace(self, grid=Grid(s, joints)).law(margin, _SLOWER_SMOOTH)
+        durations = np.append(0.5 * width, after.durations)
+        return smoothed(Law(durations, np.vstack([[1.0, self.rate, 0.0, 0.0], after.coefficients])), width)
+
+    def _factors(self, laws: list[Law]) -> Array:
+        """By how much smooth laws must be slowed to keep the limits, at least 1; judged at samples, (m,)."""
+        x = np.linspace(0.0, 1.0, _LOOKS)
+        values = []
+        for law in laws:
+            part = np.repeat(np.arange(len(law.durations)), _LOOKS)
+            values.append(law.value(part, np.tile(x, len(law.durations)) * law.durations[part]))
+        s, rate, growth, jerk = np.concatenate(values, axis=1)
+        first, second, third = self.between(s)
+        r, g, j = rate[:, None], growth[:, None], jerk[:, None]
+        linear, angular = self.path.course.speeds(s)
+        tool = np.maximum(linear / self.model.tool_speed, angular / self.model.tool_turn_speed) * rate
+        needed = np.max(
+            [
+                np.maximum((np.abs(first * r) / self.limits.qd_max).max(1), tool) / self.speed,
+                np.sqrt((np.abs(first * g + second * r * r) / self.limits.qdd_max).max(1)),
+                np.cbrt((np.abs(first * j + 3.0 * second * r * g + third * r**3) / self.limits.qddd_max).max(1)),
+                np.ones(len(s)),
+            ],
+            axis=0,
+        )
+        starts = np.cumsum([0, *(value.shape[1] for value in values[:-1])])
+        return np.maximum.reduceat(needed, starts)
+
+    def between(self, s: Array) -> tuple[Array, Array, Array]:
+        """First three derivatives of q by the parameter at s, (k,), between samples: good enough to choose by."""
+        at = self.grid.s
+        i = np.searchsorted(at[1:-1], s, side="right")
+        share = ((s - at[i]) / (at[i + 1] - at[i]))[:, None, None]
+        joints = self.grid.joints[:, 1:]
+        low = joints[i]
+        low += share * (joints[i + 1] - low)
+        return low[:, 0], low[:, 1], low[:, 2]
+
+    def stretched(self, plan: Plan, *, jerk: bool) -> Plan:
+        """Slow a plan from rest to rest, as a whole, as far as the limits demand.
+
+        Raises:
+            PlanningError: If it can't be certified.
+        """
+        limits = self.limits
+        if self.speed < 1.0:
+            limits = replace(limits, qd_max=self.speed * limits.qd_max)
+        bounds = (limits.qd_max, limits.qdd_max, limits.qddd_max)
+        factor = _peak(plan, bounds[: 3 if jerk else 2])
+        problem: str | None = None
+        for more in _STRETCHES:
+            slower = slowed(plan, factor * (1.0 + more))
+            problem = violation(slower, limits, jerk=jerk)
+            if problem is None:
+                return slower
+        raise PlanningError(f"no time law along the line: {problem}")
+
+
+def split(law: Law, edges: Array) -> Law:
+    """Divide pieces of a law that run through several pieces of a path: no one polynomial would do for those."""
+    m = len(law.durations)
+    ends = law.value(np.arange(m), law.durations)[0]
+    begin = np.searchsorted(edges, law.coefficients[:, 0], side="right")
+    counts = np.maximum(np.searchsorted(edges, ends) - begin, 1)
+    if counts.max() == 1:
+        return law
+    part = np.repeat(np.arange(m), counts)
+    h = (law.durations / counts)[part]
+    u = h * (np.arange(len(part)) - np.repeat(np.cumsum(counts) - counts, counts))
+    s = law.value(part, u)
+    factorials = np.array([1.0, 1.0, 2.0, 6.0])
+    return Law(h, (s / factorials[:, None]).T, law.smooth)
+
+
+def slowed(plan: Plan, factor: float) -> Plan:
+    """The same path, every speed divided by a factor."""
+    powers = factor ** -np.arange(float(plan.coefficients.shape[1]))
+    return Plan(plan.durations * factor, plan.coefficients * powers[:, None])
+
+
+def _peak(plan: Plan, bounds: tuple[Array, ...]) -> float:
+    """By how much a plan must be slowed for its derivatives, first and up, to keep bounds; judged at samples."""
+    x = 0.5 - 0.5 * np.cos(np.pi * np.arange(33) / 32)
+    h = plan.durations[:, None, None]
+    K = plan.coefficients.shape[1]
+    a = plan.coefficients * h ** np.arange(K)[:, None]
+    factor = 1.0
+    for order, bound in enumerate(bounds, start=1):
+        powers = np.arange(order, K)
+        scale = np.prod([powers - i for i in range(order)], axis=0)
+        values = (scale * x[:, None] ** (powers - order)) @ a[:, order:] / h**order
+        factor = max(factor, float((np.abs(values) / bound).max()) ** (1.0 / order))
+    return factor

@@ -1,0 +1,292 @@
+"""Straight-line moves of the tool, planned as joint polynomials.
+
+The joints along the line are found first, as functions of a parameter; then the fastest time law within the
+limits; then polynomials of both together, which are what is certified. A moving arm is led onto the line by the
+blend of Fig. 1 in task space. Source: Doulgeri et al., section II-B.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vrs.chunk import State
+from vrs.commands import Profile
+from vrs.errors import PlanningError, UnresolvedError
+from vrs.model import Array, Limits, RobotModel
+from vrs.planning import parabolic
+from vrs.planning.along import Grid, Journey, grid
+from vrs.planning.course import Course, rotation_vector
+from vrs.planning.jerk_limited import rest_to_rest as smooth_rest_to_rest
+from vrs.planning.joining import courses, smooth_stop
+from vrs.planning.obstacles import SINGULAR, condition, obstacle
+from vrs.planning.path import RESOLVED, Path, trace
+from vrs.planning.plan import Plan, empty, end_state, violation
+
+NEGLIGIBLE: Final = 1e-12
+"""A way [m] and a turn [rad] below which there's nothing to move."""
+STANDING: Final = 7e-7
+"""How far the tool may stir [m, rad] while joints turn on the spot."""
+BRAKED: Final = "braked first, then the line from rest at the place where the arm stopped"
+
+_HARD: Final = 1e5
+"""Condition number from which on a pose may count as one that leaves joints free."""
+_RESTING: Final = 1e-11
+"""Speed [rad/s], and acceleration [rad/s²], that rounding leaves of rest."""
+_PIECES: Final = 8.0
+"""Series to begin with for each radian, or characteristic length, of a line."""
+_TRIALS: Final = 4
+"""Blends that are planned in full before the arm brakes instead."""
+_SAME: Final = 1e-6
+"""Difference of joint values [rad] under which two solutions of a pose are one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """What a line is asked for."""
+
+    goal: Array
+    speed: float
+    profile: Profile
+    model: RobotModel
+    limits: Limits
+    q_goal: Array | None
+    configuration: str | None
+
+
+def line(
+    state: State,
+    X_goal: Array,
+    speed: float,
+    profile: Profile,
+    model: RobotModel,
+    limits: Limits,
+    *,
+    q_goal: Array | None = None,
+    configuration: str | None = None,
+) -> tuple[Plan, str]:
+    """Plan from any state to rest at a pose, the tool on a straight line.
+
+    The tool turns evenly about one axis, the shorter way. From a moving state a blend leads onto the line; where
+    none is found that keeps the limits, the arm brakes and the line starts where it stopped.
+
+    Args:
+        state: Start.
+        X_goal: Pose to reach, (4, 4).
+        speed: Share v of the tool's nominal speeds and of the joints' speed limits, in (0, 1].
+        profile: Time law.
+        model: The robot.
+        limits: Limits that hold at every instant.
+        q_goal: Joint solution of X_goal to arrive at [rad], (n,); None takes what the line leads to.
+        configuration: Words of the configuration that the line must be in; None keeps the arm's own.
+
+    Returns:
+        The plan, whose last position is the joint solution that was reached, and what the user must know of it
+        (empty if nothing).
+
+    Raises:
+        PlanningError: If the line leaves the workspace, crosses a limit, passes or ends too near a singularity,
+            or needs another configuration; the message names the joint and the place.
+        UnreachablePoseError: If the arm is there, but not in the configuration asked for, which has no solution.
+    """
+    task = _Task(_proper(X_goal), speed, profile, model, limits, q_goal, configuration)
+    jerky = profile is Profile.JERK_LIMITED
+    if np.abs(state.qd).max() <= _RESTING and not (jerky and np.abs(state.qdd).max() > _RESTING):
+        return _from_rest(state.q, task)
+    blended = _blended(state, task)
+    if blended is not None:
+        return blended
+    stop, note = _stopped(state, task)
+    plan, more = _from_rest(end_state(stop).q if len(stop) else state.q, task)
+    return stop.then(plan), "; ".join(words for words in (note, more) if words)
+
+
+def _proper(X: Array) -> Array:
+    """The pose with the nearest orthonormal rotation."""
+    U, _, Vt = np.linalg.svd(X[:3, :3])
+    proper = np.array(X, dtype=np.float64)
+    proper[:3, :3] = U @ Vt
+    return proper
+
+
+def _vector(X: Array, goal: Array) -> Array:
+    """Position and rotation vector relative to the goal's orientation, (6,)."""
+    return np.concatenate([X[:3, 3], rotation_vector(X[:3, :3] @ goal[:3, :3].T)])
+
+
+def _from_rest(q: Array, task: _Task) -> tuple[Plan, str]:
+    model = task.model
+    hardness = float(condition(model, q[None])[0])
+    start = _snapped(q, model) if hardness > _HARD else q
+    free = hardness > _HARD and bool(np.abs(start - q).max() <= STANDING)
+    if not free:
+        start = q
+    y = _vector(model.forward(start), task.goal)
+    course = Course(y, y, task.goal)
+    if max(course.length, course.angle) <= NEGLIGIBLE:
+        _check_arrival(q, task)
+        if task.configuration is not None:
+            other = model.inverse_near(task.goal, q, task.configuration)
+            if np.abs(other - q).max() > _SAME:
+                raise PlanningError(_other(q, other, task))
+        return empty(len(q)), ""
+    path = _traced(course, start, task, hardness, free=free)
+    samples = grid(path)
+    begin, end = samples.joints[[0, -1], 0]
+    if np.abs(begin - q).max() > _SAME and not free:
+        raise PlanningError(_other(q, begin, task))
+    _check(path, samples, task)
+    turn, note = empty(len(q)), ""
+    if free and np.abs(begin - q).max() > NEGLIGIBLE:
+        turn = _turned(q, begin, task)
+        if np.abs(begin - q).max() > _SAME:
+            note = _turn_note(q, begin)
+    else:
+        begin = q
+    end = _check_arrival(end, task)
+    journey = Journey(path, samples, begin, end, task.speed, model, task.limits)
+    plan = journey.jerk_limited() if task.profile is Profile.JERK_LIMITED else journey.parabolic()
+    return turn.then(plan), note
+
+
+def _other(q: Array, begin: Array, task: _Task) -> str:
+    """Why a line that would begin at other joints, (n,), than q is none."""
+    own, other = task.model.configuration(q), task.model.configuration(begin)
+    return f"a line can't change configuration: the arm is {own}, asked for is {other}"
+
+
+def _traced(course: Course, q: Array, task: _Task, hardness: float, *, free: bool) -> Path:
+    """The joints along a course that begins at a pose of a condition number, which leaves joints free or not."""
+    # Rounding in a pose makes that much of itself in the joints.
+    tolerance = max(RESOLVED, 1e-15 * min(hardness, 1e6))
+    size = max(course.length / task.model.characteristic_length, course.angle)
+    pieces = min(1 + int(_PIECES * size), 4)
+    try:
+        return trace(
+            course,
+            q,
+            task.model,
+            task.configuration,
+            pieces=pieces,
+            halvings=12 - pieces // 2,
+            free=free,
+            tolerance=tolerance,
+        )
+    except UnresolvedError:
+        if hardness <= SINGULAR:
+            raise
+    graded = Course(course.start, course.corner, course.goal, power=2)
+    return trace(graded, q, task.model, task.configuration, pieces=4, halvings=24, free=free, tolerance=tolerance)
+
+
+def _check(path: Path, samples: Grid, task: _Task) -> None:
+    problem = obstacle(path, samples.s, samples.joints[:, 0], task.model, task.limits)
+    if problem is not None:
+        raise PlanningError(f"no straight line: {problem}")
+
+
+def _check_arrival(q: Array, task: _Task) -> Array:
+    """The joints to arrive at: those that were asked for, if q is the same solution."""
+    wanted = task.q_goal
+    if wanted is None:
+        return q
+    difference = np.abs(wanted - q)
+    j = int(difference.argmax())
+    if difference[j] <= _SAME:
+        return wanted
+    own, other = task.model.configuration(q), task.model.configuration(wanted)
+    words = f", {own} instead of {other}" if own != other else ""
+    at, asked = np.degrees((q[j], wanted[j])).tolist()
+    raise PlanningError(
+        f"the line arrives at another solution of the pose: joint {j + 1} at {at:.6g} deg, "
+        f"asked for is {asked:.6g} deg{words}"
+    )
+
+
+def _snapped(q: Array, model: RobotModel) -> Array:
+    """The exactly singular joints next to q, (n,), which is all but singular."""
+    step = 1e-6
+    for _ in range(3):
+        trials = np.concatenate([q[None], q + step * np.eye(len(q)), q - step * np.eye(len(q))])
+        J = model.jacobian(trials)
+        J[:, :3] /= model.characteristic_length
+        U, _, Vt = np.linalg.svd(J[0])
+        least = np.einsum("i,kij,j->k", U[:, len(q) - 1], J, Vt[-1])
+        slope = (least[1 : len(q) + 1] - least[len(q) + 1 :]) / (2.0 * step)
+        if abs(least[0]) < 1e-14 or slope @ slope < 1e-6:
+            break
+        q = q - slope * (least[0] / (slope @ slope))
+    return q
+
+
+def _turned(q: Array, begin: Array, task: _Task) -> Plan:
+    """Turn joints that a singular pose leaves free to where the path needs them, the tool standing."""
+    steps = q + np.linspace(0.0, 1.0, 33)[:, None] * (begin - q)
+    X = task.model.forward(steps)
+    if np.abs(X - X[0]).max() > 1.5 * STANDING:
+        raise PlanningError(
+            f"no straight line: from this singular pose joint {int(np.abs(begin - q).argmax()) + 1} would have to "
+            "jump at its beginning (0 % of it)"
+        )
+    rest_to_rest = smooth_rest_to_rest if task.profile is Profile.JERK_LIMITED else parabolic.rest_to_rest
+    return rest_to_rest(q, begin, task.speed, task.limits)
+
+
+def _turn_note(q: Array, begin: Array) -> str:
+    joints = [str(j + 1) for j in np.flatnonzero(np.abs(begin - q) > _SAME)]
+    return f"joints {' and '.join(joints)} turn on the spot first: the line leaves a singular pose"
+
+
+def _blended(state: State, task: _Task) -> tuple[Plan, str] | None:
+    """A blend onto the line and the line; None where none is found that keeps the limits."""
+    model, limits = task.model, task.limits
+    if not float(condition(model, state.q[None])[0]) < SINGULAR:
+        return None
+    smooth = task.profile is Profile.JERK_LIMITED
+    tried = 0
+    for course, b in courses(state, task.goal, task.speed, model, limits, smooth=smooth):
+        tried += 1
+        if tried > _TRIALS:
+            break
+        try:
+            path = trace(
+                course, state.q, model, task.configuration, pieces=3, halvings=8, free=False, tolerance=RESOLVED
+            )
+            samples = grid(path)
+            _check(path, samples, task)
+            begin, end = samples.joints[[0, -1], 0]
+            if np.abs(begin - state.q).max() > _SAME:
+                return None
+            end = _check_arrival(end, task)
+            growth = state.qdd if smooth else None
+            journey = Journey(path, samples, state.q, end, task.speed, model, limits, state.qd, growth, 1.0 / b)
+            plan = journey.joined_smoothly() if smooth else journey.parabolic()
+        except PlanningError:
+            continue
+        return plan, f"on the line from {_met(course)} on"
+    return None
+
+
+def _met(course: Course) -> str:
+    """The place where a blend meets the line, from its beginning."""
+    if course.length > NEGLIGIBLE:
+        return f"{course.meet * course.length:.4g} m"
+    return f"{np.degrees(course.meet * course.angle):.4g} deg"
+
+
+def _stopped(state: State, task: _Task) -> tuple[Plan, str]:
+    """Brake, with bounded jerk where that's asked for and goes."""
+    limits = task.limits
+    note = BRAKED
+    if task.profile is Profile.JERK_LIMITED:
+        smooth = smooth_stop(state, limits)
+        if smooth is not None:
+            return smooth, note
+        note = f"{note}; braked with parabolas, as no jerk-limited stop keeps the limits"
+    stop = parabolic.brake(state, limits)
+    problem = violation(stop, limits, jerk=False)
+    if problem is not None:
+        raise PlanningError(f"no stop before the line: {problem}")
+    return stop, note

@@ -1,0 +1,214 @@
+"""The joints along a course of the tool, as Chebyshev series of its parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from vrs.errors import PlanningError, UnresolvedError
+from vrs.model import Array, RobotModel, frozen_array
+from vrs.planning.course import Course
+
+ORDER: Final = 16
+"""Degree of the series."""
+NODES: Final = frozen_array(-np.cos(np.pi * np.arange(ORDER + 1) / ORDER))
+"""Where a piece is sampled, on [-1, 1], ends and middle included."""
+
+
+def _polynomials(x: Array) -> Array:
+    """Chebyshev polynomials at x in [-1, 1], (k,): (k, 17)."""
+    values: Array = np.cos(np.arccos(x)[:, None] * np.arange(ORDER + 1))
+    return values
+
+
+def _differentiate() -> Array:
+    """From coefficients of a series to those of its derivative, (17, 17)."""
+    k, n = np.indices((ORDER + 1, ORDER + 1))
+    # 2 n T_(n-1), 2 n T_(n-3), ... make the derivative of T_n, its constant term counted half.
+    matrix: Array = np.where((n > k) & ((n - k) % 2 == 1), 2.0 * n, 0.0)
+    matrix[0] *= 0.5
+    return matrix
+
+
+def _analyse() -> Array:
+    """From values at NODES to the coefficients of their series, (17, 17)."""
+    ends = np.where(np.arange(ORDER + 1) % ORDER == 0, 0.5, 1.0)
+    matrix: Array = _polynomials(NODES).T * (2.0 / ORDER * ends[:, None] * ends)
+    return matrix
+
+
+_SERIES: Final = frozen_array(_analyse())
+_DERIVE: Final = frozen_array(_differentiate())
+_EXTRAPOLATE: Final = frozen_array(
+    [
+        np.prod([(NODES[0] - NODES[j]) / (NODES[i] - NODES[j]) for j in range(1, ORDER + 1) if j != i])
+        for i in range(1, ORDER + 1)
+    ]
+)
+"""Weights of the other nodes that give the value at the first."""
+
+DERIVATIVES: Final = frozen_array(
+    [_polynomials(NODES) @ np.linalg.matrix_power(_DERIVE, k) @ _SERIES for k in (1, 2, 3)]
+)
+"""From values at NODES to the first three derivatives there, (3, 17, 17)."""
+
+RESOLVED: Final = 1e-12
+"""Largest of the last coefficients of a series that has converged [rad]."""
+ROUNDING: Final = 1e-2
+"""Share of the tolerance below which the last coefficients are dropped."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """Joints along a course: a Chebyshev series a piece."""
+
+    course: Course
+    edges: Array
+    """Parameters where pieces meet, (m + 1,)."""
+    series: Array
+    """Coefficients of q and of its first three derivatives by the parameter, (m, 17, 4, n)."""
+    tolerance: float
+    """At which the series have converged [rad]."""
+
+    def sample(self, x: Array) -> tuple[Array, Array]:
+        """The same places of every piece.
+
+        Args:
+            x: Places on [-1, 1], (k,).
+
+        Returns:
+            Parameters, (m, k), and q and its derivatives there, (m, k, 4, n).
+        """
+        m, _, orders, n = self.series.shape
+        V = _polynomials(x)
+        values = (V @ self.series.reshape(m, ORDER + 1, orders * n)).reshape(m, len(x), orders, n)
+        low, high = self.edges[:-1, None], self.edges[1:, None]
+        return low + (high - low) * (0.5 + 0.5 * x), values
+
+    def value(self, s: Array, low: Array | None = None, high: Array | None = None) -> Array:
+        """Joints at parameters.
+
+        Args:
+            s: Parameters, (k,); what lies beyond the ends counts as the ends.
+            low: First piece that may be taken, (k,).
+            high: Last piece that may be taken, (k,).
+
+        Returns:
+            q and its first three derivatives by the parameter, (k, 4, n).
+        """
+        m, _, orders, n = self.series.shape
+        i = np.searchsorted(self.edges, s, side="right") - 1
+        i = np.clip(i, 0 if low is None else low, m - 1 if high is None else high)
+        begin, end = self.edges[i], self.edges[i + 1]
+        x = np.clip((2.0 * s - begin - end) / (end - begin), -1.0, 1.0)
+        V = _polynomials(x)
+        joints = np.empty((len(s), orders * n))
+        for piece in np.unique(i):
+            own = i == piece
+            joints[own] = V[own] @ self.series[piece].reshape(ORDER + 1, orders * n)
+        return joints.reshape(len(s), orders, n)
+
+
+def trace(
+    course: Course,
+    q: Array,
+    model: RobotModel,
+    configuration: str | None,
+    *,
+    pieces: int,
+    halvings: int,
+    free: bool,
+    tolerance: float,
+) -> Path:
+    """Follow a course with the joints.
+
+    Args:
+        course: What the tool does.
+        q: Joint values to go on from, (n,) [rad].
+        model: The robot.
+        configuration: As in RobotModel.follow.
+        pieces: Into which each part of the course is divided at first.
+        halvings: How often a piece may be halved.
+        free: Whether the pose at the beginning leaves joints free: they're then what the path needs.
+        tolerance: At which a series has converged [rad].
+
+    Raises:
+        UnresolvedError: If the joints aren't smooth.
+        PlanningError: If the course leaves the workspace.
+    """
+    marks = course.edges
+    edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(marks)] + [marks[-1:]])
+    low, high = edges[:-1], edges[1:]
+    known, near = q[None], q
+    done: list[tuple[Array, Array]] = []
+    for level in range(halvings + 1):
+        m = len(low)
+        s = (0.5 * (low + high))[:, None] + (0.5 * (high - low))[:, None] * NODES
+        found = model.follow(course.poses(s.ravel()), near, configuration)
+        if np.isnan(found).any():
+            raise _beyond(course, s.ravel(), found, model, near, configuration)
+        values = found.reshape(m, ORDER + 1, -1)
+        first = low[0] == marks[0]
+        if free and first:
+            values[0, 0] = np.tensordot(_EXTRAPOLATE, values[0, 1:], 1)
+        if level:
+            # Turns go on from what the piece before the halving knew.
+            values -= 2.0 * np.pi * np.round((values[:, ORDER // 2] - known) / (2.0 * np.pi))[:, None]
+        c = _SERIES @ values
+        good = np.abs(c[:, -3:]).max((1, 2)) <= tolerance
+        done.append((low[good], c[good]))
+        bad = ~good
+        if good.all():
+            break
+        middle = 0.5 * (low + high)[bad]
+        quarters = _polynomials(np.array([-0.5, 0.5])) @ c[bad]
+        known = quarters.reshape(-1, values.shape[2])
+        near = values[bad][0, ORDER // 2]
+        low, high = np.stack([low[bad], middle], 1).ravel(), np.stack([middle, high[bad]], 1).ravel()
+    else:
+        raise UnresolvedError(stuck(model, known[0]), course.place(float(low[0])))
+    starts, c = (np.concatenate(values) for values in zip(*done, strict=True))
+    order = np.argsort(starts)
+    edges = np.append(starts[order], marks[-1])
+    c = c[order]
+    # Rounding in the joints grows with each derivative: what's no more than that isn't part of a series.
+    tail = np.maximum.accumulate(np.abs(c)[:, ::-1], axis=1)[:, ::-1]
+    c[tail <= ROUNDING * tolerance] = 0.0
+    scale = (2.0 / np.diff(edges))[:, None, None]
+    derivatives = [c]
+    for _ in range(3):
+        derivatives.append(scale * (_DERIVE @ derivatives[-1]))
+    return Path(course, edges, np.stack(derivatives, axis=2), tolerance)
+
+
+def _beyond(
+    course: Course, s: Array, found: Array, model: RobotModel, near: Array, configuration: str | None
+) -> PlanningError:
+    """Say where the arm can't follow any more, and which joint gives out."""
+    order = np.argsort(s, kind="stable")
+    lost = np.isnan(found[order]).any(1)
+    i = int(np.argmax(lost))
+    beyond = float(s[order][i])
+    inside = float(s[order][i - 1]) if i else beyond
+    at = found[order][i - 1] if i else near
+    for _ in range(40):
+        middle = 0.5 * (inside + beyond)
+        q = model.follow(course.poses(np.array([middle])), at, configuration)[0]
+        if np.isnan(q).any():
+            beyond = middle
+        else:
+            inside, at = middle, q
+    joint = stuck(model, at)
+    return PlanningError(
+        f"no straight line: it leaves the workspace at {course.place(inside)}: joint {joint + 1} can't go further"
+    )
+
+
+def stuck(model: RobotModel, q: Array) -> int:
+    """Return the joint, from 0, that the singularity at or near q, (n,), makes turn fast; of several the first."""
+    J = model.jacobian(q) / np.repeat([model.characteristic_length, 1.0], 3)[:, None]
+    turning_fast = np.abs(np.linalg.svd(J)[2][-1])
+    return int(np.argmax(turning_fast > 0.7 * turning_fast.max()))

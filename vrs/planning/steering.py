@@ -1,0 +1,141 @@
+"""Steering: a hand's rates or twist as a plan that goes on for a while and then stops by itself.
+
+Every plan ends at rest, so the watchdog is in the plan: what no further input replaces stops the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vrs.chunk import State
+from vrs.commands import finite, finite_array
+from vrs.errors import InvalidValueError, PlanningError
+from vrs.model import Array, Limits, RobotModel
+from vrs.planning.parabolic import brake
+from vrs.planning.plan import Plan, violation
+from vrs.planning.steer_course import (
+    LENGTH,
+    Twist,
+    damped_rates,
+    rates_to_limits,
+    sliding_rates,
+    weighted_jacobian,
+)
+from vrs.planning.steer_joint import rates_plan
+from vrs.planning.steer_tool import STANDING, along
+
+Frame = Literal["base", "tool"]
+
+BRAKED_ONLY = "braked with parabolas: no jerk-limited plan from this state keeps the limits"
+DROPPED = "accelerations dropped at the start: bounded jerk would pass a speed limit from this state"
+TOOL_TURN_SPEED = 1.5707963267948966
+"""Nominal angular speed of the tool [rad/s] of a model that doesn't state one."""
+
+
+def steer(
+    state: State,
+    rates: ArrayLike | None,
+    twist: ArrayLike | None,
+    frame: Frame,
+    hold: float,
+    model: RobotModel,
+    limits: Limits,
+) -> tuple[Plan, str]:
+    """Plan what a hand asks for now, for as long as the input is fresh, and the stop after that.
+
+    Args:
+        state: Start; any state within the limits.
+        rates: Joint rates [rad/s], (n,); beyond the speed limits all are scaled alike. None with a twist.
+        twist: Of the tool, (6,): linear [m/s], then angular [rad/s], of the last link's frame; beyond the model's
+            nominal speeds scaled. None with rates.
+        frame: Axes of the twist: `base`, or `tool` for axes that turn with the tool.
+        hold: How long to go on [s]; 0 or less stops.
+        model: The arm.
+        limits: Limits that hold at every instant.
+
+    Returns:
+        A certified plan that ends at rest, empty where the arm stands and stays; and what the user must know of
+        it (empty if nothing).
+
+    Raises:
+        InvalidValueError: If not exactly one of rates and twist is given, or something is of the wrong form.
+        PlanningError: If the state can't be brought to rest within the limits.
+    """
+    n = limits.dof
+    lasting = max(finite("hold", hold, "finite seconds"), 0.0)
+    if frame not in {"base", "tool"}:
+        raise InvalidValueError("frame", frame, "base or tool")
+    if rates is not None and twist is None:
+        u = finite_array("rates", rates, (n,), f"finite joint rates [rad/s], shape ({n},)")
+        return _by_rates(state, u, lasting, limits)
+    if twist is None or rates is not None:
+        raise InvalidValueError("rates and twist", (rates, twist), "one of the two, the other None")
+    given = finite_array("twist", twist, (6,), "a finite twist (v [m/s], w [rad/s]), shape (6,)")
+    return _by_twist(state, _wanted(given, frame, state, model), lasting, model, limits)
+
+
+def _by_rates(
+    state: State, u: Array, hold: float, limits: Limits, shares: Sequence[float] | None = None
+) -> tuple[Plan, str]:
+    u = u / max(1.0, *(abs(rate) / V for rate, V in zip(u.tolist(), limits.qd_max.tolist(), strict=True)))
+    made = rates_plan(state, u, hold, limits, shares)
+    if made is not None and violation(made[0], limits, jerk=True) is None:
+        return made[0], DROPPED if made[1] else ""
+    plan = brake(state, limits)
+    problem = violation(plan, limits, jerk=False)
+    if problem is not None:
+        raise PlanningError(f"no stop from this state: {problem}")
+    return plan, BRAKED_ONLY
+
+
+def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twist:
+    """The twist in the base frame, not faster than nominal, its linear part over the characteristic length."""
+    v, w = given[:3], given[3:]
+    turn = float(getattr(model, "tool_turn_speed", TOOL_TURN_SPEED))
+    scale = max(1.0, hypot(*v.tolist()) / model.tool_speed, hypot(*w.tolist()) / turn)
+    scale_linear = scale * float(getattr(model, "characteristic_length", LENGTH))
+    if frame == "tool":
+        R = model.forward(state.q)[:3, :3]
+        v, w = R @ v, R @ w
+    return Twist(v / scale_linear, w / scale, frame == "tool")
+
+
+def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, str]:
+    J = weighted_jacobian(model, state.q[None])
+    asked = np.concatenate([twist.linear, twist.angular])
+    u = damped_rates(J, asked[None])[0][0]
+    if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
+        return _released(state, J[0], hold, model, limits)
+    low, high = rates_to_limits(state.q, limits)
+    blocked = bool((u < low).any() or (u > high).any())
+    plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
+    if plan is not None:
+        return plan, ""
+    u = share * sliding_rates(J[0], asked, low, high)
+    return _by_rates(state, u, hold, limits, _together(state, u, limits))
+
+
+def _released(state: State, J: Array, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, str]:
+    """Stop on the way that the tool is going."""
+    u = state.qd
+    if float((np.abs(u) / limits.qd_max).max()) >= STANDING:
+        present = J @ u
+        plan, _ = along(state, model, u, Twist(present[:3], present[3:], False), 0.0, hold, limits)
+        if plan is not None:
+            return plan, ""
+    return _by_rates(state, np.zeros_like(u), hold, limits)
+
+
+def _together(state: State, u: Array, limits: Limits) -> list[float]:
+    """Shares of the limits with which all joints reach their rates at once, so that the direction is kept."""
+    needed = np.abs(u - state.qd) / limits.qdd_max
+    longest = float(needed.max())
+    if longest < STANDING:
+        return [1.0] * len(u)
+    share = np.maximum(needed / longest, np.abs(state.qdd) / limits.qdd_max)
+    return [float(value) for value in np.clip(share, 1e-3, 1.0)]

@@ -1,0 +1,62 @@
+"""Rest to rest on the straight line of joint space: one profile from 0 to 1 that every joint follows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vrs.model import Array, Limits
+from vrs.planning.bounds import bounds
+from vrs.planning.plan import Plan
+
+NEGLIGIBLE = 1e-12
+"""A joint distance [rad] below which there's nothing to move."""
+
+
+class Rates(NamedTuple):
+    """The joint limits as limits of the share of the way."""
+
+    speed: float
+    """[1/s]."""
+    acceleration: float
+    """[1/s²]."""
+    jerk: float
+    """[1/s³]."""
+
+
+def rates(start: list[float], q: list[float], speed: float, limits: Limits) -> Rates | None:
+    """Largest rates of the share of the way that keep every joint's limits; None if there's nothing to move.
+
+    A plan whose share runs from 0 to 1 without turning back, within these rates, needs no other certificate:
+    the position limits are a box, so the line between two positions inside lies inside, and each joint's
+    derivatives are its distance times those of the share.
+
+    Args:
+        start: Where it begins [rad].
+        q: Where it ends [rad].
+        speed: Share v of the speed limits, in (0, 1].
+        limits: Limits of the joints.
+
+    Raises:
+        PlanningError: If either position lies outside the limits.
+    """
+    bound = bounds(limits)
+    bound.check_inside(start)
+    bound.check_inside(q)
+    longest = slowest = weakest = hardest = 0.0
+    for a, b, v, g, j in zip(start, q, bound.qd_max, bound.qdd_max, bound.qddd_max, strict=True):
+        reach = abs(b - a)
+        # Conditional expressions, because max() costs four times as much.
+        longest = reach if reach > longest else longest
+        slowest = reach / v if reach > slowest * v else slowest
+        weakest = reach / g if reach > weakest * g else weakest
+        hardest = reach / j if reach > hardest * j else hardest
+    return Rates(speed / slowest, 1.0 / weakest, 1.0 / hardest) if longest > NEGLIGIBLE else None
+
+
+def follow(start: Array, q: Array, durations: list[float], share: list[list[float]]) -> Plan:
+    """Every joint on the line from start to q, (n,), by the polynomials of the share of each segment."""
+    a = np.array(share)[:, :, None] * (q - start)
+    a[:, 0] += start
+    return Plan(np.array(durations), a)

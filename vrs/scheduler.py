@@ -1,0 +1,389 @@
+"""The scheduler: f, eq. (1), on one timeline, with its receipts. It's given the time and reads no clock.
+
+Source: Doulgeri, Zikos, Delopoulos, section II-B.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+from operator import add
+from typing import NamedTuple
+
+from vrs import planning
+from vrs.analyzer import solve
+from vrs.chunk import HOLD, State
+from vrs.commands import (
+    Insertion,
+    JointTarget,
+    Lateness,
+    Motion,
+    MotionCommand,
+    PlanEdit,
+    Profile,
+    SteerCommand,
+    Stop,
+)
+from vrs.errors import InvalidValueError, PlanningError, UnreachablePoseError
+from vrs.insertion import (
+    Edit,
+    JoinPlanner,
+    MovePlanner,
+    fill,
+    gap_at,
+    insert,
+    joined,
+    lengthened,
+    move_before,
+    piece,
+)
+from vrs.ledger import ARRIVED, Change, Entry, Ledger
+from vrs.model import Array, Limits, RobotModel, frozen_array
+from vrs.planning import Plan
+from vrs.planning.plan import end_state
+from vrs.receipt import Names, Receipt, Status
+from vrs.rescheduling import owner_before
+from vrs.timeline import Timeline
+
+REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
+"""What planning raises when a command can't be."""
+
+FRESH = 0.2
+"""Age [s] at which a steering input ends."""
+
+_NAMED_AT_ONCE = 64
+"""Segments whose commands are named at once; those of longer runs when somebody asks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Paused:
+    """What a stop interrupted."""
+
+    version: int
+    """Version of the timeline that the stop made: any later edit makes it the past."""
+    timeline: Timeline
+    """As it was before."""
+    at: float
+    """When the stop began [s]."""
+
+
+class _Session(NamedTuple):
+    """Steering inputs in a row."""
+
+    command_id: int
+    version: int
+    """Version of the timeline that the newest made."""
+    start: float
+    """When the first began [s]."""
+
+
+class Moment(NamedTuple):
+    """When an edit acts, and what its receipt says of that."""
+
+    t: float
+    issued: float | None
+    asked: float | None
+    status: Status
+    reason: str
+
+
+class Scheduler:
+    """What an engine has planned: a timeline, the limits in force, and a ledger of receipts."""
+
+    def __init__(self, model: RobotModel, timeline: Timeline, ledger: Ledger, lateness: Lateness) -> None:
+        self.model = model
+        self.timeline = timeline
+        self.ledger = ledger
+        self.lateness = lateness
+        self.limits = model.limits
+        self.paused: Paused | None = None
+        self.profiles: dict[int, Profile] = {}
+        """Of commands that are no motion commands."""
+        self._session: _Session | None = None
+
+    def move(self, command: MotionCommand, now: float | None) -> Receipt:
+        """Carry out a motion command.
+
+        Args:
+            command: Checked by the analyser.
+            now: Present time [s]; None offline.
+        """
+        issued = command.issued_at if command.issued_at is not None else now
+        asked, end = command.execute_at, self.timeline.end
+        status, reason = Status.ACCEPTED, ""
+        if now is None:
+            t = end if asked is None else asked
+        else:
+            t = max(now, issued if issued is not None else now) if asked is None else asked
+            if issued is not None and t < issued:
+                return self.reject(issued, asked, before_issue(t, issued))
+            if t < now:
+                reason = passed(t, now)
+                if self.lateness is Lateness.REJECT:
+                    return self.reject(issued, asked, reason)
+                t = self._end_of_active(now)
+                status, reason = Status.POSTPONED, f"{reason}: postponed to {t:.9g} s"
+        if command.insertion is Insertion.APPEND and t < end:
+            t = end
+            if asked is not None:
+                status = Status.POSTPONED
+                reason = joined(reason, f"appended at the end of the plan, {t:.9g} s")
+        command_id = self.ledger.newest + 1
+        planner, joiner = self.planner(command), self.joiner(command)
+        try:
+            if command.deviation > 0:
+                edit = self._rounded(command, t, command_id, now)
+            else:
+                edit = insert(self.timeline, t, command.insertion, command_id, planner, joiner)
+        except REFUSALS as error:
+            return self.reject(issued, asked, str(error))
+        appended = command.insertion is Insertion.APPEND
+        appended, t = appended and edit.start == t, edit.start
+        shifted, dropped = ((), ()) if appended else self.touched(edit, t)
+        receipt = Receipt(
+            command_id, status, issued, asked, t, edit.arrival, frozen_array(edit.target),
+            joined(reason, edit.notes), edit.timeline.version, edit.shift,
+            shifted_names=shifted, superseded_names=dropped,
+        )  # fmt: skip
+        return self.accept(receipt, command, edit, t, appended=appended)
+
+    def _rounded(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit:
+        """Insert a move that begins before the one that ends at t is over, and passes its target at a distance."""
+        from vrs.planning import rounding
+
+        gap, dropped = gap_at(self.timeline, t, command.insertion)
+        planner, joiner = self.planner(command), self.joiner(command)
+        found = move_before(self.timeline, t, -inf if now is None else now)
+        if found is None:
+            made = fill(self.timeline, gap, command_id, planner, joiner, dropped)
+            return replace(made, notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
+        first, begin, passed_by = found
+        _, target, _ = planner(gap.state)
+        onward = replace(command, target=JointTarget(target))
+        before = self.ledger.command(passed_by)
+        mixed = ""
+        smooth = self.profile(passed_by) is Profile.JERK_LIMITED and "parabolas" not in self._reason(passed_by)
+        if command.profile is Profile.JERK_LIMITED and not smooth:
+            mixed = "rounded with a move of parabolas"
+
+        def plans(limits: Limits) -> tuple[Plan, Plan, str]:
+            second, _, note = self.planner(onward, limits)(gap.state)
+            if limits is self.limits or before is None:
+                return first, second, joined(note, mixed)
+            again = replace(before, target=JointTarget(gap.state.q))
+            slow, _, more = self.planner(again, limits)(self.timeline.state_before(begin))
+            return slow, second, joined(more, note, mixed)
+
+        way = rounding.rounded(plans, command.deviation, self.model, self.limits, command.profile)
+        if way.first is first:
+            start, rest = t - way.delta, rounding.later(way.whole, way.first.duration - way.delta)
+        else:
+            start, rest = begin, way.whole
+        if start < t and dropped is not None:
+            dropped = (passed_by, *dropped)
+        gap = replace(gap, cut=start, start=start)
+        return fill(self.timeline, gap, command_id, lambda _: (rest, target, way.note), joiner, dropped)
+
+    def _reason(self, command_id: int) -> str:
+        return self.ledger.receipt(command_id).reason if command_id in self.ledger else ""
+
+    def moment(self, command: PlanEdit | SteerCommand, now: float | None, soonest: float) -> Moment:
+        """When an edit acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
+
+        Args:
+            command: The edit.
+            now: Present time [s]; None offline.
+            soonest: As soon as it can, offline [s].
+
+        Raises:
+            PlanningError: If it's late and the policy rejects, or if it was to act before it was issued.
+        """
+        issued, t = command.issued_at, command.execute_at
+        if now is None:
+            return Moment(soonest if t is None else t, issued, t, Status.ACCEPTED, "")
+        issued, asked = now if issued is None else issued, t
+        t = max(now, issued) if t is None else t
+        if t < issued:
+            raise PlanningError(before_issue(t, issued))
+        if t >= now:
+            return Moment(t, issued, asked, Status.ACCEPTED, "")
+        if self.lateness is Lateness.REJECT and not isinstance(command, Stop):
+            raise PlanningError(passed(t, now))
+        return Moment(now, issued, asked, Status.POSTPONED, f"{passed(t, now)}: at once")
+
+    def planner(self, command: MotionCommand, limits: Limits | None = None) -> MovePlanner:
+        """Plan a command's move, under the limits in force now or others."""
+        return partial(_move, command, self.model, self.limits if limits is None else limits)
+
+    def joiner(self, command: MotionCommand) -> JoinPlanner:
+        """Plan a joining move at a command's speed and by its profile."""
+        return partial(_join, command, self.limits)
+
+    def stop_at(self, t: float) -> tuple[Plan, str]:
+        """Plan a stop of each joint at t [s], jerk-limited where the motion is; and what must be said of it."""
+        from vrs.planning import stopping
+
+        profile = self.profile(owner_before(self.timeline, t))
+        return stopping.stop(self.timeline.state_before(t), profile, self.limits)
+
+    def profile(self, command_id: int) -> Profile:
+        """By which profile a command moves the arm."""
+        command = self.ledger.command(command_id)
+        return self.profiles.get(command_id, Profile.PARABOLIC) if command is None else command.profile
+
+    def touched(self, edit: Edit, t: float) -> tuple[Names, Names]:
+        """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
+        before = self.timeline
+        shifted: Names = ()
+        if edit.shift > ARRIVED and edit.tail is not None:
+            shifted = self.named(before, edit.tail, t)
+        if edit.dropped is None:
+            return shifted, self.named(before, max(before.index_at(t), 0), t)
+        return shifted, tuple(i for i in edit.dropped if not self.ledger.arrived(i, t))
+
+    def accept(
+        self,
+        receipt: Receipt,
+        command: MotionCommand | None,
+        edit: Edit,
+        at: float,
+        *,
+        appended: bool = False,
+        others: tuple[Entry, ...] = (),
+    ) -> Receipt:
+        """Put an edit in force, and write its receipt down.
+
+        Args:
+            receipt: Of the command that made the edit.
+            command: That command, where it's a motion.
+            edit: What it did.
+            at: Earliest time that the edit changed [s].
+            appended: Whether all that was scheduled stays.
+            others: Receipts and commands of other moves that were planned anew.
+        """
+        before, self.timeline = self.timeline, edit.timeline
+        change = None
+        if not appended:
+            dropped = None if edit.dropped is None else frozenset(edit.dropped)
+            moved = partial(add, edit.shift) if edit.shift > 0 else None
+            change = Change(edit.timeline.version, receipt.command_id, at, dropped, moved)
+        return self.ledger.accept(receipt, command, before, change, others)
+
+    def named(self, timeline: Timeline, index: int, t: float) -> Names:
+        """Commands that arrive after t and have segments from an index on."""
+        # Joining moves may stand there first whose commands have arrived.
+        stop = min(index + _NAMED_AT_ONCE, len(timeline))
+        near = timeline.owners(index, stop)
+        if stop == len(timeline):
+            return tuple(i for i in near if not self.ledger.arrived(i, t))
+        return partial(_names, timeline, index, frozenset(i for i in near if self.ledger.arrived(i, t)))
+
+    def reject(self, issued: float | None, asked: float | None, reason: str) -> Receipt:
+        """Answer a command that can't be."""
+        return self.ledger.reject(issued, asked, reason, self.timeline.version)
+
+    def _end_of_active(self, now: float) -> float:
+        """End of the segment that is valid now; in a hold, or where none is, now."""
+        timeline = self.timeline
+        index = timeline.index_at(now)
+        if 0 <= index < len(timeline) and timeline.owner_of(index) != HOLD:
+            return timeline.start_of(index + 1)
+        return now
+
+    def steer(self, command: SteerCommand, now: float | None) -> Receipt:
+        """Go on, from now, as a hand asks; inputs in a row with nothing else between are one command."""
+        from vrs.planning import steering
+
+        asked = command.execute_at
+        issued = command.issued_at if command.issued_at is not None else now
+        try:
+            moment = self.moment(command, now, self.timeline.end)
+            t = moment.t
+            hold = FRESH - (0.0 if issued is None else max(t - issued, 0.0))
+            if hold <= 0:
+                raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
+            state = self.timeline.state_before(t)
+            plan, note = steering.steer(
+                state, command.rates, command.twist, command.frame.value, hold, self.model, self.limits
+            )
+        except REFUSALS as error:
+            return self.reject(issued, asked, str(error))
+        before, session = self.timeline, self._session
+        rests = not state.qd.any() and not state.qdd.any()
+        if session is not None and (
+            session.version != before.version or t < session.start or (rests and t < before.end)
+        ):
+            session = None
+        command_id, start = (self.ledger.newest + 1, t) if session is None else (session.command_id, session.start)
+        after = before
+        if len(plan) or t < before.end or session is None:
+            after = lengthened(before, t, piece(plan, command_id))
+        if after is before:
+            return self.ledger.receipt(command_id)
+        target = end_state(plan).q if len(plan) else state.q
+        self.profiles[command_id] = Profile.JERK_LIMITED
+        self._session = _Session(command_id, after.version, start)
+        receipt = Receipt(
+            command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
+            joined(moment.reason, note), after.version,
+        )  # fmt: skip
+        if session is not None:
+            self.timeline = after
+            self.ledger.rewrite(receipt)
+            return receipt
+        edit = Edit(after, t, t + plan.duration, target, dropped=None)
+        receipt = replace(receipt, superseded_names=self.touched(edit, t)[1])
+        return self.accept(receipt, None, edit, t)
+
+    def undo(self, now: float | None) -> Receipt | None:
+        """Take back the newest edit; see `vrs.engine.Engine.undo`."""
+        last = self.ledger.last
+        if last is None:
+            return None
+        version = self.timeline.version + 1
+        if now is None or now <= last.at:
+            self.timeline = last.before.with_version(version)
+            return self.ledger.take_back(version)
+        if now >= self.timeline.end:
+            return None
+        stop, note = self.stop_at(now)
+        self.profiles[last.command_id] = self.profile(owner_before(self.timeline, now))
+        self.timeline = self.timeline.edited(now, [piece(stop, last.command_id)])
+        return self.ledger.break_off(Change(version, last.command_id, now, None), note)
+
+
+def _move(command: MotionCommand, model: RobotModel, limits: Limits, state: State) -> tuple[Plan, Array, str]:
+    speed, profile, target = command.speed, command.profile, command.target
+    if command.motion is Motion.LINE:
+        from vrs.planning.line import line
+
+        if isinstance(target, JointTarget):
+            model.limits.check(target.q)
+            X = model.forward(target.q)
+            plan, note = line(state, X, speed, profile, model, limits, q_goal=target.q)
+            return plan, target.q, note
+        plan, note = line(state, target.X, speed, profile, model, limits, configuration=target.configuration)
+        return plan, end_state(plan).q if len(plan) else state.q, note
+    # The arm solution is chosen from where the arm will be at the final execution time.
+    q = solve(target, model, state.q)
+    plan, note = planning.move(state, q, speed, profile, limits)
+    return plan, q, note
+
+
+def _join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tuple[Plan, str]:
+    return planning.run_up(q, goal, command.speed, command.profile, limits)
+
+
+def _names(timeline: Timeline, index: int, skipped: frozenset[int]) -> tuple[int, ...]:
+    return tuple(i for i in timeline.owners(index, len(timeline)) if i not in skipped)
+
+
+def before_issue(t: float, issued: float) -> str:
+    """Say that a command is to be executed before it was issued."""
+    return f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s"
+
+
+def passed(t: float, now: float) -> str:
+    """Say that a command is late."""
+    return f"t_exec = {t:.9g} s had passed at {now:.9g} s"

@@ -1,0 +1,338 @@
+"""The laws that every edit of a timeline keeps, as checks of what was there before and what is there after it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vrs.chunk import HOLD
+from vrs.model import Array, Limits
+from vrs.testing.extremes import extremes, values
+from vrs.timeline import Timeline
+from vrs.tree import Leaf
+
+BOUNDS = {
+    "gap [s]": 1e-9,
+    "jump q [rad]": 1e-9,
+    "jump qd [rad/s]": 1e-9,
+    "jump qdd [rad/s²]": 1e-9,
+    "position": 1e-9,
+    "speed": 1e-9,
+    "acceleration": 1e-9,
+    "jerk": 1e-9,
+    "tail's shift [s]": 1e-9,
+    "off the way [rad]": 1e-9,
+    "receipt's q [rad]": 1e-9,
+    "end's qd [rad/s]": 1e-9,
+    "pace": 1e-9,
+}
+"""Largest figure that each law allows; limits are passed by a share of the limit, or of 1 rad if that is more."""
+
+
+class LawBrokenError(AssertionError):
+    """An edit broke a law."""
+
+    def __init__(self, law: str, detail: str) -> None:
+        self.law, self.detail = law, detail
+        super().__init__(f"{law}: {detail}")
+
+
+@dataclass(slots=True)
+class Figures:
+    """The worst that was seen of each law."""
+
+    worst: dict[str, float] = field(default_factory=dict)
+
+    def see(self, law: str, value: float, detail: str = "") -> None:
+        """Keep a figure.
+
+        Raises:
+            LawBrokenError: If it's more than the law allows, or NaN.
+        """
+        number = float(value)
+        self.worst[law] = max(self.worst.get(law, -np.inf), number)
+        if not number <= BOUNDS[law]:
+            raise LawBrokenError(law, f"{number:.4g} > {BOUNDS[law]:g} {detail}")
+
+    def add(self, other: Figures) -> None:
+        """Take in what another run saw."""
+        for law, value in other.worst.items():
+            self.worst[law] = max(self.worst.get(law, -np.inf), value)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """All segments of a timeline, a column a property."""
+
+    starts: Array
+    """[s], (m,)."""
+    durations: Array
+    """[s], (m,)."""
+    owners: tuple[int, ...]
+    """Command ids; 0 for holds."""
+    rows: tuple[bytes, ...]
+    """Coefficients, as bytes of float64."""
+    dof: int
+    """Number of joints, n."""
+    end: float
+    """End of the last, or the timeline's start where there's none [s]."""
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def padded(self, low: int, high: int) -> Array:
+        """Coefficients of the segments low to high − 1, (m, K, n), at least cubic."""
+        orders = [len(row) // (8 * self.dof) for row in self.rows[low:high]]
+        a = np.zeros((len(orders), max(orders, default=1), self.dof))
+        for target, order, row in zip(a, orders, self.rows[low:high], strict=True):
+            target[:order] = np.frombuffer(row).reshape(order, self.dof)
+        return a
+
+    def index_at(self, t: float) -> int:
+        """Index of the segment with start ≤ t < end; −1 before the first, len(self) at the end and after it."""
+        return len(self) if t >= self.end else int(np.searchsorted(self.starts, t, "right")) - 1
+
+    def start_of(self, index: int) -> float:
+        """Start of a segment [s]; of index len(self), the end."""
+        return float(self.starts[index]) if index < len(self) else self.end
+
+    def end_of_move(self, index: int) -> int:
+        """One past the last segment of the move, with its inner holds, that a segment belongs to."""
+        owner = self.owners[index]
+        while True:
+            following = self.next_move(index + 1)
+            if following == len(self) or self.owners[following] != owner:
+                return index + 1
+            index = following
+
+    def next_move(self, index: int) -> int:
+        """First segment from an index on that isn't a hold; len(self) if there's none."""
+        while index < len(self) and self.owners[index] == HOLD:
+            index += 1
+        return index
+
+
+def columns(timeline: Timeline) -> Columns:
+    """All segments of a timeline; much quicker than one by one."""
+    starts: list[float] = []
+    leaves: list[Leaf] = []
+
+    def walk(node: Any, offset: float) -> None:
+        if isinstance(node, Leaf):
+            leaves.append(node)
+            starts.extend([offset + start for start in node.starts])
+            return
+        for child, own in zip(node.children, node.offsets, strict=True):
+            walk(child, offset + own)
+
+    if len(timeline):
+        walk(timeline._root, 0.0)
+    durations = np.array(list(chain.from_iterable(leaf.durations for leaf in leaves)))
+    owners = tuple(chain.from_iterable(leaf.owners for leaf in leaves))
+    rows = tuple(chain.from_iterable(leaf.rows for leaf in leaves))
+    return Columns(np.array(starts), durations, owners, rows, timeline.dof, timeline.end)
+
+
+def check_past(before: Columns, after: Columns, t: float) -> None:
+    """What lies before t is bit-identical: starts, durations, coefficients, commands; cut at t, at the earliest.
+
+    Raises:
+        LawBrokenError: If it isn't.
+    """
+    stays = min(len(before), max(before.index_at(t), -1) + 1)
+    stays -= stays > 0 and before.start_of(stays - 1) >= t
+    if len(after) < stays and any(before.owners[len(after) : stays]):
+        raise LawBrokenError("the past", f"{len(after)} segments are left of {stays} before {t!r} s")
+    # A hold at the end may come and go: after the end the arm stands as well.
+    stays = min(stays, len(after))
+    same = (
+        np.array_equal(before.starts[:stays], after.starts[:stays])
+        and before.rows[:stays] == after.rows[:stays]
+        and before.owners[:stays] == after.owners[:stays]
+        and np.array_equal(before.durations[: max(stays - 1, 0)], after.durations[: max(stays - 1, 0)])
+    )
+    if not same:
+        raise LawBrokenError("the past", f"a segment before {t!r} s is another")
+    if stays and before.durations[stays - 1] != after.durations[stays - 1]:
+        ends = [float(run.starts[stays - 1] + run.durations[stays - 1]) for run in (before, after)]
+        if min(ends) < t - 1e-9 and before.owners[stays - 1] != HOLD:
+            raise LawBrokenError(
+                "the past", f"a segment ended at {ends[0]!r} s, ends at {ends[1]!r} s, before {t!r} s"
+            )
+
+
+def check_memory(before: Timeline, after: Timeline, t: float) -> None:
+    """Positions before t, g of eq. (4), are bit-identical.
+
+    Raises:
+        LawBrokenError: If it isn't.
+    """
+    low = before.start_of(max(before.index_at(t) - 2, 0))
+    for share in (0.0, 0.271828, 0.618034, 0.931416):
+        moment = low + share * (t - low)
+        moment = moment if moment < t else float(np.nextafter(t, -np.inf))
+        if not np.array_equal(before.sample(moment), after.sample(moment)):
+            raise LawBrokenError("the past", f"the position at {moment!r} s, before {t!r} s, is another")
+
+
+def changed(before: Columns, after: Columns, t: float) -> tuple[int, int]:
+    """First segment from t on that isn't as it was, and one past the last: the tail that stayed follows."""
+    low = min(max(before.index_at(t), 0), len(after))
+    if low < len(before) and before.start_of(low) < t:
+        low = min(low + 1, len(after))
+    high, other = len(after), len(before)
+    while high > low and other > 0:
+        i, j = high - 1, other - 1
+        alike = after.rows[i] == before.rows[j] and after.durations[i] == before.durations[j]
+        if not alike or after.owners[i] != before.owners[j]:
+            break
+        high, other = i, j
+    return low, high
+
+
+def check_tail(before: Columns, after: Columns, first: int, shift: float | None, figures: Figures) -> None:
+    """The segments from an index of before on are the last of after: bit-identical, shifted by one Δ ≥ 0.
+
+    Args:
+        before: Segments before the edit.
+        after: Segments after it.
+        first: Index, in before, of the first that stays.
+        shift: Δ [s]; None for any.
+        figures: Where the worst figures are kept.
+
+    Raises:
+        LawBrokenError: If they aren't.
+    """
+    if first >= len(before):
+        return
+    count = len(before) - first
+    low = len(after) - count
+    if low < 0:
+        raise LawBrokenError("the tail", f"{count} segments should have stayed, {len(after)} are there")
+    if shift is None:
+        shift = float(after.starts[low] - before.starts[first])
+    if shift < -BOUNDS["tail's shift [s]"]:
+        raise LawBrokenError("the tail", f"is shifted by {shift} s")
+    for what, mine, others in (
+        ("coefficients", before.rows[first:], after.rows[low:]),
+        ("commands", before.owners[first:], after.owners[low:]),
+        ("durations", before.durations[first:].tolist(), after.durations[low:].tolist()),
+    ):
+        if list(mine) != list(others):
+            raise LawBrokenError("the tail", f"{what} changed from {before.start_of(first)!r} s on")
+    away = np.abs(after.starts[low:] - before.starts[first:] - shift)
+    figures.see("tail's shift [s]", away.max(), f"at {before.starts[first + int(away.argmax())]!r} s")
+
+
+def check_moves(before: Columns, after: Columns, first: int, names: Collection[int], figures: Figures) -> None:
+    """The segments of some commands, from an index of before on, are bit-identical, each shifted by one Δ ≥ 0.
+
+    Args:
+        before: Segments before the edit.
+        after: Segments after it.
+        first: Index, in before, from which on they're judged.
+        names: The commands.
+        figures: Where the worst figures are kept.
+
+    Raises:
+        LawBrokenError: If they aren't.
+    """
+    for name in {*before.owners[first:]}.intersection(names):
+        mine = [i for i in range(first, len(before)) if before.owners[i] == name]
+        same = [i for i, owner in enumerate(after.owners) if owner == name][-len(mine) :]
+        alike = len(mine) == len(same) and all(
+            before.rows[i] == after.rows[j] and before.durations[i] == after.durations[j]
+            for i, j in zip(mine, same, strict=True)
+        )
+        if not alike:
+            raise LawBrokenError("the tail", f"the move of command {name} changed")
+        away = after.starts[same] - before.starts[mine]
+        figures.see("tail's shift [s]", max(away.max() - away.min(), -away.min()), f"of command {name}")
+
+
+def check_run(run: Columns, low: int, high: int, limits: Limits, smooth: set[int], figures: Figures) -> None:
+    """Segments low to high − 1 follow one another without gap or jump and keep the limits; knots at both ends too.
+
+    Args:
+        run: All segments.
+        low: First that is judged.
+        high: One past the last.
+        limits: In force.
+        smooth: Commands whose segments keep jerk limits, and have no jumps in acceleration.
+        figures: Where the worst figures are kept.
+
+    Raises:
+        LawBrokenError: If a law is broken.
+    """
+    first, last = max(low - 1, 0), min(high + 1, len(run))
+    if first >= last:
+        return
+    a, h, starts = run.padded(first, last), run.durations[first:last], run.starts[first:last]
+    if not (h > 0).all():
+        raise LawBrokenError("durations", f"a segment of {h.min()!r} s")
+    figures.see("gap [s]", np.abs(starts[:-1] + h[:-1] - starts[1:]).max(initial=0.0))
+    zero = np.zeros(len(a) - 1)
+    owners = np.array(run.owners[first:last])
+    jerky = np.isin(owners, list(smooth))
+    for order, law in enumerate(("jump q [rad]", "jump qd [rad/s]", "jump qdd [rad/s²]")):
+        jump = np.abs(values(a[:-1], h[:-1], order) - values(a[1:], zero, order))
+        if order == 2:
+            jump[~(jerky[1:] & (owners[:-1] == owners[1:]))] = 0.0
+        if jump.size:
+            at = int(jump.max(1).argmax())
+            figures.see(law, jump.max(), f"at {starts[at + 1]!r} s, command {owners[at]} to {owners[at + 1]}")
+    new = slice(low - first, high - first)
+    check_limits(a[new], h[new], limits, jerky[new], figures, f"of commands {sorted({*owners[new].tolist()})}")
+
+
+def check_limits(
+    a: Array, h: Array, limits: Limits, jerky: NDArray[np.bool_], figures: Figures, of: str = ""
+) -> None:
+    """Polynomials keep the limits at every instant.
+
+    Args:
+        a: Coefficients, (m, K, n).
+        h: Durations [s], (m,).
+        limits: To be kept.
+        jerky: Which of them keep jerk limits, (m,).
+        figures: Where the worst figures are kept.
+        of: Whose they are, for the message.
+
+    Raises:
+        LawBrokenError: If one is passed.
+    """
+    if not len(a):
+        return
+    if not np.isfinite(a).all():
+        raise LawBrokenError("finite", f"a coefficient {of} is NaN or infinite")
+    low, high = extremes(a, h, 0)
+    over = np.maximum(
+        (high - limits.q_max) / np.maximum(1.0, np.abs(limits.q_max)),
+        (limits.q_min - low) / np.maximum(1.0, np.abs(limits.q_min)),
+    )
+    figures.see("position", over.max(), f"in joint {int(over.max(0).argmax()) + 1} {of}")
+    bounds = (("speed", limits.qd_max), ("acceleration", limits.qdd_max), ("jerk", limits.qddd_max))
+    for order, (law, bound) in enumerate(bounds, 1):
+        mine = jerky if order == 3 else np.ones(len(a), bool)
+        if mine.any():
+            low, high = extremes(a[mine], h[mine], order)
+            over = np.maximum(high, -low) / bound - 1.0
+            figures.see(law, over.max(), f"in joint {int(over.max(0).argmax()) + 1} {of}")
+
+
+def check_rest(timeline: Timeline, run: Columns, figures: Figures) -> None:
+    """The plan ends at rest.
+
+    Raises:
+        LawBrokenError: If it doesn't.
+    """
+    if len(run):
+        a = run.padded(len(run) - 1, len(run))
+        figures.see("end's qd [rad/s]", np.abs(values(a, run.durations[-1:], 1)).max())
+    if timeline.sample(timeline.end, derivative=1).any():
+        raise LawBrokenError("rest", "the arm moves after the end")

@@ -1,0 +1,334 @@
+"""An engine under watch: whatever it's told, every law is checked."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vrs.chunk import HOLD
+from vrs.commands import (
+    Cancel,
+    Command,
+    Insertion,
+    InsertVia,
+    MotionCommand,
+    Position,
+    Profile,
+    Resume,
+    Retime,
+    ScaleTime,
+    SteerCommand,
+    Stop,
+)
+from vrs.engine import Engine
+from vrs.errors import VrsError
+from vrs.receipt import Receipt, Status
+from vrs.testing.kinds import kinds_of
+from vrs.testing.laws import (
+    Columns,
+    Figures,
+    LawBrokenError,
+    changed,
+    check_memory,
+    check_moves,
+    check_past,
+    check_rest,
+    check_run,
+    check_tail,
+    columns,
+)
+from vrs.testing.pace import check_pace, check_way
+from vrs.testing.receipts import check_names, check_receipts, check_same
+from vrs.testing.scene import Scene, given
+from vrs.timeline import Timeline
+
+_FIGURES = re.compile(r"-?\d[\d.,e+-]*|\[.*?\]", re.DOTALL)
+_ROUGH = ("parabolas", "accelerations dropped")
+"""What receipts say where jerk limits don't hold."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Step:
+    """What was there before an edit that can be taken back."""
+
+    command_id: int
+    at: float
+    """Earliest time that it changed [s]."""
+    timeline: Timeline
+    receipts: dict[int, Receipt]
+
+
+class Watch:
+    """Passes commands on to an engine, and raises LawBrokenError as soon as an answer breaks a law.
+
+    Rounding apart, the laws are: the past stays bit-identical; nothing jumps; limits hold at every instant; what
+    stays of the future stays bit-identical and is shifted by one Δ ≥ 0; receipts are true; what's rejected changes
+    nothing; undo restores; the plan ends at rest. The engine must have been asked for nothing else meanwhile.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        figures: Figures | None = None,
+        answers: Counter[tuple[str, str]] | None = None,
+        reasons: Counter[tuple[str, str]] | None = None,
+    ) -> None:
+        """Watch an engine from now on.
+
+        Args:
+            engine: What to watch.
+            figures: Where the worst figures are kept.
+            answers: Where it's counted how often a kind of command had an outcome.
+            reasons: Where it's counted why kinds of commands were rejected, figures left out.
+        """
+        self.engine = engine
+        self.figures = Figures() if figures is None else figures
+        self.answers: Counter[tuple[str, str]] = Counter() if answers is None else answers
+        self.reasons: Counter[tuple[str, str]] = Counter() if reasons is None else reasons
+        self._columns = columns(engine.timeline)
+        self._receipts = {r.command_id: r for r in engine.receipts}
+        self._commands: dict[int, MotionCommand] = {}
+        self._smooth: set[int] = set()
+        self._steps: list[_Step] = []
+        self._stopped: tuple[Columns, float] | None = None
+
+    @property
+    def moves(self) -> Mapping[int, MotionCommand]:
+        """The motion commands that the engine has accepted, by command id."""
+        return self._commands
+
+    @property
+    def receipts(self) -> dict[int, Receipt]:
+        """The engine's receipts, by command id."""
+        return self._receipts
+
+    def execute(self, command: Command) -> Receipt | Position | None:
+        """Let the engine carry out a command.
+
+        Raises:
+            LawBrokenError: If a law is broken.
+            VrsError: If the engine refuses the command's form.
+        """
+        before, now = self.engine.timeline, self._now()
+        kinds = kinds_of(command)
+        try:
+            answer: Receipt | Position | None = self.engine.execute(command)  # type: ignore[arg-type]
+        except VrsError as error:
+            self._count(kinds, "misuse", str(error))
+            self._untouched(before, None)
+            raise
+        if not isinstance(answer, Receipt):
+            self._untouched(before, None)
+            if isinstance(answer, Position) and not np.array_equal(answer.q, self.engine.joints(answer.t)):
+                raise LawBrokenError("query", f"the arm isn't at {answer.q} at {answer.t!r} s")
+            self._count(kinds, "answered")
+            return answer
+        self._count(kinds, answer.status.value, answer.reason if answer.status is Status.REJECTED else "")
+        if answer.status is Status.REJECTED:
+            if not answer.reason:
+                raise LawBrokenError("receipts", "rejected without a reason")
+            fresh = answer.command_id not in self._receipts
+            self._untouched(before, answer.command_id if fresh else None)
+            return answer
+        scene = self._look(now, before)
+        at = scene.earliest(command, answer)
+        self._remember(command, answer, at, scene)
+        self._check(command, answer, at, scene)
+        self._settle(scene)
+        return answer
+
+    def undo(self) -> Receipt | None:
+        """Let the engine take back the newest edit.
+
+        Raises:
+            LawBrokenError: If a law is broken.
+        """
+        before, now = self.engine.timeline, self._now()
+        step = self._steps[-1] if self._steps else None
+        answer = self.engine.undo()
+        self._count(("undo",), "nothing" if answer is None else "accepted")
+        if answer is None:
+            if step is not None and (now is None or now <= step.at or now < before.end):
+                raise LawBrokenError("undo", f"the edit of command {step.command_id} could have been taken back")
+            self._untouched(before, None)
+            return None
+        if step is None:
+            raise LawBrokenError("undo", "there was nothing to take back")
+        scene = self._look(now, before)
+        self._steps.pop()
+        self._stopped = None
+        whole = now is None or now <= step.at
+        if whole:
+            self._check_restored(step, scene)
+        else:
+            self._steps.clear()
+            if not answer.undone or answer.command_id != step.command_id:
+                raise LawBrokenError("undo", "the receipt doesn't say that its command is undone")
+            smooth = self._smooth_before(given(now), scene) and not _rough(answer.reason)
+            self._smooth.add(step.command_id) if smooth else self._smooth.discard(step.command_id)
+        at = step.at if now is None else max(now, step.at) if whole else now
+        # Knots that were cut at a receipt's time, which is rounded, move back by as much.
+        self._check_edit(scene, at - 1e-12 * max(1.0, abs(at)) if whole else at)
+        self._settle(scene)
+        return answer
+
+    def _now(self) -> float | None:
+        return None if self.engine.clock is None else self.engine.clock.now()
+
+    def _count(self, kinds: tuple[str, ...], outcome: str, reason: str = "") -> None:
+        for kind in kinds:
+            self.answers[kind, outcome] += 1
+        if reason:
+            self.reasons[kinds[0], _FIGURES.sub("#", reason)] += 1
+
+    def _look(self, now: float | None, before: Timeline) -> Scene:
+        receipts = {r.command_id: r for r in self.engine.receipts}
+        after = self.engine.timeline
+        return Scene(now, before, self._columns, self._receipts, after, columns(after), receipts)
+
+    def _settle(self, scene: Scene) -> None:
+        self._columns, self._receipts = scene.new, scene.now_receipts
+
+    def _untouched(self, before: Timeline, rejected: int | None) -> None:
+        """Nothing was changed, but for the receipt of a new command that was rejected."""
+        if self.engine.timeline is not before:
+            raise LawBrokenError("nothing changed", "the timeline is another")
+        receipts = {r.command_id: r for r in self.engine.receipts}
+        if rejected is not None:
+            self._receipts[rejected] = receipts[rejected]
+        check_same(self._receipts, receipts, "nothing changed")
+
+    def _remember(self, command: Command, answer: Receipt, at: float, scene: Scene) -> None:
+        """Keep what later edits are judged by."""
+        mine, smooth = answer.command_id, not _rough(answer.reason)
+        if isinstance(command, MotionCommand):
+            self._commands[mine] = command
+            smooth = smooth and command.profile is Profile.JERK_LIMITED
+        elif isinstance(command, Stop):
+            smooth = smooth and self._smooth_before(at, scene)
+        elif not isinstance(command, SteerCommand) or mine in scene.receipts:
+            smooth = smooth and mine in self._smooth
+        self._smooth.add(mine) if smooth else self._smooth.discard(mine)
+        for i, receipt in scene.now_receipts.items():
+            if receipt.version > scene.before.version and _rough(receipt.reason):
+                self._smooth.discard(i)
+        if _rough(answer.reason):
+            low, high = changed(scene.old, scene.new, at)
+            self._smooth.difference_update(scene.new.owners[low:high])
+        goes_on = isinstance(command, SteerCommand) and mine in scene.receipts
+        if not goes_on:
+            self._steps.append(_Step(mine, at, scene.before, scene.receipts))
+        elif self._steps:
+            self._steps[-1] = replace(self._steps[-1], at=min(at, self._steps[-1].at))
+        stopped = isinstance(command, Stop)
+        paused = self._stopped
+        self._stopped = (scene.old, at) if stopped else None
+        if isinstance(command, Resume):
+            if paused is None:
+                raise LawBrokenError("resume", "nothing was stopped, or something was commanded since")
+            old, then = paused
+            i = old.index_at(then)
+            first = max(i, 0)
+            if 0 <= i < len(old) and old.owners[i] != HOLD:
+                # All that's left of the interrupted command is planned anew.
+                first = 1 + max(j for j, owner in enumerate(old.owners) if owner == old.owners[i])
+                first = max(first, old.end_of_move(i))
+            first = old.next_move(first)
+            check_tail(old, scene.new, first, answer.shift, self.figures)
+
+    def _smooth_before(self, t: float, scene: Scene) -> bool:
+        """Whether what moved just before a time keeps jerk limits."""
+        i = int(np.searchsorted(scene.old.starts, t)) - 1
+        return i >= 0 and scene.old.owners[i] in self._smooth
+
+    def _check(self, command: Command, answer: Receipt, at: float, scene: Scene) -> None:
+        if scene.now is not None and at < scene.now:
+            raise LawBrokenError("the past", f"an edit at {at!r} s, {scene.now - at:.3g} s ago")
+        self._check_edit(scene, at)
+        if not isinstance(command, Resume):
+            moves = {*self._commands, *scene.old.owners}
+            check_names(answer, scene.before.version, scene.receipts, scene.now_receipts, moves)
+        old, new = scene.old, scene.new
+        if isinstance(command, MotionCommand):
+            self._check_move(command, answer, at, scene)
+        elif isinstance(command, ScaleTime):
+            self._check_pace(command.factor, answer, at, scene)
+        elif isinstance(command, Stop):
+            if "on its way" in answer.reason:
+                check_way(scene.before, scene.after, (at, new.end), None, 0.0, self.figures)
+            self._ends(answer, at, scene)
+        elif isinstance(command, SteerCommand):
+            self._ends(answer, at, scene)
+        elif isinstance(command, (Retime, Cancel, InsertVia)):
+            first = scene.first_that_stays(command)
+            if isinstance(command, Retime):
+                # Taking the move out and putting it in again may each shift what comes after it.
+                planned = {i for i, r in scene.now_receipts.items() if "elsewhere" in r.reason}
+                stand = {i for i in self._commands if scene.now_receipts[i].stands}
+                check_moves(old, new, first, stand - planned - {command.command_id}, self.figures)
+            else:
+                check_tail(old, new, first, answer.shift, self.figures)
+
+    def _check_edit(self, scene: Scene, at: float) -> None:
+        """The laws of all edits."""
+        check_past(scene.old, scene.new, at)
+        check_memory(scene.before, scene.after, at)
+        low, high = changed(scene.old, scene.new, at)
+        check_run(scene.new, low, high, self.engine.limits, self._smooth, self.figures)
+        check_rest(scene.after, scene.new, self.figures)
+        check_receipts(scene.after, scene.new, scene.now_receipts, self._commands, self.figures)
+
+    def _check_move(self, command: MotionCommand, answer: Receipt, at: float, scene: Scene) -> None:
+        old, t = scene.old, scene.nominal(command)
+        if command.deviation == 0 and at != t:
+            raise LawBrokenError("receipts", f"to be executed at {t!r} s, planned for {at!r} s")
+        if at > t:
+            raise LawBrokenError("receipts", f"to be rounded from {t!r} s back, planned for {at!r} s")
+        punctual = t == (t if command.execute_at is None else command.execute_at)
+        if punctual != (answer.status is Status.ACCEPTED):
+            raise LawBrokenError("receipts", f"{answer.status} for {t!r} s, asked for {command.execute_at!r} s")
+        first = len(old)
+        if command.insertion is Insertion.APPEND:
+            if t < old.end:
+                raise LawBrokenError("append", f"begins at {t!r} s, before the end at {old.end!r} s")
+        elif command.insertion is Insertion.SPLICE and t < old.end:
+            i = old.index_at(t)
+            first = old.next_move(old.end_of_move(i) if i >= 0 and old.owners[i] != HOLD else max(i, 0))
+        if first < len(old):
+            check_tail(old, scene.new, first, answer.shift, self.figures)
+        else:
+            self._ends(answer, at, scene)
+
+    def _check_pace(self, factor: float, answer: Receipt, at: float, scene: Scene) -> None:
+        old, new, changes = scene.old, scene.new, given(answer.end)
+        first = min(int(np.searchsorted(new.starts, changes - 1e-12 * max(1.0, abs(changes)))) + 1, len(new))
+        check_pace(old, new, first, factor, self.figures)
+        there = None
+        if first < len(new):
+            # From there on the pace is steady, so that places on the way are known.
+            t, s = new.start_of(first), old.start_of(len(old) - (len(new) - first))
+            there = s - factor * (t - changes)
+            for moment in np.linspace(changes, t, 4):
+                away = scene.after.sample(moment) - scene.before.sample(s - factor * (t - moment))
+                self.figures.see("off the way [rad]", np.abs(away).max(), f"at {moment!r} s")
+        if at < old.end:
+            check_way(scene.before, scene.after, (at, changes), there, factor, self.figures)
+
+    def _ends(self, answer: Receipt, at: float, scene: Scene) -> None:
+        """Nothing follows what was planned."""
+        if at < scene.old.end and abs(scene.new.end - given(answer.end)) > 1e-9:
+            raise LawBrokenError("receipts", f"ends at {answer.end!r} s, the plan at {scene.new.end!r} s")
+
+    def _check_restored(self, step: _Step, scene: Scene) -> None:
+        if scene.after != step.timeline:
+            raise LawBrokenError("undo", f"the timeline isn't what it was before command {step.command_id}")
+        now = {i: r for i, r in scene.now_receipts.items() if i in step.receipts}
+        check_same(step.receipts, now, "undo")
+
+
+def _rough(reason: str) -> bool:
+    return any(word in reason for word in _ROUGH)

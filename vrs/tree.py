@@ -1,0 +1,343 @@
+"""A persistent tree of segments: an edit rebuilds one path from root to leaf and shares everything else.
+
+Every child of a node has a time offset. A segment starts at the offsets summed from the root down, in that order,
+plus its own start in the leaf; that float is the start, wherever it's asked for. Shifting a tail adds Δ to the
+offsets right of the path at each level and to no segment. A node that is made anew from one node keeps its
+offset; one that is made from two has offset 0 and their children the summed offset, so that the same float comes
+out. Leaves that are made anew have absolute starts: their offset takes away what's summed above them, exactly.
+"""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_right
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+LEAF = 48
+"""Segments of a leaf, at most: more cost more to copy, fewer make more leaves."""
+
+CAPACITY = 96
+"""Children of a node, at most: more cost more to copy, fewer make the tree deeper."""
+
+FILLED = 0.75
+"""How full a sequence that grows at its end leaves what lies behind: edits that follow there need no split."""
+
+
+class Leaf:
+    """Up to LEAF segments, a column a property. Never changed once it's made."""
+
+    __slots__ = ("count", "durations", "first", "owners", "rows", "starts")
+
+    def __init__(
+        self, starts: array[float], durations: array[float], owners: array[int], rows: tuple[bytes, ...]
+    ) -> None:
+        self.starts = starts
+        """Start of each segment [s], in the leaf's time."""
+        self.durations = durations
+        """[s]."""
+        self.owners = owners
+        """Command ids; 0 for a hold."""
+        self.rows = rows
+        """Coefficients (degree + 1, n) of each segment, as the bytes of a C-ordered float64 array."""
+        self.first: float = starts[0]
+        self.count = len(starts)
+
+
+class Node:
+    """Up to CAPACITY leaves or nodes, all of one height. What a reader sees of it never changes."""
+
+    __slots__ = (
+        "__weakref__", "asked", "children", "count", "counts", "first", "firsts", "index", "offsets", "stack",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        children: tuple[Any, ...],
+        offsets: array[float],
+        firsts: array[float],
+        counts: array[int],
+    ) -> None:
+        self.children = children
+        """Leaves, or nodes: which of them, the height says."""
+        self.offsets = offsets
+        """Time offset of each child [s]."""
+        self.firsts = firsts
+        """Where each child's first segment starts, in this node's time [s]; exact to rounding only."""
+        self.counts = counts
+        """Segments before each child, and in all."""
+        self.first: float = firsts[0]
+        self.count: int = counts[-1]
+        self.index: Any = None
+        self.stack: Any = None
+        """What `vrs.evaluation` makes for single times and for many; to be had again if it's dropped."""
+        self.asked = 0
+        """For how many times the stack was missing."""
+
+
+class Run(NamedTuple):
+    """Consecutive segments with absolute starts, in columns as a leaf's, of any length."""
+
+    starts: array[float]
+    durations: array[float]
+    owners: array[int]
+    rows: tuple[bytes, ...]
+
+
+class Path(NamedTuple):
+    """The way from the root to a segment."""
+
+    steps: list[Step]
+    leaf: Leaf
+    place: int
+    offset: float
+
+
+Step: TypeAlias = tuple[Node, int, float]
+"""A node on the way, the child that was taken, and the node's summed offset."""
+
+
+def locate(root: Node, height: int, index: int) -> tuple[Leaf, int, float]:
+    """The leaf of a segment, the segment's index there, and the leaf's summed offset."""
+    node: Any = root
+    offset = 0.0
+    for _ in range(height):
+        child = bisect_right(node.counts, index) - 1
+        index -= node.counts[child]
+        offset += node.offsets[child]
+        node = node.children[child]
+    return node, index, offset
+
+
+def index_at(root: Node, height: int, t: float) -> int:
+    """Index of the last segment that doesn't start after t, which isn't before the first."""
+    node: Any = root
+    index, offset = 0, 0.0
+    for _ in range(height):
+        child = max(bisect_right(node.firsts, t - offset) - 1, 0)
+        index += node.counts[child]
+        offset += node.offsets[child]
+        node = node.children[child]
+    starts = node.starts
+    i = max(bisect_right(starts, t - offset) - 1, 0)
+    index += i
+    # t − offset is rounded: the comparison that counts is the one with offset + start.
+    if offset + starts[i] <= t and i + 1 < len(starts) and t < offset + starts[i + 1]:
+        return index
+    while index + 1 < root.count and start_of(root, height, index + 1) <= t:
+        index += 1
+    while start_of(root, height, index) > t:
+        index -= 1
+    return index
+
+
+def path_at(root: Node, height: int, t: float) -> tuple[int, Path]:
+    """What `index_at` gives, and the way there."""
+    steps = []
+    node: Any = root
+    index, offset = 0, 0.0
+    for _ in range(height):
+        child = bisect_right(node.firsts, t - offset) - 1
+        if child < 0:
+            break
+        steps.append((node, child, offset))
+        index += node.counts[child]
+        offset += node.offsets[child]
+        node = node.children[child]
+    else:
+        starts = node.starts
+        i = bisect_right(starts, t - offset) - 1
+        if i >= 0 and offset + starts[i] <= t and i + 1 < len(starts) and t < offset + starts[i + 1]:
+            return index + i, Path(steps, node, i, offset)
+    index = index_at(root, height, t)
+    return index, _path(root, height, index)
+
+
+def start_of(root: Node, height: int, index: int) -> float:
+    """Start of a segment [s]."""
+    leaf, i, offset = locate(root, height, index)
+    return offset + leaf.starts[i]
+
+
+def first_start(node: Any, height: int, offset: float) -> float:
+    """Start of the first segment below a node or, of height 0, in a leaf, whose summed offset is given."""
+    for _ in range(height):
+        offset += node.offsets[0]
+        node = node.children[0]
+    start: float = offset + node.starts[0]
+    return start
+
+
+def last_end(root: Node, height: int) -> float:
+    """End of the last segment."""
+    node: Any = root
+    offset = 0.0
+    for _ in range(height):
+        offset += node.offsets[-1]
+        node = node.children[-1]
+    end: float = offset + node.starts[-1] + node.durations[-1]
+    return end
+
+
+def _path(root: Node, height: int, index: int) -> Path:
+    steps = []
+    node: Any = root
+    offset = 0.0
+    for _ in range(height):
+        child = bisect_right(node.counts, index) - 1
+        steps.append((node, child, offset))
+        index -= node.counts[child]
+        offset += node.offsets[child]
+        node = node.children[child]
+    return Path(steps, node, index, offset)
+
+
+def _bounds(count: int, most: int, even: bool) -> list[int]:
+    """Where to cut a sequence into groups of at most so many; uneven ones are filled one after the other."""
+    if even:
+        groups = -(-count // most)
+        return [count * k // groups for k in range(groups + 1)]
+    return [*range(0, count, max(int(FILLED * most), 2)), count]
+
+
+def splice(
+    root: Node | None,
+    height: int,
+    kept: int,
+    cut: float | None,
+    new: Run,
+    tail: int | None = None,
+    tail_start: float = 0.0,
+    left: Path | None = None,
+) -> tuple[Node | None, int]:
+    """Keep segments 0 to kept − 1, put new ones there, and let those from `tail` on follow, shifted as a whole.
+
+    Args:
+        root: The tree, None for an empty one.
+        height: Levels of nodes above its leaves.
+        kept: How many segments stay before the new ones.
+        cut: Where the last of them ends [s]: it's shortened, or left out if it starts there; None keeps it whole.
+        new: The new segments.
+        tail: First segment that stays after them; None for none.
+        tail_start: When it starts [s].
+        left: The way to segment kept − 1, if it's known.
+
+    Returns:
+        The new tree and its height.
+    """
+    last, right = None, None
+    if root is not None and kept:
+        left = left or _path(root, height, kept - 1)
+        if cut is not None:
+            last = cut - (left.offset + left.leaf.starts[left.place])
+            if last <= 0:
+                left, last = _path(root, height, kept - 2) if kept > 1 else None, None
+    if root is not None and tail is not None:
+        place = -1 if left is None else left.place + tail + 1 - kept
+        if left is not None and last is not None and 0 <= place < left.leaf.count:
+            right = left._replace(place=place)
+        else:
+            right = _path(root, height, tail)
+    starts, durations, owners, rows = new
+    if left is not None:
+        leaf, stop, offset = left.leaf, left.place + 1, left.offset
+        starts = _moved(leaf.starts[:stop], offset) + starts
+        durations = leaf.durations[:stop] + durations
+        if last is not None:
+            durations[stop - 1] = last
+        owners = leaf.owners[:stop] + owners
+        rows = leaf.rows[:stop] + rows
+    delta = 0.0
+    if right is not None:
+        leaf, begin, offset = right.leaf, right.place, right.offset
+        delta = tail_start - (offset + leaf.starts[begin])
+        starts += _moved(leaf.starts[begin:], offset, delta)
+        durations += leaf.durations[begin:]
+        owners += leaf.owners[begin:]
+        rows += leaf.rows[begin:]
+    children: tuple[Any, ...]
+    if len(starts) > LEAF:
+        cuts = pairwise(_bounds(len(starts), LEAF, right is not None))
+        children = tuple([Leaf(starts[a:b], durations[a:b], owners[a:b], rows[a:b]) for a, b in cuts])
+    else:
+        children = (Leaf(starts, durations, owners, rows),) if starts else ()
+    base = 0.0
+    for level in range(height - 1, -1, -1):
+        children, base = _joined(left and left.steps[level], children, base, right and right.steps[level], delta)
+    while len(children) > 1 or (children and not height):
+        children, base = _joined(None, children, base, None, 0.0)
+        height += 1
+    if not children:
+        return None, 0
+    top: Node = children[0]
+    while height > 1 and len(top.children) == 1 and not top.offsets[0]:
+        top, height = top.children[0], height - 1
+    return top, height
+
+
+def _joined(
+    left: Step | None, new: tuple[Any, ...], made: float, right: Step | None, delta: float
+) -> tuple[tuple[Node, ...], float]:
+    """Nodes over what lies left of a path, what was made anew, and what lies right of a path.
+
+    Args:
+        left: The step of the path to the last segment that stays before what's new.
+        new: What was made anew at the level below.
+        made: Summed offset at which its times hold [s]: 0, or that of the node that it was made from.
+        right: The step of the path to the first segment that stays after it.
+        delta: How much later that segment starts than before [s].
+
+    Returns:
+        The nodes, and the summed offset at which their times hold [s].
+    """
+    same = left is None or right is None or left[0] is right[0]
+    near = left or right
+    base = near[2] if same and near else 0.0
+    entry = near[0].offsets[near[1]] if made and near else -base
+    children = new
+    offsets, counts = array("d", (entry,) * len(new)), array("q", (0,))
+    firsts = array("d", [entry + fresh.first for fresh in new])
+    if left is not None:
+        node, child, offset = left
+        counts = node.counts[: child + 1]
+        if child:
+            children = node.children[:child] + new
+            if same:
+                offsets, firsts = node.offsets[:child] + offsets, node.firsts[:child] + firsts
+            else:
+                moved = _moved(node.offsets[:child] + node.firsts[:child], offset)
+                offsets, firsts = moved[:child] + offsets, moved[child:] + firsts
+    before = counts[-1]
+    for fresh in new:
+        before += fresh.count
+        counts.append(before)
+    if right is not None:
+        node, child, offset = right
+        child += 1
+        more = len(node.children) - child
+        if more:
+            children += node.children[child:]
+            counts += _added(node.counts[child + 1 :], before - node.counts[child])
+            moved = _moved(node.offsets[child:] + node.firsts[child:], 0.0 if same else offset, delta)
+            offsets += moved[:more]
+            firsts += moved[more:]
+    if len(children) <= CAPACITY:
+        return ((Node(children, offsets, firsts, counts),) if children else ()), base
+    nodes = []
+    for a, b in pairwise(_bounds(len(children), CAPACITY, right is not None)):
+        nodes.append(Node(children[a:b], offsets[a:b], firsts[a:b], _added(counts[a : b + 1], -counts[a])))
+    return tuple(nodes), base
+
+
+def _moved(times: array[float], by: float, further: float = 0.0) -> array[float]:
+    """Times later by one span, then by another [s]."""
+    if not (by or further):
+        return times
+    moved = np.frombuffer(times) + by if by else np.frombuffer(times)
+    return array("d", (moved + further if further else moved).tobytes())
+
+
+def _added(counts: array[int], more: int) -> array[int]:
+    return array("q", (np.frombuffer(counts, np.int64) + more).tobytes()) if more else counts
