@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from vrs.model import Array
@@ -23,8 +22,7 @@ class Piece(NamedTuple):
     """Who made them; HOLD for a hold."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
+class State(NamedTuple):
     """Where the arm is and how it moves, each (n,)."""
 
     q: Array

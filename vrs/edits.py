@@ -207,7 +207,7 @@ def _replanned(plan: Scheduler, gap: Gap, following: int, cancelled: int) -> tup
         # It can't be planned from there: the arm goes to where it begins.
         join = plan.joiner(MotionCommand(JointTarget(gap.state.q), profile=plan.profile(cancelled)))
         note = f"the arm still goes to where command {other} begins"
-        return fill(timeline, replace(gap, tail=following), cancelled, stay(note), join), ()
+        return fill(timeline, gap._replace(tail=following), cancelled, stay(note), join), ()
     text = f"goes from elsewhere, as command {cancelled} was cancelled"
     shifted = replace(
         receipt,
@@ -244,6 +244,6 @@ def _insert_via(plan: Scheduler, command: InsertVia, receipt: Receipt, now: floa
 
     gap = Gap(t, t, timeline.state_before(t), next_move(timeline, segments[1]))
     made = fill(timeline, gap, receipt.command_id, by_way, plan.joiner(motion))
-    made = replace(made, start=start)
+    made = made._replace(start=start)
     reason = joined(moment.reason, "goes by a via")
     return plan.accept(_as_planned(plan, receipt, made, moment, reason, t), motion, made, t)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ _ROUNDED_MOST = 64
 """Segments of a move that the next one may overlap."""
 
 
-@dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(NamedTuple):
     """Where a move goes: what stays before it and what follows it."""
 
     cut: float
@@ -47,8 +46,7 @@ class Gap:
     """What the user must know of that."""
 
 
-@dataclass(frozen=True, slots=True)
-class Edit:
+class Edit(NamedTuple):
     """What an insertion makes."""
 
     timeline: Timeline

@@ -9,9 +9,9 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -32,8 +32,7 @@ Entry: TypeAlias = tuple[Receipt, MotionCommand | None]
 """A receipt, and the motion command that it answers."""
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(NamedTuple):
     """What an edit did to commands other than its own."""
 
     version: int
@@ -52,8 +51,7 @@ class Change:
     """Whether commands to where the arm stood anyway are dropped too: they have no segments that could be kept."""
 
 
-@dataclass(frozen=True, slots=True)
-class Undo:
+class Undo(NamedTuple):
     """What is needed to take an edit back."""
 
     command_id: int
@@ -274,8 +272,7 @@ class Ledger:
         """Make the newest two edits one, to be taken back together."""
         second, first = self._undo.pop(), self._undo.pop()
         self._undo.append(
-            replace(
-                first,
+            first._replace(
                 at=min(first.at, second.at),
                 overwritten={**second.overwritten, **first.overwritten},
                 stills=(*second.stills, *first.stills),

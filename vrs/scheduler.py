@@ -5,7 +5,7 @@ Source: Doulgeri, Zikos, Delopoulos, section II-B.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import inf
 from operator import add
@@ -56,8 +56,7 @@ _NAMED_AT_ONCE = 64
 """Segments whose commands are named at once; those of longer runs when somebody asks."""
 
 
-@dataclass(frozen=True, slots=True)
-class Paused:
+class Paused(NamedTuple):
     """What a stop interrupted."""
 
     version: int
@@ -157,7 +156,7 @@ class Scheduler:
         found = move_before(self.timeline, t, -inf if now is None else now)
         if found is None:
             made = fill(self.timeline, gap, command_id, planner, joiner, dropped)
-            return replace(made, notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
+            return made._replace(notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
         first, begin, passed_by = found
         _, target, _ = planner(gap.state)
         onward = replace(command, target=JointTarget(target))
@@ -182,7 +181,7 @@ class Scheduler:
             start, rest = begin, way.whole
         if start < t and dropped is not None:
             dropped = (passed_by, *dropped)
-        gap = replace(gap, cut=start, start=start)
+        gap = gap._replace(cut=start, start=start)
         return fill(self.timeline, gap, command_id, lambda _: (rest, target, way.note), joiner, dropped)
 
     def _reason(self, command_id: int) -> str:

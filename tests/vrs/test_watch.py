@@ -81,7 +81,7 @@ def spoil_timelines(monkeypatch: pytest.MonkeyPatch, chosen: Any, bump: Any) -> 
 
     def spoiling(plan: Scheduler, receipt: Receipt, command: Any, edit: Any, *args: Any, **kwargs: Any) -> Receipt:
         return accept(
-            plan, receipt, command, replace(edit, timeline=spoiled(edit.timeline, chosen, bump)), *args, **kwargs
+            plan, receipt, command, edit._replace(timeline=spoiled(edit.timeline, chosen, bump)), *args, **kwargs
         )
 
     monkeypatch.setattr(Scheduler, "accept", spoiling)
