@@ -17,6 +17,8 @@ from vrs.segment import evaluate
 Pair: TypeAlias = Callable[[Limits], tuple[Plan, Plan, str]]
 """Plans, within limits, that end and begin at rest at the via, and what the user must know of them."""
 
+_KNOT = 2e-12
+"""Times nearer to a knot than this [s] are at it: sums of durations are rounded."""
 _GRID = 16
 _HALVINGS = 6
 _LOOKS = 65
@@ -106,7 +108,7 @@ def _overlaps(first: Plan, second: Plan, longest: float) -> Iterator[float]:
 
 def later(plan: Plan, t: float) -> Plan:
     """What of a plan comes after a knot at t [s]."""
-    first = int(np.searchsorted(np.cumsum(plan.durations), t + 1e-9, side="right"))
+    first = int(np.searchsorted(np.cumsum(plan.durations), t + _KNOT, side="right"))
     return Plan(plan.durations[first:], plan.coefficients[first:])
 
 
