@@ -12,6 +12,7 @@ from vrs.chunk import HOLD, Piece, State
 from vrs.commands import Insertion
 from vrs.model import Array
 from vrs.planning import Plan, empty
+from vrs.planning.plan import stacked
 from vrs.timeline import Timeline
 
 MovePlanner = Callable[[State], tuple[Plan, Array, str]]
@@ -144,10 +145,8 @@ def move_before(timeline: Timeline, t: float, earliest: float) -> tuple[Plan, fl
     segments = [timeline.segment(i) for i in range(low, index) if timeline.start_of(i) >= earliest]
     if not segments or timeline.state_before(t).qd.any():
         return None
-    stack = np.zeros((len(segments), max(len(s.coefficients) for s in segments), timeline.dof))
-    for row, segment in zip(stack, segments, strict=True):
-        row[: len(segment.coefficients)] = segment.coefficients
-    return Plan(np.array([s.duration for s in segments]), stack), segments[0].start, owner
+    plan = stacked([s.duration for s in segments], [s.coefficients for s in segments], timeline.dof)
+    return plan, segments[0].start, owner
 
 
 def fill(

@@ -18,7 +18,7 @@ from vrs.chunk import HOLD, Piece
 from vrs.insertion import piece, shifted
 from vrs.model import Array, Limits
 from vrs.planning.fit import fit
-from vrs.planning.plan import Plan, violation
+from vrs.planning.plan import Plan, stacked, violation
 from vrs.segment import evaluate
 from vrs.timeline import Timeline
 
@@ -212,11 +212,8 @@ def certified(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> st
 def as_plan(pieces: Iterator[Piece], n: int) -> Plan:
     """Pieces as one plan."""
     parts = list(pieces)
-    rows = [a for piece in parts for a in piece.coefficients]
-    stack = np.zeros((len(rows), max((len(a) for a in rows), default=1), n))
-    for row, a in zip(stack, rows, strict=True):
-        row[: len(a)] = a
-    return Plan(np.array([h for piece in parts for h in piece.durations]), stack)
+    durations = [h for part in parts for h in part.durations]
+    return stacked(durations, [a for part in parts for a in part.coefficients], n)
 
 
 def _halting(timeline: Timeline, s: float, rest: float, limits: Limits, margin: float) -> Law:

@@ -10,7 +10,7 @@ from vrs.chunk import HOLD, Piece, State
 from vrs.commands import JointTarget, MotionCommand, Profile, Resume, ScaleTime, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Gap, fill, hold, joined, next_move, piece, stay
-from vrs.ledger import Change, Entry, TimeMap
+from vrs.ledger import Change, Entry
 from vrs.model import frozen_array
 from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_on
 from vrs.planning import stopping, violation
@@ -47,9 +47,11 @@ def scale(plan: Scheduler, command: ScaleTime, now: float | None) -> Receipt:
     after = timeline.edited(t, pieces) if t < timeline.end else timeline.with_version(timeline.version + 1)
 
     def moved(old: float) -> float:
+        if old < t:
+            return old
         return t + (law.when(old) if old < s else law.duration + (old - s) / factor)
 
-    change = Change(after.version, plan.ledger.newest + 1, t, frozenset(), _from(t, moved), stills=False)
+    change = Change(after.version, plan.ledger.newest + 1, t, frozenset(), moved, stills=False)
     receipt = _receipt(plan, moment, after, t + law.duration, f"{factor:g} times as fast")
     begin = t + law.waits
     if factor != 1 and begin < timeline.end:
@@ -158,10 +160,6 @@ def resume(plan: Scheduler, command: Resume, now: float | None) -> Receipt:
     receipt = replace(receipt, shift=shift, superseded_names=names)
     plan.timeline = after
     return plan.ledger.reinstate(receipt, timeline, change, others)
-
-
-def _from(at: float, moved: TimeMap) -> TimeMap:
-    return lambda t: t if t < at else moved(t)
 
 
 def _receipt(plan: Scheduler, moment: Moment, after: Timeline, end: float, reason: str) -> Receipt:

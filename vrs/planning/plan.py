@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from vrs.model import Array
 from vrs.planning.bounds import TOLERANCE
 from vrs.planning.certificate import violation
 
-__all__ = ["TAYLOR", "TOLERANCE", "Plan", "empty", "end_state", "integrate", "violation"]
+__all__ = ["TAYLOR", "TOLERANCE", "Plan", "empty", "end_state", "integrate", "stacked", "violation"]
 
 TAYLOR = np.array([[1.0], [1.0], [1.0 / 2.0], [1.0 / 6.0]])
 """What derivatives are multiplied by to be coefficients, (4, 1)."""
@@ -57,6 +58,14 @@ class Plan:
                     order -= 1
                 rows[i] = row[: max(order, 1)]
         return rows
+
+
+def stacked(durations: Sequence[float], rows: Sequence[Array], n: int) -> Plan:
+    """A plan of n joints from the rows of its segments, arrays of shape (degree + 1, n)."""
+    a = np.zeros((len(rows), max((len(row) for row in rows), default=1), n))
+    for padded, row in zip(a, rows, strict=True):
+        padded[: len(row)] = row
+    return Plan(np.array(durations, dtype=np.float64), a)
 
 
 def empty(n: int) -> Plan:
