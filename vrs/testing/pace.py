@@ -79,7 +79,9 @@ def _refined(timeline: Timeline, q: Array, low: float, high: float) -> float:
     return s
 
 
-def check_pace(before: Columns, after: Columns, first: int, factor: float, figures: Figures) -> None:
+def check_pace(
+    before: Columns, after: Columns, first: int, factor: float, figures: Figures
+) -> tuple[int, int] | None:
     """The last segments of after are the last of before, run `factor` times as fast.
 
     Args:
@@ -89,15 +91,18 @@ def check_pace(before: Columns, after: Columns, first: int, factor: float, figur
         factor: Ratio of the paces.
         figures: Where the worst figures are kept.
 
+    Returns:
+        Indices, in before and after, of the first pair; None if there's none.
+
     Raises:
         LawBrokenError: If they aren't.
     """
-    new = [i for i in range(first, len(after)) if after.durations[i] > _SLIVER]
+    new = [i for i in range(first, len(after)) if after.durations[i] * factor > _SLIVER]
     old = [i for i in range(len(before)) if before.durations[i] > _SLIVER][-len(new) :] if new else []
     if [before.owners[i] for i in old] != [after.owners[i] for i in new]:
         raise LawBrokenError("pace", "other commands than before follow the change of pace")
     if not new:
-        return
+        return None
     figures.see("pace", np.abs(after.durations[new] * factor / before.durations[old] - 1.0).max())
     for i, j in zip(old, new, strict=True):
         a, b = before.padded(i, i + 1)[0], after.padded(j, j + 1)[0]
@@ -105,3 +110,4 @@ def check_pace(before: Columns, after: Columns, first: int, factor: float, figur
             raise LawBrokenError("pace", "polynomials of another degree follow the change of pace")
         scaled = a * factor ** np.arange(len(a))[:, None]
         figures.see("pace", (np.abs(b - scaled) / np.maximum(np.abs(scaled), 1e-300)).max(initial=0.0))
+    return old[0], new[0]

@@ -306,11 +306,11 @@ class Watch:
     def _check_pace(self, factor: float, answer: Receipt, at: float, scene: Scene) -> None:
         old, new, changes = scene.old, scene.new, given(answer.end)
         first = min(int(np.searchsorted(new.starts, changes - 1e-12 * max(1.0, abs(changes)))) + 1, len(new))
-        check_pace(old, new, first, factor, self.figures)
+        pair = check_pace(old, new, first, factor, self.figures)
         there = None
-        if first < len(new):
+        if pair is not None:
             # From there on the pace is steady, so that places on the way are known.
-            t, s = new.start_of(first), old.start_of(len(old) - (len(new) - first))
+            s, t = old.start_of(pair[0]), new.start_of(pair[1])
             there = s - factor * (t - changes)
             for moment in np.linspace(changes, t, 4):
                 away = scene.after.sample(moment) - scene.before.sample(s - factor * (t - moment))
