@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from math import inf
 from typing import NamedTuple, TypeAlias
@@ -97,8 +97,14 @@ class Ledger:
             receipt = _after(receipt, change)
         return receipt
 
-    def arrived(self, command_id: int, t: float) -> bool:
-        """Whether a command was at its target, or was to be when it was cut short, at t or before."""
+    def arrived(self, command_id: int, t: float, version: float = inf) -> bool:
+        """Whether a command was at its target, or was to be when it was cut short, at t or before.
+
+        Args:
+            command_id: The command.
+            t: A time [s].
+            version: As it was before this version of the timeline; as it's now, by default.
+        """
         entry = self._entries.get(command_id)
         if entry is None:
             return False
@@ -106,6 +112,8 @@ class Ledger:
         if start is None or end is None:
             return True
         for change in self._changes[bisect_left(self._versions, entry[0].version + 1) :]:
+            if change.version >= version:
+                break
             if end > change.at + ARRIVED:
                 if change.dropped is None or command_id in change.dropped or start < change.since:
                     break
@@ -156,7 +164,7 @@ class Ledger:
         command: MotionCommand | None,
         before: Timeline,
         change: Change | None,
-        others: Iterable[Entry] = (),
+        others: Collection[Entry] = (),
     ) -> Receipt:
         """Write down an accepted edit.
 
@@ -175,7 +183,8 @@ class Ledger:
         later = tuple(self._stills[first:])
         if change is not None and later:
             if change.stills:
-                dropped = (*receipt.superseded, *(i for _, i in later))
+                again = {other.command_id for other, _ in others}
+                dropped = (*receipt.superseded, *(i for _, i in later if i not in again))
                 receipt = replace(receipt, superseded_names=dropped)
                 del self._stills[first:]
             elif change.moved is not None:

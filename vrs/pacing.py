@@ -119,7 +119,7 @@ def remainder(timeline: Timeline, s: float, pace: float) -> Iterator[Piece]:
     for index in range(max(timeline.index_at(s), 0), len(timeline)):
         begin, a, owner, end = _segment(timeline, index)
         late = max(s - begin, 0.0)
-        if end - begin - late <= 0:
+        if late > 0 and end - begin - late <= 0:
             continue
         b = shifted(a, late) if late > 0 else a
         if pace != 1.0:
@@ -188,8 +188,8 @@ def halting(timeline: Timeline, s: float, limits: Limits, *, jerk: bool) -> Law:
     return Law((rest - s,), ((s, 1.0),))
 
 
-def straight_on(timeline: Timeline, s: float) -> bool:
-    """Whether the motion from s on stays on one straight line of joint space until it rests."""
+def straight_until(timeline: Timeline, s: float) -> float | None:
+    """When the motion from s on next rests [s], if until then it's on one straight line of joint space."""
     rest = _rest_after(timeline, s)
     first = max(timeline.index_at(s), 0)
     d = timeline.state_before(s).qd
@@ -200,8 +200,8 @@ def straight_on(timeline: Timeline, s: float) -> bool:
             break
         aside = a[1:] - np.outer(a[1:] @ d / square, d) if square else a[1:]
         if np.abs(aside).max(initial=0.0) > _ASIDE:
-            return False
-    return True
+            return None
+    return rest
 
 
 def certified(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> str | None:

@@ -162,8 +162,7 @@ class Scheduler:
         onward = replace(command, target=JointTarget(target))
         before = self.ledger.command(passed_by)
         mixed = ""
-        smooth = self.profile(passed_by) is Profile.JERK_LIMITED and "parabolas" not in self._reason(passed_by)
-        if command.profile is Profile.JERK_LIMITED and not smooth:
+        if command.profile is Profile.JERK_LIMITED and not self.smooth(passed_by):
             mixed = "rounded with a move of parabolas"
 
         def plans(limits: Limits) -> tuple[Plan, Plan, str]:
@@ -176,16 +175,13 @@ class Scheduler:
 
         way = rounding.rounded(plans, command.deviation, self.model, self.limits, command.profile)
         if way.first is first:
-            start, rest = t - way.delta, rounding.later(way.whole, way.first.duration - way.delta)
+            start, rest = max(t - way.delta, begin), rounding.later(way.whole, way.first.duration - way.delta)
         else:
             start, rest = begin, way.whole
         if start < t and dropped is not None:
             dropped = (passed_by, *dropped)
         gap = gap._replace(cut=start, start=start)
         return fill(self.timeline, gap, command_id, lambda _: (rest, target, way.note), joiner, dropped)
-
-    def _reason(self, command_id: int) -> str:
-        return self.ledger.receipt(command_id).reason if command_id in self.ledger else ""
 
     def moment(self, command: PlanEdit | SteerCommand, now: float | None, soonest: float) -> Moment:
         """When an edit acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
@@ -230,6 +226,12 @@ class Scheduler:
         """By which profile a command moves the arm."""
         command = self.ledger.command(command_id)
         return self.profiles.get(command_id, Profile.PARABOLIC) if command is None else command.profile
+
+    def smooth(self, command_id: int) -> bool:
+        """Whether a command moves the arm with bounded jerk throughout."""
+        reason = self.ledger.receipt(command_id).reason if command_id in self.ledger else ""
+        rough = "parabolas" in reason or "accelerations dropped" in reason
+        return self.profile(command_id) is Profile.JERK_LIMITED and not rough
 
     def touched(self, edit: Edit, t: float) -> tuple[Names, Names]:
         """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
@@ -276,7 +278,7 @@ class Scheduler:
         near = timeline.owners(index, stop)
         if stop == len(timeline):
             return tuple(i for i in near if not self.ledger.arrived(i, t))
-        return partial(_names, timeline, index, frozenset(i for i in near if self.ledger.arrived(i, t)))
+        return partial(_names, self.ledger, timeline, index, t)
 
     def reject(self, issued: float | None, asked: float | None, reason: str) -> Receipt:
         """Answer a command that can't be."""
@@ -374,8 +376,9 @@ def _join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tupl
     return planning.run_up(q, goal, command.speed, command.profile, limits)
 
 
-def _names(timeline: Timeline, index: int, skipped: frozenset[int]) -> tuple[int, ...]:
-    return tuple(i for i in timeline.owners(index, len(timeline)) if i not in skipped)
+def _names(ledger: Ledger, timeline: Timeline, index: int, t: float) -> tuple[int, ...]:
+    """Commands that have segments from an index on, and hadn't arrived at t when the timeline was edited."""
+    return tuple(i for i in timeline.owners(index, len(timeline)) if not ledger.arrived(i, t, timeline.version + 1))
 
 
 def before_issue(t: float, issued: float) -> str:

@@ -12,8 +12,9 @@ from vrs.errors import PlanningError
 from vrs.insertion import Gap, fill, hold, joined, next_move, piece, stay
 from vrs.ledger import Change, Entry
 from vrs.model import frozen_array
-from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_on
-from vrs.planning import stopping, violation
+from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
+from vrs.planning import Plan, stopping, violation
+from vrs.planning.plan import end_state
 from vrs.receipt import Receipt
 from vrs.rescheduling import owner_before, span
 from vrs.scheduler import Moment, Paused, Scheduler
@@ -38,12 +39,14 @@ def scale(plan: Scheduler, command: ScaleTime, now: float | None) -> Receipt:
     moment = moment._replace(t=t)
     if factor > 1:
         _check_faster(plan, t, factor)
-    index = max(timeline.index_at(t), 0)
-    now_moving = timeline.owner_of(index) if index < len(timeline) else HOLD
-    jerky = Profile.JERK_LIMITED in (plan.profile(owner_before(timeline, t)), plan.profile(now_moving))
-    law = paced(timeline, t, factor, plan.limits, jerk=jerky)
+    for jerk in (False, True):
+        law = paced(timeline, t, factor, plan.limits, jerk=jerk)
+        ramp = list(composed(timeline, law))
+        # Jerk limits bind where any of what the pace changes in keeps them.
+        if all(plan.profile(part.command_id) is not Profile.JERK_LIMITED for part in ramp):
+            break
     s = law.end if law.durations else t
-    pieces = [*composed(timeline, law), *remainder(timeline, s, factor)]
+    pieces = [*ramp, *remainder(timeline, s, factor)]
     after = timeline.edited(t, pieces) if t < timeline.end else timeline.with_version(timeline.version + 1)
 
     def moved(old: float) -> float:
@@ -72,14 +75,12 @@ def stop(plan: Scheduler, command: Stop, now: float | None) -> Receipt:
     reason = "stood"
     pieces: list[Piece] = []
     if len(braking):
-        straight = stopping.straight_stop(state, plan.limits) if jerky and straight_on(timeline, t) else None
+        straight = _straight_stop(plan, state, t) if jerky else None
         if straight is not None:
             way = [piece(straight, owner_before(timeline, t))]
         else:
             way = list(composed(timeline, halting(timeline, t, plan.limits, jerk=jerky)))
-        smooth = not jerky or all(
-            plan.profile(i) is Profile.JERK_LIMITED for i in {part.command_id for part in way}
-        )
+        smooth = not jerky or all(plan.smooth(i) for i in {part.command_id for part in way})
         if smooth and sum(sum(part.durations) for part in way) <= _PATIENCE * braking.duration + 0.05:
             reason = "stopped on its way"
             pieces = [part._replace(command_id=number) for part in way]
@@ -160,6 +161,16 @@ def resume(plan: Scheduler, command: Resume, now: float | None) -> Receipt:
     receipt = replace(receipt, shift=shift, superseded_names=names)
     plan.timeline = after
     return plan.ledger.reinstate(receipt, timeline, change, others)
+
+
+def _straight_stop(plan: Scheduler, state: State, t: float) -> Plan | None:
+    """A stop at t along a way that's straight in joint space, and long enough; None where it isn't."""
+    until = straight_until(plan.timeline, t)
+    found = None if until is None else stopping.straight_stop(state, plan.limits)
+    if found is None or until is None:
+        return None
+    ahead, needed = plan.timeline.sample(until) - state.q, end_state(found).q - state.q
+    return found if ahead @ state.qd >= needed @ state.qd else None
 
 
 def _receipt(plan: Scheduler, moment: Moment, after: Timeline, end: float, reason: str) -> Receipt:

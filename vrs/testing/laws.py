@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -32,6 +32,10 @@ BOUNDS = {
     "pace": 1e-9,
 }
 """Largest figure that each law allows; limits are passed by a share of the limit, or of 1 rad if that is more."""
+
+
+SLIVER = 1e-12
+"""Segments up to this long [s] may vanish when they're moved or their pace changes."""
 
 
 class LawBrokenError(AssertionError):
@@ -92,6 +96,17 @@ class Columns:
         for target, order, row in zip(a, orders, self.rows[low:high], strict=True):
             target[:order] = np.frombuffer(row).reshape(order, self.dof)
         return a
+
+    def lasting(self, first: int) -> list[int]:
+        """Segments from an index on that last; a cut next to a knot may leave one that's only rounding."""
+        return (first + np.flatnonzero(self.durations[first:] > SLIVER)).tolist()
+
+    def known(self) -> dict[bytes, float]:
+        """Longest duration [s] of each polynomial, by its coefficients."""
+        longest: dict[bytes, float] = {}
+        for row, duration in zip(self.rows, self.durations.tolist(), strict=True):
+            longest[row] = max(duration, longest.get(row, 0.0))
+        return longest
 
     def index_at(self, t: float) -> int:
         """Index of the segment with start ≤ t < end; −1 before the first, len(self) at the end and after it."""
@@ -208,25 +223,25 @@ def check_tail(before: Columns, after: Columns, first: int, shift: float | None,
     Raises:
         LawBrokenError: If they aren't.
     """
-    if first >= len(before):
+    stays = before.lasting(first)
+    if not stays:
         return
-    count = len(before) - first
-    low = len(after) - count
-    if low < 0:
-        raise LawBrokenError("the tail", f"{count} segments should have stayed, {len(after)} are there")
+    are = after.lasting(0)[-len(stays) :]
+    if len(are) < len(stays):
+        raise LawBrokenError("the tail", f"{len(stays)} segments should have stayed, {len(are)} are there")
     if shift is None:
-        shift = float(after.starts[low] - before.starts[first])
+        shift = float(after.starts[are[0]] - before.starts[stays[0]])
     if shift < -BOUNDS["tail's shift [s]"]:
         raise LawBrokenError("the tail", f"is shifted by {shift} s")
     for what, mine, others in (
-        ("coefficients", before.rows[first:], after.rows[low:]),
-        ("commands", before.owners[first:], after.owners[low:]),
-        ("durations", before.durations[first:].tolist(), after.durations[low:].tolist()),
+        ("coefficients", before.rows, after.rows),
+        ("commands", before.owners, after.owners),
+        ("durations", before.durations, after.durations),
     ):
-        if list(mine) != list(others):
+        if any(mine[i] != others[j] for i, j in zip(stays, are, strict=True)):
             raise LawBrokenError("the tail", f"{what} changed from {before.start_of(first)!r} s on")
-    away = np.abs(after.starts[low:] - before.starts[first:] - shift)
-    figures.see("tail's shift [s]", away.max(), f"at {before.starts[first + int(away.argmax())]!r} s")
+    away = np.abs(after.starts[are] - before.starts[stays] - shift)
+    figures.see("tail's shift [s]", away.max(), f"at {before.starts[stays[int(away.argmax())]]!r} s")
 
 
 def check_moves(before: Columns, after: Columns, first: int, names: Collection[int], figures: Figures) -> None:
@@ -255,7 +270,15 @@ def check_moves(before: Columns, after: Columns, first: int, names: Collection[i
         figures.see("tail's shift [s]", max(away.max() - away.min(), -away.min()), f"of command {name}")
 
 
-def check_run(run: Columns, low: int, high: int, limits: Limits, smooth: set[int], figures: Figures) -> None:
+def check_run(
+    run: Columns,
+    low: int,
+    high: int,
+    limits: Limits,
+    smooth: set[int],
+    figures: Figures,
+    known: Mapping[bytes, float] | None = None,
+) -> None:
     """Segments low to high − 1 follow one another without gap or jump and keep the limits; knots at both ends too.
 
     Args:
@@ -265,6 +288,8 @@ def check_run(run: Columns, low: int, high: int, limits: Limits, smooth: set[int
         limits: In force.
         smooth: Commands whose segments keep jerk limits, and have no jumps in acceleration.
         figures: Where the worst figures are kept.
+        known: Durations [s] of segments that were there before, by their coefficients: they may have been planned
+            under other limits.
 
     Raises:
         LawBrokenError: If a law is broken.
@@ -286,7 +311,9 @@ def check_run(run: Columns, low: int, high: int, limits: Limits, smooth: set[int
         if jump.size:
             at = int(jump.max(1).argmax())
             figures.see(law, jump.max(), f"at {starts[at + 1]!r} s, command {owners[at]} to {owners[at + 1]}")
-    new = slice(low - first, high - first)
+    known = {} if known is None else known
+    made = [i for i in range(low, high) if run.durations[i] > known.get(run.rows[i], 0.0)]
+    new = np.array(made, int) - first
     check_limits(a[new], h[new], limits, jerky[new], figures, f"of commands {sorted({*owners[new].tolist()})}")
 
 

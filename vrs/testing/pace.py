@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vrs.model import Array
-from vrs.testing.laws import Columns, Figures, LawBrokenError
+from vrs.testing.laws import SLIVER, Columns, Figures, LawBrokenError
 from vrs.timeline import Timeline
 
 _PLACES = 6
@@ -14,8 +14,6 @@ _DIPS = 4
 """Places where the way comes near that are looked at closely."""
 _ASTRAY = 1e-3
 """How far from where it's looked for a place may lie [s], as where the arm hardly moves times aren't certain."""
-_SLIVER = 1e-12
-"""Segments up to this long [s] may vanish when the pace changes."""
 _STEADY = 1e-24
 """Square of a speed [rad²/s²] below which the arm stands."""
 
@@ -43,7 +41,8 @@ def check_way(
     s, step = begin, (end - begin) / _PLACES
     for k in range(1, _PLACES + 1):
         t = begin + k * step
-        low, high = s + slow * step, s + fast * step
+        # Places found where the arm hardly moves are too uncertain to bound the next ones from above.
+        low, high = s + slow * step, begin + fast * (t - begin)
         if there is not None:
             low, high = max(low, there - fast * (end - t)), min(high, there - slow * (end - t))
         q = after.sample(t)
@@ -97,8 +96,8 @@ def check_pace(
     Raises:
         LawBrokenError: If they aren't.
     """
-    new = [i for i in range(first, len(after)) if after.durations[i] * factor > _SLIVER]
-    old = [i for i in range(len(before)) if before.durations[i] > _SLIVER][-len(new) :] if new else []
+    new = [i for i in range(first, len(after)) if after.durations[i] * factor > SLIVER]
+    old = before.lasting(0)[-len(new) :] if new else []
     if [before.owners[i] for i in old] != [after.owners[i] for i in new]:
         raise LawBrokenError("pace", "other commands than before follow the change of pace")
     if not new:

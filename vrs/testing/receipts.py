@@ -12,7 +12,7 @@ from vrs.testing.laws import Columns, Figures, LawBrokenError
 from vrs.timeline import Timeline
 
 _KEPT = tuple(item.name for item in fields(Receipt) if item.name not in {"q", "shifted_names", "superseded_names"})
-_ROUNDING = 1e-9
+_ROUNDING = 1.001e-9
 """Times that differ by less [s] may be the same."""
 _SHORT = 1e-6
 """Moves up to this long [s] aren't looked for at their receipts' times, which are rounded."""

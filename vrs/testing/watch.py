@@ -95,6 +95,7 @@ class Watch:
         self._smooth: set[int] = set()
         self._steps: list[_Step] = []
         self._stopped: tuple[Columns, float] | None = None
+        self._left: Columns | None = None
 
     @property
     def moves(self) -> Mapping[int, MotionCommand]:
@@ -172,7 +173,8 @@ class Watch:
             self._smooth.add(step.command_id) if smooth else self._smooth.discard(step.command_id)
         at = step.at if now is None else max(now, step.at) if whole else now
         # Knots that were cut at a receipt's time, which is rounded, move back by as much.
-        self._check_edit(scene, at - 1e-12 * max(1.0, abs(at)) if whole else at)
+        back = columns(step.timeline) if whole else None
+        self._check_edit(scene, at - 1e-12 * max(1.0, abs(at)) if whole else at, back)
         self._settle(scene)
         return answer
 
@@ -226,6 +228,7 @@ class Watch:
             self._steps[-1] = replace(self._steps[-1], at=min(at, self._steps[-1].at))
         stopped = isinstance(command, Stop)
         paused = self._stopped
+        self._left = paused[0] if isinstance(command, Resume) and paused is not None else None
         self._stopped = (scene.old, at) if stopped else None
         if isinstance(command, Resume):
             if paused is None:
@@ -248,7 +251,7 @@ class Watch:
     def _check(self, command: Command, answer: Receipt, at: float, scene: Scene) -> None:
         if scene.now is not None and at < scene.now:
             raise LawBrokenError("the past", f"an edit at {at!r} s, {scene.now - at:.3g} s ago")
-        self._check_edit(scene, at)
+        self._check_edit(scene, at, self._left)
         if not isinstance(command, Resume):
             moves = {*self._commands, *scene.old.owners}
             check_names(answer, scene.before.version, scene.receipts, scene.now_receipts, moves)
@@ -273,12 +276,15 @@ class Watch:
             else:
                 check_tail(old, new, first, answer.shift, self.figures)
 
-    def _check_edit(self, scene: Scene, at: float) -> None:
-        """The laws of all edits."""
+    def _check_edit(self, scene: Scene, at: float, back: Columns | None = None) -> None:
+        """The laws of all edits; `back` is an earlier plan of which parts may come back as they were."""
         check_past(scene.old, scene.new, at)
         check_memory(scene.before, scene.after, at)
         low, high = changed(scene.old, scene.new, at)
-        check_run(scene.new, low, high, self.engine.limits, self._smooth, self.figures)
+        known = scene.old.known()
+        for row, duration in (back.known() if back is not None else {}).items():
+            known[row] = max(duration, known.get(row, 0.0))
+        check_run(scene.new, low, high, self.engine.limits, self._smooth, self.figures, known)
         check_rest(scene.after, scene.new, self.figures)
         check_receipts(scene.after, scene.new, scene.now_receipts, self._commands, self.figures)
 
@@ -305,7 +311,7 @@ class Watch:
 
     def _check_pace(self, factor: float, answer: Receipt, at: float, scene: Scene) -> None:
         old, new, changes = scene.old, scene.new, given(answer.end)
-        first = min(int(np.searchsorted(new.starts, changes - 1e-12 * max(1.0, abs(changes)))) + 1, len(new))
+        first = int(np.searchsorted(new.starts, changes + 1e-12 * max(1.0, abs(changes))))
         pair = check_pace(old, new, first, factor, self.figures)
         there = None
         if pair is not None:
