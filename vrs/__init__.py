@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vrs.clock import Clock, ManualClock, OffsetClock, WallClock
+from vrs.clock import Clock, ManualClock, OffsetClock, SlewedClock, WallClock
 from vrs.commands import (
     Cancel,
     DriveCommand,
@@ -58,6 +58,7 @@ __all__ = [
     "RobotModel",
     "ScaleTime",
     "Segment",
+    "SlewedClock",
     "Status",
     "SteerCommand",
     "Stop",

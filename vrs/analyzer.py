@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-import numpy as np
-
 from vrs.commands import (
     DriveCommand,
     InsertVia,
@@ -58,7 +56,7 @@ def solve(target: Target, model: RobotModel, q: Array) -> Array:
     """
     if isinstance(target, JointTarget):
         model.limits.check(target.q)
-        return np.array(target.q)
+        return target.q
     solution = model.inverse_near(target.X, q, target.configuration)
     model.limits.check(solution)
     return solution

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Protocol
 
@@ -71,3 +72,66 @@ class OffsetClock:
     def now(self) -> float:
         """Present time [s]."""
         return self._base.now() + self.D
+
+
+class SlewedClock:
+    """Another clock, shifted by a D that changes gently: the clock never runs back and never jumps.
+
+    Its rate stays within [1 − slew, 1 + slew] times its base's. Its reading depends on the base's alone, not on how
+    often it's asked.
+
+    Args:
+        base: The clock that sets the pace.
+        D: Shift at the start [s].
+        slew: Largest change of D a second of the base, in (0, 1).
+
+    Raises:
+        InvalidValueError: If D isn't finite or slew is out of range.
+    """
+
+    def __init__(self, base: Clock, D: float = 0.0, slew: float = 0.05) -> None:
+        self._base = base
+        self.slew = finite("slew", slew, "in (0, 1)")
+        if not 0 < self.slew < 1:
+            raise InvalidValueError("slew", slew, "in (0, 1)")
+        self._target = finite("D", D, "finite seconds")
+        self._rate = 1.0
+        self._turn = self._settled = self._base.now()
+        self._reading = self._latest = self._turn + self._target
+
+    def now(self) -> float:
+        """Present time [s]."""
+        self._latest = max(self._latest, self._at(self._base.now()))
+        return self._latest
+
+    @property
+    def D(self) -> float:
+        """Present shift [s]."""
+        t = self._base.now()
+        return self._at(t) - t
+
+    @property
+    def target(self) -> float:
+        """The shift that it has or is on the way to [s]."""
+        return self._target
+
+    def follow(self, D: float) -> None:
+        """From now on move towards the shift D [s], as fast as slew allows.
+
+        To follow another clock, hand over its reading less the base's, as often as that changes.
+
+        Raises:
+            InvalidValueError: If D isn't finite.
+        """
+        target = finite("D", D, "finite seconds")
+        t = self._base.now()
+        self._reading = self._at(t)
+        gap = target - (self._reading - t)
+        self._turn, self._settled = t, t + abs(gap) / self.slew
+        self._rate = 1 + math.copysign(self.slew, gap)
+        self._target = target
+
+    def _at(self, t: float) -> float:
+        if t >= self._settled:
+            return t + self._target
+        return self._reading + self._rate * (t - self._turn)

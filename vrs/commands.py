@@ -73,7 +73,10 @@ def finite(name: str, value: object, allowed: str = "a finite number") -> float:
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidValueError(name, value, allowed)
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        raise InvalidValueError(name, value, allowed) from None
     if not math.isfinite(number):
         raise InvalidValueError(name, value, allowed)
     return number

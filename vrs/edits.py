@@ -113,7 +113,7 @@ def _retime(plan: Scheduler, command: Retime, receipt: Receipt, now: float | Non
         earliest, latest = room(plan.timeline, *segments)
         if earliest <= t < latest:
             made = moved(plan.timeline, *segments, t, receipt.command_id, planner, joiner, plan.stop_at)
-            at = min(start, t)
+            at = min(start, t, plan.timeline.start_of(segments[0]))
             return plan.accept(_as_planned(plan, receipt, made, moment, reason, at), motion, made, at)
     # It goes past another move: it's taken out, and commanded again at its new time.
     before = plan.timeline
@@ -176,7 +176,8 @@ def _take_out(plan: Scheduler, receipt: Receipt, t: float) -> Receipt:
     if segments is None:
         made = Edit(timeline.with_version(timeline.version + 1), t, t, timeline.state_before(t).q)
     else:
-        gap, following = removed(timeline, *segments, t, plan.stop_at)
+        # Receipts' times are rounded: what hasn't begun is taken out from its first segment on.
+        gap, following = removed(timeline, *segments, t if started else -np.inf, plan.stop_at)
         if following is None:
             made = Edit(timeline.edited(gap.cut, gap.lead), gap.start, gap.start, gap.state.q, notes=gap.note)
         else:

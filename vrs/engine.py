@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vrs.analyzer import check
+from vrs.archive import Keeper
 from vrs.clock import Clock
 from vrs.commands import (
     Cancel,
@@ -38,6 +39,9 @@ from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.receipt import Receipt
 from vrs.scheduler import Scheduler
 from vrs.timeline import Timeline
+
+if TYPE_CHECKING:
+    from vrs.anchoring import Anchored
 
 _LIMIT_NAMES = ("qd_max", "qdd_max", "qddd_max")
 
@@ -89,6 +93,7 @@ class Engine:
         self._clock = clock
         ledger = Ledger(max(timeline.owners(0, len(timeline)), default=0))
         self._plan = Scheduler(model, timeline, ledger, _lateness(lateness))
+        self._keeper = Keeper()
 
     @property
     def model(self) -> RobotModel:
@@ -190,7 +195,11 @@ class Engine:
         return edit(self._plan, checked, self._present())
 
     def _present(self) -> float | None:
-        return None if self._clock is None else self._clock.now()
+        if self._clock is None:
+            return None
+        now = self._clock.now()
+        self._keeper.tidy(self._plan.timeline, now)
+        return now
 
     def retime(self, command_id: int, t: float, *, issued_at: float | None = None) -> Receipt:
         """Let a scheduled move begin at t [s]; see `vrs.commands.Retime` and `execute`."""
@@ -227,6 +236,31 @@ class Engine:
     def resume(self, *, issued_at: float | None = None, execute_at: float | None = None) -> Receipt:
         """Go on with what a stop interrupted; see `vrs.commands.Resume` and `execute`."""
         return self.execute(Resume(issued_at, execute_at))
+
+    @property
+    def newest(self) -> int:
+        """Highest command id given out; 0 while there's none."""
+        return self._plan.ledger.newest
+
+    def skip_to(self, command_id: int) -> None:
+        """Give the next command an id above this one: a replica skips what the engine that it follows rejected."""
+        self._plan.ledger.newest = max(self._plan.ledger.newest, command_id)
+
+    def refuse(self, command: Command, reason: str) -> Receipt:
+        """Answer a command that something outside the engine forbids."""
+        issued, asked = getattr(command, "issued_at", None), getattr(command, "execute_at", None)
+        return self._plan.reject(issued, asked, reason)
+
+    def anchor(self, truth: Timeline) -> Anchored:
+        """Go over from now on into a timeline that turned out to be the true one; see `vrs.anchoring.anchor`.
+
+        Raises:
+            InvalidValueError: If the timeline is of another number of joints.
+            PlanningError: If no way to it keeps the limits.
+        """
+        from vrs.anchoring import anchor
+
+        return anchor(self._plan, truth, self.now())
 
     def undo(self) -> Receipt | None:
         """Take back the newest accepted command or edit, as far as it lies in the future.

@@ -7,7 +7,8 @@ import weakref
 from array import array
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from struct import unpack
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -44,6 +45,8 @@ each cell, or with it; the coefficients of each segment."""
 
 Places: TypeAlias = tuple["array[float]", list["Index"], list[Node]]
 """The nodes of height 1: when the first segment of each starts [s], their indexes, and themselves."""
+
+Floats: TypeAlias = Sequence[float]
 
 _Integers: TypeAlias = NDArray[np.int64]
 
@@ -82,37 +85,37 @@ def power_sum(coefficients: Array, u: float) -> Array:
     return value
 
 
-def state_rows(coefficients: Array, u: float) -> Array:
-    """Position, velocity and acceleration of polynomials (K, n) at u, (3, n)."""
-    order = len(coefficients)
-    derived: tuple[tuple[float, ...], ...]
-    if order == QUICK_ORDER:
-        square = u * u
-        derived = ((1.0, u, square, square * u), (0.0, 1.0, 2 * u, 3 * square), (0.0, 0.0, 2.0, 6 * u))
-    else:
-        power, powers = 1.0, []
-        for _ in range(order):
-            powers.append(power)
-            power *= u
-        first = [k * powers[max(k - 1, 0)] for k in range(order)]
-        second = [k * (k - 1) * powers[max(k - 2, 0)] for k in range(order)]
-        derived = (tuple(powers), tuple(first), tuple(second))
-    states: Array = np.array(derived).dot(coefficients)
-    return states
+def state_of(row: bytes, n: int, u: float) -> tuple[Floats, Floats, Floats]:
+    """Position, velocity and acceleration, n values each, of the polynomials in a leaf's row at u [s]."""
+    values = unpack(f"{len(row) // 8}d", row)
+    last = len(values) - n
+    q: Floats = values[last:]
+    qd: Floats = (0.0,) * n
+    qdd: Floats = qd
+    # By Horner's rule; for few joints plain floats are quicker than arrays.
+    for k in range(last - n, -1, -n):
+        qdd = [x * u + y for x, y in zip(qdd, qd, strict=True)]
+        qd = [x * u + y for x, y in zip(qd, q, strict=True)]
+        q = [x * u + y for x, y in zip(q, values[k : k + n], strict=True)]
+    return q, qd, [2.0 * x for x in qdd]
 
 
-def settled(states: Array, low_degree: bool) -> Array:
-    """Position, velocity and acceleration (3, n) without what rounding leaves of rest.
+def first_state(row: bytes, n: int) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration, (n,) each, where the polynomials in a leaf's row begin."""
+    q, qd, half = np.frombuffer(row.ljust(24 * n, b"\0")[: 24 * n]).reshape(3, n)
+    return q, qd, 2.0 * half
 
-    Args:
-        states: As the polynomials have them.
-        low_degree: Whether these are of degree 2 at most: at rest they leave no acceleration behind.
+
+def settled(row: bytes, n: int, u: float) -> Array:
+    """Position, velocity and acceleration (3, n) of a leaf's row at u [s], without what rounding leaves of rest.
+
+    Polynomials of degree 2 at most leave no acceleration behind at rest.
     """
-    q, qd, qdd = states.tolist()
+    q, qd, qdd = state_of(row, n, u)
     qd = [0.0 if -1e-11 < x < 1e-11 else x for x in qd]
-    still = low_degree and not any(qd)
+    still = len(row) < 32 * n and not any(qd)
     qdd = [0.0 if still or -1e-9 < x < 1e-9 else x for x in qdd]
-    return np.array((q, qd, qdd))
+    return np.array((*q, *qd, *qdd)).reshape(3, -1)
 
 
 class Stack:

@@ -40,7 +40,7 @@ class Gap(NamedTuple):
     state: State
     """At the start."""
     tail: int | None
-    """Index of the first segment that follows; None for none."""
+    """Index of the first segment that follows; None where no move follows."""
     lead: tuple[Piece, ...] = ()
     """What comes between the cut and the start."""
     note: str = ""
@@ -78,12 +78,24 @@ def end_of_move(timeline: Timeline, index: int) -> int:
 
     A move is one command's segments; holds in which it spends slack before its joining move are part of it.
     """
-    owner = timeline.owner_of(index)
+    return _around(timeline, index, timeline.owner_of(index))[0]
+
+
+def _around(timeline: Timeline, index: int, owner: int) -> tuple[int, bool]:
+    """The end of the move that a command's segment belongs to, and whether another one follows."""
+    count = len(timeline)
     while True:
-        end = timeline.end_of_run(index)
-        following = next_move(timeline, end)
-        if following is None or timeline.owner_of(following) != owner:
-            return end
+        end = following = timeline.end_of_run(index)
+        if following == count:
+            return end, False
+        other = timeline.owner_of(following)
+        if other == HOLD:
+            following = timeline.end_of_run(following)
+            if following == count:
+                return end, False
+            other = timeline.owner_of(following)
+        if other != owner:
+            return end, True
         index = following
 
 
@@ -121,15 +133,15 @@ def gap_at(timeline: Timeline, t: float, how: Insertion) -> tuple[Gap, tuple[int
     dropped: tuple[int, ...] | None = ()
     if t < timeline.end and len(timeline):
         index = max(timeline.index_at(t), 0)
+        owner = timeline.owner_of(index)
         if how is Insertion.REPLACE:
             dropped = None
-        elif timeline.owner_of(index) == HOLD:
+        elif owner == HOLD or t < timeline.start:
             tail = index if t < timeline.start else index + 1
-        elif t < timeline.start:
-            tail = 0
+            tail = None if next_move(timeline, tail) is None else tail
         else:
-            tail = end_of_move(timeline, index)
-            dropped = (timeline.owner_of(index),)
+            end, goes_on = _around(timeline, index, owner)
+            tail, dropped = end if goes_on else None, (owner,)
     return Gap(t, t, timeline.state_before(t), tail), dropped
 
 
@@ -176,7 +188,7 @@ def fill(
     arrival = gap.start + plan.duration
     pieces = [*gap.lead, piece(plan, command_id)]
     tail = gap.tail
-    if tail is None or next_move(timeline, tail) is None:
+    if tail is None:
         after = timeline.edited(gap.cut, pieces)
         return Edit(after, gap.start, arrival, target, dropped=dropped, notes=joined(gap.note, note))
     scheduled = timeline.start_of(tail)
@@ -186,7 +198,7 @@ def fill(
     ready = arrival + join.duration
     slack = scheduled - ready
     if slack > 0:
-        moving = bool(goal.qd.any())
+        moving = any(goal.qd.tolist())
         rest = hold(slack, target if moving else goal.q)
         pieces += [rest, joining] if moving else [joining, rest]
     else:

@@ -288,6 +288,24 @@ class Ledger:
             )
         )
 
+    def rebase(self, change: Change, times: dict[int, tuple[float, float]]) -> None:
+        """Write down that the plan is another one from `change.at` on; what came before can't be taken back.
+
+        Args:
+            change: What it does to commands that aren't in the new plan.
+            times: Start and end [s], in the new plan, of commands that are.
+        """
+        for command_id, (start, end) in times.items():
+            if command_id in self:
+                receipt, command = self.receipt(command_id), self.command(command_id)
+                again = replace(
+                    receipt, execute_at=start, end=end, version=change.version, superseded_by=None, undone=False
+                )
+                self._entries[command_id] = again, command
+        self._write_log(len(self._changes), (change,))
+        self._undo.clear()
+        del self._stills[bisect_left(self._stills, (change.at, 0)) :]
+
     def break_off(self, change: Change, note: str) -> Receipt:
         """Write down that the newest edit is taken back from `change.at` on, and all that was scheduled with it.
 

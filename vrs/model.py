@@ -58,10 +58,11 @@ class Limits:
 
     def check(self, q: Array) -> None:
         """Raise OutOfLimitsError unless q, shape (n,) [rad], lies within the position limits."""
-        outside = (q < self.q_min) | (q > self.q_max)
-        if outside.any():
-            j = int(np.argmax(outside))
-            raise OutOfLimitsError(j, float(q[j]), float(self.q_min[j]), float(self.q_max[j]))
+        # Of few numbers, plain floats are several times quicker than arrays.
+        joints = zip(q.tolist(), self.q_min.tolist(), self.q_max.tolist(), strict=True)
+        for j, (value, low, high) in enumerate(joints):
+            if not low <= value <= high:
+                raise OutOfLimitsError(j, value, low, high)
 
 
 @runtime_checkable

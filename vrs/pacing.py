@@ -27,6 +27,10 @@ _RAMPS = np.geomspace(0.01, 40.0, 60)
 _LOOKS = 48
 _NO_SPEED = 1e-13
 """A speed [rad/s] that's only rounding."""
+_NEARLY = 1e-6
+"""A speed [rad/s] that's worth a closer look."""
+_KNOTS = 64
+"""Knots that are looked at together."""
 _NO_JUMP = 1e-9
 """An acceleration, or a jump of one [rad/s²], that counts as none."""
 _ASIDE = 1e-9
@@ -85,15 +89,15 @@ class Law:
         return c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2 * c2 + 3 * u * c3), 2 * c2 + 6 * u * c3, 6 * c3
 
 
-def change(s: float, wait: float, goal: float, ramp: float) -> Law:
-    """Go on at pace 1 for `wait` seconds, then change to another within `ramp` seconds."""
-    half, step = 0.5 * ramp, goal - 1.0
-    begin = s + wait
-    middle = begin + half + step * ramp / 12.0
-    rising = (begin, 1.0, 0.0, 2.0 * step / (3.0 * ramp * ramp))
-    falling = (middle, 0.5 * (1.0 + goal), step / ramp, -2.0 * step / (3.0 * ramp * ramp))
+def change(s: float, wait: float, goal: float, ramp: float, pace: float = 1.0) -> Law:
+    """Go on at a pace for `wait` seconds, then change to another within `ramp` seconds."""
+    half, step = 0.5 * ramp, goal - pace
+    begin = s + wait * pace
+    middle = begin + half * pace + step * ramp / 12.0
+    rising = (begin, pace, 0.0, 2.0 * step / (3.0 * ramp * ramp))
+    falling = (middle, 0.5 * (pace + goal), step / ramp, -2.0 * step / (3.0 * ramp * ramp))
     if wait > 0:
-        return Law((wait, half, half), ((s, 1.0), rising, falling))
+        return Law((wait, half, half), ((s, pace), rising, falling))
     return Law((half, half), (rising, falling))
 
 
@@ -103,7 +107,7 @@ def composed(timeline: Timeline, law: Law) -> Iterator[Piece]:
         tau = 0.0
         index = timeline.index_at(c[0])
         while tau < duration:
-            begin, a, owner, end = _segment(timeline, index)
+            begin, a, owner, end = segment_at(timeline, index)
             until = duration if _value(c, duration) <= end else _when(c, end, tau, duration)
             if until > tau:
                 w = _moved(c, tau)
@@ -117,7 +121,7 @@ def composed(timeline: Timeline, law: Law) -> Iterator[Piece]:
 def remainder(timeline: Timeline, s: float, pace: float) -> Iterator[Piece]:
     """What comes from s on, at a constant pace; at pace 1 all but the first segment is as it was, to the bit."""
     for index in range(max(timeline.index_at(s), 0), len(timeline)):
-        begin, a, owner, end = _segment(timeline, index)
+        begin, a, owner, end = segment_at(timeline, index)
         late = max(s - begin, 0.0)
         if late > 0 and end - begin - late <= 0:
             continue
@@ -145,7 +149,7 @@ def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bo
     state = timeline.state_before(s)
     if not state.qd.any() and not state.qdd.any():
         return Law((), ())
-    rest = _rest_after(timeline, s)
+    rest = rest_after(timeline, s)
     best = Law((rest - s,), ((s, 1.0),))
     for wait in _waits(timeline, s, rest):
         if wait >= best.duration:
@@ -153,7 +157,7 @@ def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bo
         low, high = -1, len(_RAMPS)
         while high - low > 1:
             middle = (low + high) // 2
-            if _keeps(timeline, change(s, wait, goal, float(_RAMPS[middle])), limits, jerk=jerk):
+            if keeps(timeline, change(s, wait, goal, float(_RAMPS[middle])), limits, jerk=jerk):
                 high = middle
             else:
                 low = middle
@@ -180,7 +184,7 @@ def halting(timeline: Timeline, s: float, limits: Limits, *, jerk: bool) -> Law:
     """
     if jerk:
         return paced(timeline, s, 0.0, limits, jerk=True)
-    rest = _rest_after(timeline, s)
+    rest = rest_after(timeline, s)
     for margin in _MARGINS:
         law = _halting(timeline, s, rest, limits, margin)
         if certified(timeline, law, limits, jerk=False) is None:
@@ -190,12 +194,12 @@ def halting(timeline: Timeline, s: float, limits: Limits, *, jerk: bool) -> Law:
 
 def straight_until(timeline: Timeline, s: float) -> float | None:
     """When the motion from s on next rests [s], if until then it's on one straight line of joint space."""
-    rest = _rest_after(timeline, s)
+    rest = rest_after(timeline, s)
     first = max(timeline.index_at(s), 0)
     d = timeline.state_before(s).qd
     square = float(d @ d)
     for index in range(first, len(timeline)):
-        begin, a, _, _ = _segment(timeline, index)
+        begin, a, _, _ = segment_at(timeline, index)
         if begin >= rest:
             break
         aside = a[1:] - np.outer(a[1:] @ d / square, d) if square else a[1:]
@@ -223,7 +227,7 @@ def _halting(timeline: Timeline, s: float, rest: float, limits: Limits, margin: 
     coefficients: list[tuple[float, ...]] = []
     pace, index = 1.0, timeline.index_at(s)
     while pace > 0 and s < rest:
-        _, _, _, end = _segment(timeline, index)
+        _, _, _, end = segment_at(timeline, index)
         dt = min(step, (end - s) / pace)
         rate = 0.0
         for _ in range(2):
@@ -258,7 +262,7 @@ def _lowest_rate(timeline: Timeline, s: Array, pace: Array, limits: Limits) -> f
     return min(float(lowest.max()), 0.0)
 
 
-def _keeps(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
+def keeps(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
     """Whether samples of the motion along a law keep the limits."""
     s, *derivatives = law(np.linspace(0.0, law.duration, _LOOKS))
     p, r, third = (value[:, None] for value in derivatives)
@@ -286,26 +290,38 @@ def _waits(timeline: Timeline, s: float, rest: float) -> Iterator[float]:
             return
 
 
-def _rest_after(timeline: Timeline, s: float) -> float:
-    """When the motion next rests, at a knot [s]."""
-    for index in range(max(timeline.index_at(s), 0) + 1, len(timeline) + 1):
-        knot = timeline.start_of(index)
-        if knot <= s:
-            continue
-        before = timeline.state_before(knot)
-        if before.qd.any():
-            continue
-        if index == len(timeline):
-            return knot
-        # What is only nearly at rest goes on moving, with the acceleration that it had.
-        after = timeline.state_after(index)
-        accelerates = np.abs(after.qdd).max() > _NO_JUMP and np.abs(after.qdd - before.qdd).max() <= _NO_JUMP
-        if np.abs(after.qd).max() < _NO_SPEED and not accelerates:
-            return knot
-    return max(timeline.end, s)
+def rest_after(timeline: Timeline, s: float, until: float = np.inf) -> float:
+    """When the motion next rests, at a knot [s]; infinity where it doesn't until a time."""
+    first = max(timeline.index_at(s), 0) + 1
+    for low in range(first, len(timeline) + 1, _KNOTS):
+        knots = np.array([timeline.start_of(i) for i in range(low, min(low + _KNOTS, len(timeline) + 1))])
+        slow = np.abs(timeline.sample(knots, derivative=1)).max(1) < _NEARLY
+        for i in np.flatnonzero(slow & (knots > s)).tolist():
+            knot = float(knots[i])
+            if knot > until:
+                return np.inf
+            if _rests(timeline, knot, low + i):
+                return knot
+        if knots[-1] > until:
+            return np.inf
+    end = max(timeline.end, s)
+    return end if end <= until else np.inf
 
 
-def _segment(timeline: Timeline, index: int) -> tuple[float, Array, int, float]:
+def _rests(timeline: Timeline, knot: float, index: int) -> bool:
+    """Whether the arm rests at the knot where a segment begins, or the timeline ends."""
+    before = timeline.state_before(knot)
+    if before.qd.any():
+        return False
+    if index == len(timeline):
+        return True
+    # What is only nearly at rest goes on moving, with the acceleration that it had.
+    after = timeline.state_after(index)
+    accelerates = np.abs(after.qdd).max() > _NO_JUMP and np.abs(after.qdd - before.qdd).max() <= _NO_JUMP
+    return bool(np.abs(after.qd).max() < _NO_SPEED and not accelerates)
+
+
+def segment_at(timeline: Timeline, index: int) -> tuple[float, Array, int, float]:
     """Start, coefficients, owner and end of a segment; outside the timeline, of standing there."""
     if index < 0:
         return -np.inf, timeline.initial[None], HOLD, timeline.start
@@ -352,12 +368,18 @@ def _value(c: tuple[float, ...] | list[float], u: float) -> float:
 
 def _when(c: tuple[float, ...], s: float, low: float, high: float) -> float:
     """The time between low and high at which a rising polynomial reaches s."""
+    rate = tuple(k * factor for k, factor in enumerate(c))[1:]
+    t = 0.5 * (low + high)
     for _ in range(80):
-        middle = 0.5 * (low + high)
-        if _value(c, middle) < s:
-            low = middle
-        else:
-            high = middle
+        short = _value(c, t) - s
+        low, high = (t, high) if short < 0 else (low, t)
+        steep = _value(rate, t)
+        # Newton's step where it stays between the bounds, else half of what they leave.
+        step = t - short / steep if steep > 0 else low
+        following = step if low < step < high else 0.5 * (low + high)
+        if following in (t, low, high):
+            break
+        t = following
     return high
 
 

@@ -17,10 +17,15 @@ from vrs.timeline import Timeline
 Stopper: TypeAlias = Callable[[float], tuple[Plan, str]]
 """Plans a stop at a time of the plan: the stop, and what the user must know of it."""
 
+_ROUNDING = 1e-9
+"""Receipts' times [s] may lie this much before the knot that they mean."""
+
 
 def span(timeline: Timeline, command_id: int, start: float) -> tuple[int, int] | None:
     """First segment of a command's move that begins at a time, and one past its last; None if it has none."""
     near = max(timeline.index_at(start), 0)
+    if near + 1 < len(timeline) and timeline.start_of(near + 1) - start <= _ROUNDING:
+        near += 1
     for index in (near, near + 1, near - 1):
         if 0 <= index < len(timeline) and timeline.owner_of(index) == command_id:
             return index, end_of_move(timeline, index)

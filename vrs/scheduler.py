@@ -140,8 +140,9 @@ class Scheduler:
         appended = command.insertion is Insertion.APPEND
         appended, t = appended and edit.start == t, edit.start
         shifted, dropped = ((), ()) if appended else self.touched(edit, t)
+        target = frozen_array(edit.target) if edit.target.flags.writeable else edit.target
         receipt = Receipt(
-            command_id, status, issued, asked, t, edit.arrival, frozen_array(edit.target),
+            command_id, status, issued, asked, t, edit.arrival, target,
             joined(reason, edit.notes), edit.timeline.version, edit.shift,
             shifted_names=shifted, superseded_names=dropped,
         )  # fmt: skip

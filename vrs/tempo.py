@@ -81,7 +81,9 @@ def stop(plan: Scheduler, command: Stop, now: float | None) -> Receipt:
         else:
             way = list(composed(timeline, halting(timeline, t, plan.limits, jerk=jerky)))
         smooth = not jerky or all(plan.smooth(i) for i in {part.command_id for part in way})
-        if smooth and sum(sum(part.durations) for part in way) <= _PATIENCE * braking.duration + 0.05:
+        # A plan made under other limits may have no way to stop on that keeps these.
+        keeps = violation(as_plan(iter(way), timeline.dof), plan.limits, jerk=jerky) is None
+        if smooth and keeps and sum(sum(part.durations) for part in way) <= _PATIENCE * braking.duration + 0.05:
             reason = "stopped on its way"
             pieces = [part._replace(command_id=number) for part in way]
         else:

@@ -25,13 +25,13 @@ from vrs.evaluation import (
     Cursor,
     Places,
     filled_rows,
+    first_state,
     idle_cursor,
     places_of,
     power_sum,
     rows_of,
     sample_many,
     settled,
-    state_rows,
 )
 from vrs.model import Array
 from vrs.segment import PolynomialSegment, check_derivative, evaluate, times
@@ -338,13 +338,13 @@ class Timeline:
             index, leaf, i, offset = self._count, None, 0, 0.0
         if leaf is None or offset + leaf.starts[i] >= t:
             leaf, i, offset = self._locate(index - 1)
-        row, u = leaf.rows[i], min(t - (offset + leaf.starts[i]), leaf.durations[i])
-        return State(*settled(state_rows(filled_rows(row, self.dof), u), len(row) < 32 * self.dof))
+        u = min(t - (offset + leaf.starts[i]), leaf.durations[i])
+        return State(*settled(leaf.rows[i], self.dof, u))
 
     def state_after(self, index: int) -> State:
         """The state at the start of a segment, as the segment has it."""
         leaf, i, _ = self._locate(index)
-        return State(*state_rows(filled_rows(leaf.rows[i], self.dof), 0.0))
+        return State(*first_state(leaf.rows[i], self.dof))
 
     def edited(
         self, cut: float, pieces: Iterable[Piece], tail: int | None = None, tail_start: float | None = None

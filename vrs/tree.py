@@ -27,9 +27,12 @@ FILLED = 0.75
 
 
 class Leaf:
-    """Up to LEAF segments, a column a property. Never changed once it's made."""
+    """Up to LEAF segments, a column a property. Never changed once it's made, but put away: see `vrs.archive`."""
 
-    __slots__ = ("count", "durations", "first", "owners", "rows", "starts")
+    __slots__ = ("count", "durations", "first", "owners", "place", "rows", "starts")
+
+    place: Any
+    """Where it's put away; not there before."""
 
     def __init__(
         self, starts: array[float], durations: array[float], owners: array[int], rows: tuple[bytes, ...]
@@ -50,8 +53,15 @@ class Node:
     """Up to CAPACITY leaves or nodes, all of one height. What a reader sees of it never changes."""
 
     __slots__ = (
-        "__weakref__", "asked", "children", "count", "counts", "first", "firsts", "index", "offsets", "stack",
+        "__weakref__", "asked", "children", "count", "counts", "first", "firsts", "index", "offsets", "place",
+        "stack",
     )  # fmt: skip
+
+    place: Any
+    """Where it's put away; not there before."""
+
+    head: tuple[float, float] | None = None
+    """Offset of the first child and `first` of it, where they're known though the children are put away."""
 
     def __init__(
         self,
@@ -164,9 +174,12 @@ def start_of(root: Node, height: int, index: int) -> float:
 def first_start(node: Any, height: int, offset: float) -> float:
     """Start of the first segment below a node or, of height 0, in a leaf, whose summed offset is given."""
     for _ in range(height):
+        head: tuple[float, float] | None = node.head
+        if head is not None:
+            return offset + head[0] + head[1]
         offset += node.offsets[0]
         node = node.children[0]
-    start: float = offset + node.starts[0]
+    start: float = offset + node.first
     return start
 
 

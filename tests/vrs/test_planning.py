@@ -10,7 +10,7 @@ from vrs import Engine, JointTarget, Limits, MotionCommand, Profile
 from vrs.chunk import State
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.planning import jerk_limited, move, overlapped, parabolic, run_up, violation
-from vrs.planning.blend import _certified, _Move, _quickest, _Times, blend
+from vrs.planning.blend import _certified, _Move, _quickest, _slowest_joint, _Times, blend
 from vrs.planning.bounds import bounds
 from vrs.planning.online import online
 from vrs.planning.plan import Plan, empty, end_state, integrate
@@ -264,7 +264,7 @@ def test_a_blend_is_certified_apart_from_the_search():
     one = np.ones(1)
     bound = bounds(Limits(-3 * one, 3 * one, one, 4 * one))
     back = _Move([0.0], [1.0], [-2.0], [1.0], bound)
-    assert _quickest(back) == pytest.approx((2.625, 0.5, 2.25))
+    assert _quickest(back, _slowest_joint(back)) == pytest.approx((2.625, 0.5, 2.25))
     assert len(_certified(back, _Times(2.625, 0.5, 2.25))) == 3
     for b, last, L in ((0.4, 0.25, 2.2), (0.5, 0.2, 2.25), (0.5, 0.25, 2.0)):
         assert _certified(back, _Times(L + 0.5 * (b + last), b, L)) is None

@@ -9,7 +9,6 @@ Source: Doulgeri, Zikos, Delopoulos, section II-B.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,19 +16,23 @@ import numpy as np
 from vrs.chunk import State
 from vrs.model import Array, Limits
 from vrs.planning.bounds import Bounds, bounds
-from vrs.planning.plan import Plan
+from vrs.planning.plan import Plan, parabolas
 
 _OVER = 2e-5
 """Share by which a blend time is taken longer than needed, so that the search for it ends."""
 _GAIN = 1e-4
 """Share of the duration below which a longer search isn't worth it."""
+_WITHIN = 1.0 + 4e-10
+"""What a limit is multiplied by to be kept: a little less than what the general certificate lets pass."""
 _STOPPING = np.concatenate([np.linspace(0.05, 2.0, 40), np.geomspace(2.2, 40.0, 16)])
 """Blend times to try, in times of what stopping takes."""
 _REVERSING = np.linspace(0.03, 2.1, 40)
 """Blend times to try, in times of what reaching full speed takes."""
 
 
-def blend(state: State, q: Array, speed: float, limits: Limits, *, back: bool = False) -> Plan | None:
+def blend(
+    state: State, q: Array, speed: float, limits: Limits, *, back: bool = False, patience: float = math.inf
+) -> Plan | None:
     """The fastest redirection with common knots that keeps the limits.
 
     Args:
@@ -39,9 +42,10 @@ def blend(state: State, q: Array, speed: float, limits: Limits, *, back: bool = 
         limits: Limits that hold at every instant.
         back: Plan the other way, from rest at q to the state. In time's mirror that's a redirection, from the state
             with its speed reversed; a joint may cruise as fast as the state is, if that's more than v allows.
+        patience: How many times as long as braking and a move from there it may take.
 
     Returns:
-        The plan, which keeps the limits, or None if the search finds none.
+        The plan, which keeps the limits, or None if the search finds none that's quick enough.
     """
     bound = bounds(limits)
     qd = state.qd.tolist()
@@ -50,12 +54,16 @@ def blend(state: State, q: Array, speed: float, limits: Limits, *, back: bool = 
         qd = [-value for value in qd]
         fastest = [abs(v) if abs(v) > top else top for v, top in zip(qd, fastest, strict=True)]
     move = _Move(state.q.tolist(), qd, q.tolist(), fastest, bound)
-    times = _quickest(move)
+    slowest = _slowest_joint(move)
+    times = _quickest(move, slowest)
     plan = None if times is None else _certified(move, times, back=back)
     if plan is None:
         times = _searched(move, limits)
         plan = None if times is None else _certified(move, times, back=back)
-    return plan
+    # Through rest nothing is quicker than its slowest joint alone would be, and that's known.
+    if plan is None or plan.duration <= patience * slowest.total:
+        return plan
+    return plan if plan.duration <= patience * _through_rest(move, speed) else None
 
 
 class _Times(NamedTuple):
@@ -64,6 +72,17 @@ class _Times(NamedTuple):
     total: float
     blend: float
     L: float
+
+
+class _Slowest(NamedTuple):
+    """The joint that needs longest when it's alone."""
+
+    total: float
+    """What it needs [s]."""
+    blend: float
+    """Of which its blend [s]."""
+    too_fast: bool
+    """Whether any joint is faster than it may cruise."""
 
 
 class _Value(NamedTuple):
@@ -80,22 +99,23 @@ class _Value(NamedTuple):
 class _Move:
     """What a redirection starts from and goes to, as plain floats."""
 
-    __slots__ = ("bound", "fastest", "q", "q0", "qd", "way")
+    __slots__ = ("bound", "joints", "q", "q0", "qd", "way")
 
     def __init__(
         self, q0: list[float], qd: list[float], q: list[float], fastest: list[float], bound: Bounds
     ) -> None:
-        self.q0, self.qd, self.q, self.fastest, self.bound = q0, qd, q, fastest, bound
+        self.q0, self.qd, self.q, self.bound = q0, qd, q, bound
         self.way = [b - a for a, b in zip(q0, q, strict=True)]
-
-    def joints(self) -> Iterator[tuple[float, float, float, float]]:
+        self.joints = list(zip(self.way, qd, fastest, bound.qdd_max, strict=True))
         """Way, speed, fastest cruise and acceleration of each joint."""
-        return zip(self.way, self.qd, self.fastest, self.bound.qdd_max, strict=True)
 
 
-def _quickest(move: _Move) -> _Times | None:
-    """The fastest redirection, its turning points not looked at; None where the search doesn't end."""
-    b, too_fast = _slowest_joint(move)
+def _quickest(move: _Move, slowest: _Slowest) -> _Times | None:
+    """The fastest redirection, its turning points not looked at; None where the search doesn't end.
+
+    Where the other joints can follow the slowest, nothing is faster.
+    """
+    b = slowest.blend
     before = None
     for _ in range(20):
         L, A, needed = _needed(move, b)
@@ -112,17 +132,14 @@ def _quickest(move: _Move) -> _Times | None:
     else:
         return None
     found = _Times(L + 0.5 * (b + A / L), b, L)
-    return _slowing(move, found) if too_fast else found
+    return _slowing(move, found) if slowest.too_fast else found
 
 
-def _slowest_joint(move: _Move) -> tuple[float, bool]:
-    """Blend time of the joint that needs longest when it's alone, and whether any joint is too fast.
-
-    Where the other joints can follow it, nothing is faster.
-    """
+def _slowest_joint(move: _Move) -> _Slowest:
+    """The joint that needs longest when it's alone."""
     longest, b = 0.0, 0.0
     too_fast = False
-    for way, qd, fastest, g in move.joints():
+    for way, qd, fastest, g in move.joints:
         # As if the target lay ahead; where braking alone gets there, it does.
         if way * g < (0.5 - 1e-9) * qd * abs(qd):
             D, v = -way, -qd
@@ -134,7 +151,8 @@ def _slowest_joint(move: _Move) -> tuple[float, bool]:
             ramp = (v - V) / g
             line = (D - 0.5 * (v + V) * ramp) / V - 0.5 * V / g
         else:
-            too_fast = too_fast or -v > V * (1.0 + 1e-9)
+            if -v > V * (1.0 + 1e-9):
+                too_fast = True
             line = (D - (V * V - 0.5 * v * v) / g) / V
             if line < 0.0:
                 V, line = math.sqrt(abs(g * D + 0.5 * v * v)), 0.0
@@ -142,25 +160,41 @@ def _slowest_joint(move: _Move) -> tuple[float, bool]:
         total = ramp + line + V / g
         if total > longest:
             longest, b = total, ramp
-    return (b if b > 1e-6 * longest else 1e-6 * longest), too_fast
+    return _Slowest(longest, b if b > 1e-6 * longest else 1e-6 * longest, too_fast)
 
 
 def _needed(move: _Move, b: float) -> tuple[float, float, float]:
     """Smallest L of a blend time that cruises and stops within the limits, A, and the time that its blend needs."""
     L = A = needed = 0.0
-    for way, qd, fastest, g in move.joints():
-        reach = abs(way - 0.5 * b * qd)
+    half = 0.5 * b
+    for way, qd, fastest, g in move.joints:
+        reach = abs(way - half * qd)
         if reach > L * fastest:
             L = reach / fastest
         if reach > A * g:
             A = reach / g
     triangle = 0.25 * (b + math.sqrt(b * b + 8.0 * A))
     L = triangle if triangle > L else L
-    for way, qd, g in zip(move.way, move.qd, move.bound.qdd_max, strict=True):
-        change = abs((way - 0.5 * b * qd) / L - qd)
+    for way, qd, _, g in move.joints:
+        change = abs((way - half * qd) / L - qd)
         if change > needed * g:
             needed = change / g
     return L, A, needed
+
+
+def _through_rest(move: _Move, speed: float) -> float:
+    """Duration of braking and of the move from there [s], whether or not it keeps the position limits."""
+    longest = slowest = weakest = 0.0
+    for (way, qd, _, g), v in zip(move.joints, move.bound.qd_max, strict=True):
+        braking = abs(qd) / g
+        reach = abs(way - 0.5 * qd * braking)
+        longest = max(longest, braking)
+        slowest = max(slowest, reach / v)
+        weakest = max(weakest, reach / g)
+    if slowest == 0.0:
+        return longest
+    rate = min(speed / slowest, 1.0 / math.sqrt(weakest))
+    return longest + 1.0 / rate + rate * weakest
 
 
 def _slowing(move: _Move, found: _Times) -> _Times:
@@ -206,7 +240,7 @@ def _value(move: _Move, b: float) -> _Value:
     """The best redirection of a blend time, all limits but the positions kept."""
     L = A = L_slope = A_slope = 0.0
     longest = math.inf
-    for way, speed, fastest, g in move.joints():
+    for way, speed, fastest, g in move.joints:
         reach, qd = way - 0.5 * b * speed, speed
         if reach < 0.0:
             reach, qd = -reach, -qd
@@ -248,16 +282,16 @@ def _certified(move: _Move, times: _Times, *, back: bool = False) -> Plan | None
         last = 2.0 * L - b
     if not (b > 0.0 and last > 0.0):
         return None
-    within = 1.0 + 4e-10
+    half, fading = 0.5 * b, 0.5 * last
     V, blending, stopping, corner, foot = [], [], [], [], []
-    for j, (way, qd) in enumerate(zip(move.way, move.qd, strict=True)):
-        g, v_max = bound.qdd_max[j] * within, bound.qd_max[j] * within
-        v = (way - 0.5 * b * qd) / L
+    for start, end, way, qd, growth, speed, low, high in zip(
+        move.q0, move.q, move.way, move.qd, bound.qdd_max, bound.qd_max, bound.lowest, bound.highest, strict=True
+    ):
+        g, v_max = growth * _WITHIN, speed * _WITHIN
+        v = (way - half * qd) / L
         rise, fall = (v - qd) / b, -v / last
-        start, end = move.q0[j], move.q[j]
-        first, second = start + 0.5 * (qd + v) * b, end - 0.5 * v * last
+        first, second = start + 0.5 * (qd + v) * b, end - fading * v
         turn = start - 0.5 * qd * qd / rise if qd * v < 0.0 else first
-        low, high = bound.lowest[j], bound.highest[j]
         # Written so that NaN fails.
         if not (
             -g <= rise <= g
@@ -279,14 +313,14 @@ def _certified(move: _Move, times: _Times, *, back: bool = False) -> Plan | None
     zero = [0.0] * len(V)
     if back:
         V = [-v for v in V]
-        opening, closing = [move.q, zero, stopping], [corner, V, blending]
+        opening, closing = (move.q, zero, stopping), (corner, V, blending)
         b, last, corner = last, b, foot
     else:
         # The last parabola is written from the target, so that it ends there and at rest.
-        opening, closing = [move.q0, move.qd, blending], [foot, V, stopping]
+        opening, closing = (move.q0, move.qd, blending), (foot, V, stopping)
     if triangle:
-        return Plan(np.array([b, last]), np.array([opening, closing]))
-    return Plan(np.array([b, line, last]), np.array([opening, [corner, V, zero], closing]))
+        return parabolas([b, last], [*opening, *closing])
+    return parabolas([b, line, last], [*opening, corner, V, zero, *closing])
 
 
 def _searched(move: _Move, limits: Limits) -> _Times | None:
@@ -303,7 +337,8 @@ def _searched(move: _Move, limits: Limits) -> _Times | None:
 
 def _least_time(move: _Move, limits: Limits, b: Array) -> _Times | None:
     """The fastest feasible redirection among blend times b, or None."""
-    q0, qd, fastest = np.array([move.q0, move.qd, move.fastest])
+    q0, qd = np.array(move.q0), np.array(move.qd)
+    fastest = np.array([fastest for _, _, fastest, _ in move.joints])
     bb = b[:, None]
     D = np.array(move.way) - 0.5 * bb * qd
     reach = np.abs(D)

@@ -34,7 +34,7 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan,
     """
     if not any(state.qd.tolist()) and not any(state.qdd.tolist()):
         return rest_to_rest(state.q, q, speed, limits), ""
-    still = np.zeros_like(q)
+    still = np.zeros(len(q))
     plan = online(state, State(q, still, still), speed, limits, order=3)
     if plan is not None:
         return plan, ""
@@ -64,7 +64,7 @@ def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[
     """
     if not any(goal.qd.tolist()):
         return rest_to_rest(start, goal.q, speed, limits), ""
-    still = np.zeros_like(start)
+    still = np.zeros(len(start))
     plan = online(State(start, still, still), goal, speed, limits, order=3)
     if plan is not None:
         return plan, ""
@@ -95,7 +95,8 @@ def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
         if steady < 0:
             ramp, steady = (0.5 / jerk) ** (1.0 / 3.0), 0.0
     # Of the jerk 1, then scaled to cover the way exactly, whatever the durations were rounded to.
-    durations, share = [], []
+    durations: list[float] = []
+    share: list[float] = []
     s = sd = sdd = 0.0
     for h, sddd in (
         (ramp, 1.0),
@@ -108,8 +109,8 @@ def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
     ):
         if h > 1e-12 * ramp:
             durations.append(h)
-            share.append([s, sd, 0.5 * sdd, sddd / 6.0])
+            share += (s, sd, 0.5 * sdd, sddd / 6.0)
             s += h * (sd + h * (0.5 * sdd + h * sddd / 6.0))
             sd += h * (sdd + 0.5 * h * sddd)
             sdd += h * sddd
-    return follow(start, q, durations, [[value / s for value in row] for row in share])
+    return follow(start, q, durations, [value / s for value in share])

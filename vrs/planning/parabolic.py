@@ -10,7 +10,6 @@ from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits
 from vrs.planning.blend import blend
-from vrs.planning.bounds import bounds
 from vrs.planning.online import online
 from vrs.planning.plan import Plan, empty, end_state, integrate, violation
 from vrs.planning.straight import NEGLIGIBLE, follow, rates
@@ -37,10 +36,10 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> Plan:
     """
     if not any(state.qd.tolist()):
         return rest_to_rest(state.q, q, speed, limits)
-    plan = blend(state, q, speed, limits)
-    if plan is not None and plan.duration <= 2.0 * _through_rest(state, q, speed, limits):
+    plan = blend(state, q, speed, limits, patience=2.0)
+    if plan is not None:
         return plan
-    still = np.zeros_like(q)
+    still = np.zeros(len(q))
     plan = online(state, State(q, still, still), speed, limits, order=2)
     if plan is not None:
         return plan
@@ -50,24 +49,6 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> Plan:
     if problem is not None:
         raise PlanningError(f"no blend from this state: {problem}")
     return plan
-
-
-def _through_rest(state: State, q: Array, speed: float, limits: Limits) -> float:
-    """Duration of braking and of the move from there [s], whether or not it keeps the position limits."""
-    bound = bounds(limits)
-    longest = slowest = weakest = 0.0
-    for a, qd, b, v, g in zip(
-        state.q.tolist(), state.qd.tolist(), q.tolist(), bound.qd_max, bound.qdd_max, strict=True
-    ):
-        braking = abs(qd) / g
-        reach = abs(b - a - 0.5 * qd * braking)
-        longest = braking if braking > longest else longest
-        slowest = reach / v if reach > slowest * v else slowest
-        weakest = reach / g if reach > weakest * g else weakest
-    if slowest == 0.0:
-        return longest
-    rate = min(speed / slowest, 1.0 / math.sqrt(weakest))
-    return longest + 1.0 / rate + rate * weakest
 
 
 def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
@@ -84,10 +65,10 @@ def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
         rate = math.sqrt(growth)
     ramp, cruise = rate / growth, 1.0 / rate - rate / growth
     half, covered = 0.5 * growth, 0.5 * rate * ramp
-    first, last = [0.0, 0.0, half], [1.0 - covered, rate, -half]
+    first, last = (0.0, 0.0, half), (1.0 - covered, rate, -half)
     if cruise > 1e-12 * ramp:
-        return follow(start, q, [ramp, cruise, ramp], [first, [covered, rate, 0.0], last])
-    return follow(start, q, [ramp, ramp], [first, last])
+        return follow(start, q, [ramp, cruise, ramp], [*first, covered, rate, 0.0, *last])
+    return follow(start, q, [ramp, ramp], [*first, *last])
 
 
 def brake(state: State, limits: Limits) -> Plan:
@@ -116,15 +97,14 @@ def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> Plan:
     """
     if not any(goal.qd.tolist()):
         return rest_to_rest(start, goal.q, speed, limits)
-    mirrored = State(goal.q, -goal.qd, goal.qdd)
-    plan = blend(goal, start, speed, limits, back=True)
-    if plan is not None and plan.duration <= 2.0 * _through_rest(mirrored, start, speed, limits):
+    plan = blend(goal, start, speed, limits, back=True, patience=2.0)
+    if plan is not None:
         return plan
-    still = np.zeros_like(start)
+    still = np.zeros(len(start))
     plan = online(State(start, still, still), goal, speed, limits, order=2)
     if plan is not None:
         return plan
-    braking = brake(mirrored, limits)
+    braking = brake(State(goal.q, -goal.qd, goal.qdd), limits)
     stop = end_state(braking)
     h = braking.durations[::-1].copy()
     run_up = integrate(State(stop.q, still, still), h, 2.0 * braking.coefficients[::-1, 2], 2)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
+import numpy as np
+
 from vrs.clock import ManualClock
 from vrs.commands import Command, Lateness, ParameterChange
 from vrs.engine import Engine
@@ -100,8 +102,16 @@ class Session:
             clock.advance(self._draws.pause(engine))
 
     def branch(self) -> None:
-        """Go on on a branch of the timeline, with an engine of its own."""
+        """Go on on a branch of the timeline, with an engine of its own.
+
+        Not where limits were changed: a branch has the model's, and its past may have passed those.
+        """
         engine = self.watch.engine
+        if any(
+            not np.array_equal(getattr(engine.limits, name), getattr(self._model.limits, name))
+            for name in ("qd_max", "qdd_max", "qddd_max")
+        ):
+            return
         receipts = {r.command_id: r for r in engine.receipts}
         self._left.append(_Left(engine, engine.timeline, columns(engine.timeline), receipts))
         draws, t = self._draws, engine.timeline
