@@ -1,28 +1,21 @@
-"""One direction of an emulated link."""
+"""One direction of an emulated link, without resending."""
 
 from __future__ import annotations
 
-import enum
 import heapq
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 
-from interfaces.link.profiles import DelayProfile
+from interfaces.link.conditions import MAX_COUNT, Conditions, Service, whole
+from interfaces.link.delay import DelayProfile
+from interfaces.link.packets import LossReason, PacketLog, PacketRecord
+from interfaces.link.path import Path
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
 T = TypeVar("T")
-
-
-class Service(enum.StrEnum):
-    """What the link promises about order."""
-
-    IN_ORDER = "in-order"
-    """No packet overtakes an earlier one: it waits for it, as in a byte stream."""
-    DATAGRAM = "datagram"
-    """Packets arrive as they come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,64 +32,108 @@ class Delivery(Generic[T]):
 class Channel(Generic[T]):
     """A one-way link with delay and loss, without input or output of its own.
 
+    Its in-order service holds back packets that would overtake, but doesn't send lost ones again: those
+    behind a lost one don't wait for it, as with sequence numbers on datagrams. A byte stream is `Stream`.
+
     Args:
-        profile: How long packets take.
+        profile: How long packets take; or all conditions of the direction, whose own delay, service and
+            capacity then hold.
         rng: Source of everything random in it.
         service: Order of delivery.
         capacity: Most packets in flight, ≥ 1; what is sent beyond it is lost.
+        path: A path to share with other channels instead of one of its own; its conditions decide the fates.
     """
 
     def __init__(
         self,
-        profile: DelayProfile,
+        profile: DelayProfile | Conditions,
         rng: np.random.Generator,
         service: Service = Service.IN_ORDER,
         capacity: int = 10_000,
+        *,
+        path: Path | None = None,
     ) -> None:
-        if capacity < 1:
-            raise InvalidValueError("capacity", capacity, "an integer, at least 1")
-        self._source = profile.source(rng)
-        self._service = Service(service)
-        self._capacity = capacity
-        self._flight: list[tuple[float, int, Delivery[T]]] = []
-        self._count = 0
+        if isinstance(profile, Conditions):
+            conditions = profile
+        else:
+            whole("capacity", capacity, 1, MAX_COUNT)
+            conditions = Conditions(delay=profile, service=Service(service), capacity=capacity)
+        self._conditions = conditions
+        self._path = Path(conditions, rng) if path is None else path
+        self._flight: list[tuple[float, int, Delivery[T], PacketRecord]] = []
+        self._order = self._count = 0
         self._sent = -float("inf")
         self._last_arrival = -float("inf")
+        self.log = PacketLog()
+        """What became of each packet."""
 
-    def send(self, payload: T, now: float) -> float | None:
+    def send(self, payload: T, now: float, size: int = 0) -> float | None:
         """Put a packet on its way.
 
         Args:
             payload: What the packet carries.
             now: Time [s], not before that of the packet sent last.
+            size: Size of the packet [byte], ≥ 0.
 
         Returns:
             When it will arrive [s]; None when it is lost. For the record only: no receiver knows it.
 
         Raises:
-            InvalidValueError: If now is not finite, or runs back.
+            InvalidValueError: If now is not finite, or runs back; or size is no number of bytes.
         """
-        now = finite("now", now, "finite seconds")
-        if now < self._sent:
-            raise InvalidValueError("now", now, f"at least {self._sent}, the time of the last sending")
+        now, size = moment("now", now, self._sent), whole("size", size, 0, 2**31)
         self._sent = now
-        delay = self._source.draw(now)
-        if delay is None or len(self._flight) >= self._capacity:
+        number, self._count = self._count, self._count + 1
+        self.log.sent(size)
+        fate = self._path.fate(now, size)
+        if fate.lost is not None or len(self._flight) >= self._conditions.capacity:
+            reason = fate.lost or LossReason.CAPACITY
+            self.log.settle(PacketRecord(number, size, now, None, reason))
             return None
-        arrival = now + delay
-        if self._service is Service.IN_ORDER:
+        arrival = fate.arrivals[0]
+        if self._conditions.service is Service.IN_ORDER:
             arrival = self._last_arrival = max(arrival, self._last_arrival)
-        heapq.heappush(self._flight, (arrival, self._count, Delivery(payload, now, arrival)))
-        self._count += 1
+        self._fly(payload, PacketRecord(number, size, now, arrival))
+        for copy in fate.arrivals[1:]:
+            self.log.copied()
+            if self._conditions.service is Service.IN_ORDER:
+                self.log.discarded()
+            elif len(self._flight) >= self._conditions.capacity:
+                self.log.settle(PacketRecord(number, size, now, None, LossReason.CAPACITY, copy=True))
+            else:
+                self._fly(payload, PacketRecord(number, size, now, copy, copy=True))
         return arrival
+
+    def _fly(self, payload: T, record: PacketRecord) -> None:
+        arrival = record.sent if record.arrived is None else record.arrived
+        heapq.heappush(self._flight, (arrival, self._order, Delivery(payload, record.sent, arrival), record))
+        self._order += 1
 
     def receive(self, now: float) -> tuple[Delivery[T], ...]:
         """Take everything that has arrived by now [s], in the order of arrival."""
         arrived: list[Delivery[T]] = []
         while self._flight and self._flight[0][0] <= now:
-            arrived.append(heapq.heappop(self._flight)[2])
+            _, _, delivery, record = heapq.heappop(self._flight)
+            self.log.settle(record)
+            arrived.append(delivery)
         return tuple(arrived)
 
     def next_deadline(self) -> float | None:
         """When the next packet arrives [s]; None when none is in flight."""
         return self._flight[0][0] if self._flight else None
+
+    def in_flight(self) -> int:
+        """Packets on their way, copies included."""
+        return len(self._flight)
+
+
+def moment(name: str, value: object, earliest: float) -> float:
+    """Return a time that doesn't run back [s].
+
+    Raises:
+        InvalidValueError: If it isn't finite, or lies before the earliest.
+    """
+    now = finite(name, value, "finite seconds")
+    if now < earliest:
+        raise InvalidValueError(name, now, f"at least {earliest}, the latest time so far")
+    return now

@@ -5,12 +5,53 @@ from __future__ import annotations
 import csv
 import io
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
-from vrs.errors import FormatError
+import numpy as np
+
+from interfaces.link.delay import MAX_DELAY, DelaySource, number_in, share_of
+from vrs.errors import FormatError, InvalidValueError
 
 COLUMN = "delay_s"
 MAX_BYTES = 64 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class TraceDelay:
+    """Recorded delays, a row a packet; after the last row the first comes again."""
+
+    name: str
+    delays: tuple[float | None, ...]
+    """One-way delays [s], in [0, 3600]; None is a lost packet. Not empty."""
+
+    def __post_init__(self) -> None:
+        if not self.delays:
+            raise InvalidValueError("delays", self.delays, "at least one row")
+        for delay in self.delays:
+            if delay is not None:
+                number_in("delay", delay, 0.0, MAX_DELAY, "seconds")
+
+    def source(self, rng: np.random.Generator) -> DelaySource:  # noqa: ARG002
+        """Start at the first row."""
+        return _Replay(self.delays)
+
+    def quantile(self, share: float) -> float:
+        """Smallest recorded delay that the share of arriving packets keeps within [s]; 0 if none arrives."""
+        arriving = sorted(d for d in self.delays if d is not None)
+        return arriving[max(0, math.ceil(share_of(share) * len(arriving)) - 1)] if arriving else 0.0
+
+
+class _Replay:
+    """Position in a trace."""
+
+    def __init__(self, delays: tuple[float | None, ...]) -> None:
+        self._delays, self._row = delays, 0
+
+    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+        delay = self._delays[self._row]
+        self._row = (self._row + 1) % len(self._delays)
+        return delay
 
 
 def read_trace(path: Path, *, longest: float) -> tuple[float | None, ...]:

@@ -1,0 +1,61 @@
+"""Both directions of an emulated link, made from one configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeAlias, TypeVar
+
+import numpy as np
+
+from interfaces.link.channel import Channel
+from interfaces.link.conditions import Conditions, LinkConditions, Service
+from interfaces.link.packets import Totals
+from interfaces.link.path import Path
+from interfaces.link.stream import Stream
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+Direction: TypeAlias = Channel[T] | Stream[T]
+"""One direction: datagrams, or a byte stream that sends again."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTotals:
+    """Sums over all packets."""
+
+    forward: Totals
+    backward: Totals
+
+
+class Link(Generic[T, U]):
+    """Two directions, T from the operator to the robot, U back, without input or output of their own.
+
+    Args:
+        conditions: What each direction does; `service` says whether it is a `Channel` or a `Stream`.
+        rng: Source of everything random in it; the directions draw independently.
+    """
+
+    def __init__(self, conditions: LinkConditions, rng: np.random.Generator) -> None:
+        there, back = rng.spawn(2)
+        self.conditions = conditions
+        self.forward: Direction[T] = direction(conditions.forward, there)
+        self.backward: Direction[U] = direction(conditions.backward, back)
+
+    def next_deadline(self) -> float | None:
+        """When the next packet arrives in either direction, or is sent again [s]; None when both are idle."""
+        both = (self.forward.next_deadline(), self.backward.next_deadline())
+        return min((t for t in both if t is not None), default=None)
+
+    def totals(self) -> LinkTotals:
+        """What became of all packets so far."""
+        return LinkTotals(self.forward.log.totals(), self.backward.log.totals())
+
+
+def direction(
+    conditions: Conditions, rng: np.random.Generator, *, path: Path | None = None
+) -> Channel[T] | Stream[T]:
+    """Make one direction: a `Channel` for datagrams, a `Stream` for in-order service."""
+    if conditions.service is Service.IN_ORDER:
+        return Stream(conditions, rng, path=path)
+    return Channel(conditions, rng, path=path)

@@ -1,0 +1,128 @@
+"""Which packets get lost: independently, or in bursts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from interfaces.link.delay import number_in
+from vrs.errors import InvalidValueError
+
+
+class LossSource(Protocol):
+    """The fate of successive packets; it holds the state of the link."""
+
+    def lost(self) -> bool:
+        """Whether the next packet is lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class BernoulliLoss:
+    """Every packet is lost with the same probability, whatever happened to the others."""
+
+    share: float
+    """Probability of loss, in [0, 1]."""
+
+    def __post_init__(self) -> None:
+        number_in("loss", self.share, 0.0, 1.0)
+
+    def source(self, rng: np.random.Generator) -> LossSource:
+        """Start a sequence of packets."""
+        return _Independent(self.share, rng)
+
+
+@dataclass(frozen=True, slots=True)
+class GilbertElliottLoss:
+    """Two states, good and bad, that change from packet to packet: losses come in bursts.
+
+    Source: E. N. Gilbert (1960); E. O. Elliott (1963), Bell System Technical Journal 39 and 42.
+    """
+
+    enter: float
+    """Probability that the packet after a good one is bad, in [0, 1]."""
+    leave: float
+    """Probability that the packet after a bad one is good, in (0, 1]."""
+    loss_bad: float = 1.0
+    """Probability of loss in the bad state, in [0, 1]."""
+    loss_good: float = 0.0
+    """Probability of loss in the good state, in [0, 1]."""
+
+    def __post_init__(self) -> None:
+        for name in ("enter", "leave", "loss_bad", "loss_good"):
+            number_in(name, getattr(self, name), 0.0, 1.0)
+        if self.leave == 0:
+            raise InvalidValueError("leave", self.leave, "in (0, 1]")
+
+    @classmethod
+    def bursts(cls, share: float, length: float) -> GilbertElliottLoss:
+        """Losses of a given share in bursts of a given mean length.
+
+        Args:
+            share: Share of packets lost in the long run, in [0, 1).
+            length: Mean number of packets lost in a row, ≥ 1 and ≥ share / (1 − share).
+        """
+        number_in("length of a burst", length, 1.0, 1e6, "packets")
+        if not number_in("loss", share, 0.0, 1.0) < 1:
+            raise InvalidValueError("loss", share, "in [0, 1)")
+        enter = share / ((1.0 - share) * length)
+        if enter > 1:
+            raise InvalidValueError("length of a burst", length, f"at least {share / (1.0 - share):g} packets")
+        return cls(enter, 1.0 / length)
+
+    @property
+    def share(self) -> float:
+        """Share of packets lost in the long run."""
+        bad = self.enter / (self.enter + self.leave)
+        return bad * self.loss_bad + (1.0 - bad) * self.loss_good
+
+    def source(self, rng: np.random.Generator) -> LossSource:
+        """Start a sequence of packets in the stationary distribution of the states."""
+        return _TwoStates(self, rng)
+
+
+LossModel: TypeAlias = BernoulliLoss | GilbertElliottLoss
+ALLOWED = "a probability P in [0, 1], or burst:P,N: a share P lost in bursts of N packets on average (N ≥ 1)"
+"""What a loss model may be, in words."""
+
+
+def loss_model(text: str) -> LossModel:
+    """Read a loss model as the command line spells it: `P`, or `burst:P,N`.
+
+    Raises:
+        InvalidValueError: If text is neither.
+    """
+    kind, colon, argument = text.partition(":")
+    try:
+        if not colon:
+            return BernoulliLoss(float(text))
+        share, length = (float(part) for part in argument.split(","))
+        if kind == "burst":
+            return GilbertElliottLoss.bursts(share, length)
+    except InvalidValueError as error:
+        raise InvalidValueError("loss", text, f"{ALLOWED} ({error})") from None
+    except ValueError:
+        pass
+    raise InvalidValueError("loss", text, ALLOWED)
+
+
+class _Independent:
+    def __init__(self, share: float, rng: np.random.Generator) -> None:
+        self._share, self._rng = share, rng
+
+    def lost(self) -> bool:
+        return bool(self._rng.random() < self._share)
+
+
+class _TwoStates:
+    def __init__(self, model: GilbertElliottLoss, rng: np.random.Generator) -> None:
+        self._model, self._rng = model, rng
+        self._bad = bool(rng.random() < model.enter / (model.enter + model.leave))
+
+    def lost(self) -> bool:
+        model = self._model
+        lost = bool(self._rng.random() < (model.loss_bad if self._bad else model.loss_good))
+        changes = self._rng.random() < (model.leave if self._bad else model.enter)
+        self._bad = self._bad != bool(changes)
+        return lost

@@ -1,0 +1,145 @@
+"""What became of each packet: records for whoever keeps them, totals for whoever doesn't."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections import Counter, deque
+from dataclasses import dataclass
+
+MAX_RECORDS = 10_000
+"""Records kept until they are taken; the oldest are dropped first."""
+
+
+class LossReason(enum.StrEnum):
+    """Why a packet didn't arrive."""
+
+    ON_THE_WAY = "loss"
+    """The loss model or the trace took it."""
+    QUEUE = "queue"
+    """The queue before the bandwidth was full."""
+    CAPACITY = "capacity"
+    """The emulation holds no more packets."""
+    GIVEN_UP = "given-up"
+    """It was sent as often as an in-order service may, and lost each time."""
+
+
+@dataclass(frozen=True, slots=True)
+class PacketRecord:
+    """One packet, or the second copy of one."""
+
+    number: int
+    """Its number among the packets sent in this direction, from 0."""
+    size: int
+    """Its size [byte]."""
+    sent: float
+    """When it was sent [s]."""
+    arrived: float | None
+    """When it was delivered [s]; None when it was lost."""
+    lost: LossReason | None = None
+    """Why it was lost; None when it arrived."""
+    copy: bool = False
+    """Whether it is the second copy of a packet."""
+    attempts: int = 1
+    """How often it was sent: more than once on an in-order service that lost it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """Sums over all packets of one direction.
+
+    sent + copies = arrived + discarded + the losses + those on their way.
+    """
+
+    sent: int
+    """Packets sent."""
+    copies: int
+    """Second copies that the link made."""
+    arrived: int
+    """Deliveries, copies included."""
+    discarded: int
+    """Second copies that an in-order service discarded."""
+    lost: dict[str, int]
+    """Packets lost, by reason; reasons that didn't occur aren't listed."""
+    resent: int
+    """Times that an in-order service sent a packet again."""
+    bytes_sent: int
+    bytes_arrived: int
+    delay_mean: float | None
+    """Mean time between sending and delivery of what arrived [s]; None before the first."""
+    delay_min: float | None
+    """Shortest [s]."""
+    delay_max: float | None
+    """Longest [s]."""
+    forgotten: int
+    """Records that nobody took in time."""
+
+
+class PacketLog:
+    """Records of packets, bounded, and their totals.
+
+    Args:
+        keep: Most records kept until `take`; the totals know of all.
+    """
+
+    def __init__(self, keep: int = MAX_RECORDS) -> None:
+        self._records: deque[PacketRecord] = deque(maxlen=keep)
+        self._lost: Counter[str] = Counter()
+        self._sent = self._copies = self._arrived = self._discarded = self._resent = 0
+        self._bytes_sent = self._bytes_arrived = self._forgotten = 0
+        self._delay_sum, self._delay_min, self._delay_max = 0.0, math.inf, 0.0
+
+    def sent(self, size: int) -> None:
+        """Count a packet of `size` bytes that was sent."""
+        self._sent += 1
+        self._bytes_sent += size
+
+    def copied(self) -> None:
+        """Count a second copy."""
+        self._copies += 1
+
+    def discarded(self) -> None:
+        """Count a second copy that was thrown away on arrival."""
+        self._discarded += 1
+
+    def resent(self) -> None:
+        """Count another attempt."""
+        self._resent += 1
+
+    def settle(self, record: PacketRecord) -> None:
+        """Keep what became of a packet."""
+        self._forgotten += len(self._records) == self._records.maxlen
+        self._records.append(record)
+        if record.lost is not None:
+            self._lost[record.lost.value] += 1
+        elif record.arrived is not None:
+            delay = record.arrived - record.sent
+            self._arrived += 1
+            self._bytes_arrived += record.size
+            self._delay_sum += delay
+            self._delay_min = min(self._delay_min, delay)
+            self._delay_max = max(self._delay_max, delay)
+
+    def take(self) -> tuple[PacketRecord, ...]:
+        """Hand over the records since the last call, in the order in which they became known."""
+        records = tuple(self._records)
+        self._records.clear()
+        return records
+
+    def totals(self) -> Totals:
+        """The sums so far."""
+        some = self._arrived > 0
+        return Totals(
+            sent=self._sent,
+            copies=self._copies,
+            arrived=self._arrived,
+            discarded=self._discarded,
+            lost=dict(sorted(self._lost.items())),
+            resent=self._resent,
+            bytes_sent=self._bytes_sent,
+            bytes_arrived=self._bytes_arrived,
+            delay_mean=self._delay_sum / self._arrived if some else None,
+            delay_min=self._delay_min if some else None,
+            delay_max=self._delay_max if some else None,
+            forgotten=self._forgotten,
+        )

@@ -1,0 +1,308 @@
+"""TCP through the emulated link: each connection is a byte stream each way over the link's shared paths."""
+
+from __future__ import annotations
+
+import asyncio
+import enum
+import socket
+import struct
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from interfaces.link.conditions import Conditions, Service
+from interfaces.link.packets import PacketLog
+from interfaces.link.path import Path
+from interfaces.link.proxy.timer import Lateness, Timer
+from interfaces.link.stream import Stream
+from vrs.clock import Clock
+
+SEGMENT = 1460
+"""Most bytes in a packet."""
+WINDOW_BYTES = 1_048_576
+"""Bytes on their way, a direction of a connection, from which its sender waits."""
+WINDOW_PACKETS = 8192
+"""Packets on their way from which its sender waits."""
+CONNECT_TIMEOUT = 10.0
+"""Longest wait for the server to accept [s]."""
+
+
+class _Mark(enum.Enum):
+    """What ends a byte stream; it crosses the link behind the bytes."""
+
+    END = "end"
+    """The sender has closed its half."""
+    ABORT = "abort"
+    """The sender has reset the connection."""
+
+
+@dataclass(slots=True)
+class TcpCounts:
+    """What happened to connections."""
+
+    accepted: int = 0
+    refused: int = 0
+    """Beyond the limit on connections."""
+    unreachable: int = 0
+    """The server didn't accept."""
+    aborted: int = 0
+    """Ended by a reset from either side, or by a packet lost for good."""
+    most_at_once: int = 0
+
+
+class Way:
+    """What all connections share in one direction."""
+
+    def __init__(self, conditions: Conditions, path: Path, rng: np.random.Generator) -> None:
+        capacity = 2 * (WINDOW_PACKETS + WINDOW_BYTES // SEGMENT)
+        self._conditions = replace(conditions, service=Service.IN_ORDER, capacity=capacity)
+        self._path, self._rng = path, rng
+        self.log = PacketLog(keep=1)
+
+    def stream(self) -> Stream[bytes | _Mark]:
+        """A stream for one direction of one connection."""
+        return Stream(self._conditions, self._rng, path=self._path, log=self.log)
+
+
+class TcpProxy:
+    """Accepts connections and makes one to the server for each.
+
+    Args:
+        target: Host and port of the server, resolved.
+        ways: Client to server, and back.
+        clock: Tells the time of the link.
+        lateness: Told how late timers fire.
+        most: Most connections at once.
+    """
+
+    def __init__(
+        self, target: tuple[str, int], ways: tuple[Way, Way], clock: Clock, lateness: Lateness, most: int
+    ) -> None:
+        self.target, self.ways, self.clock, self.lateness = target, ways, clock, lateness
+        self.counts = TcpCounts()
+        self._most = most
+        self._server: asyncio.Server | None = None
+        self.connections: set[_Connection] = set()
+
+    async def start(self, listener: socket.socket) -> None:
+        """Accept connections on a bound socket."""
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(self._accept, sock=listener)
+
+    def close(self) -> None:
+        """Stop listening and abort every connection."""
+        if self._server is not None:
+            self._server.close()
+        for connection in tuple(self.connections):
+            connection.abort()
+
+    def _accept(self) -> asyncio.Protocol:
+        connection = _Connection(self)
+        if len(self.connections) >= self._most:
+            self.counts.refused += 1
+            connection.client.unwanted = True
+        else:
+            self.counts.accepted += 1
+            self.connections.add(connection)
+            self.counts.most_at_once = max(self.counts.most_at_once, len(self.connections))
+        return connection.client
+
+
+class _Connection:
+    """Two sockets and the two flows between them."""
+
+    def __init__(self, proxy: TcpProxy) -> None:
+        self._proxy = proxy
+        self.client, self.server = _End(self), _End(self)
+        there, back = (way.stream() for way in proxy.ways)
+        self._flows = (
+            _Flow(there, self.client, self.server, proxy), _Flow(back, self.server, self.client, proxy)
+        )  # fmt: skip
+        self.client.out, self.server.out = self._flows
+        self.client.into, self.server.into = self._flows[1], self._flows[0]
+        self._connecting: asyncio.Task[None] | None = None
+
+    def opened(self, end: _End) -> None:
+        """Make the connection to the server as soon as the client's stands; nothing is read before."""
+        if end is self.client:
+            end.hold()
+            self._connecting = asyncio.get_running_loop().create_task(self._connect())
+        else:
+            for flow in self._flows:
+                flow.throttle()
+
+    async def _connect(self) -> None:
+        host, port = self._proxy.target
+        try:
+            async with asyncio.timeout(CONNECT_TIMEOUT):
+                await asyncio.get_running_loop().create_connection(lambda: self.server, host, port)
+        except OSError:
+            self._proxy.counts.unreachable += 1
+            self.abort()
+
+    def closed(self) -> None:
+        """Forget the connection when both sockets are closed."""
+        if self.client.gone and self.server.gone:
+            self._forget()
+
+    def broken(self) -> None:
+        """End both halves at once: a reset has crossed the link, or a packet is lost for good."""
+        self._proxy.counts.aborted += 1
+        self.abort()
+
+    def abort(self) -> None:
+        """Reset both sockets."""
+        if self._connecting is not None:
+            self._connecting.cancel()
+        self.client.reset()
+        self.server.reset()
+        self._forget()
+
+    def _forget(self) -> None:
+        for flow in self._flows:
+            flow.stop()
+        self._proxy.connections.discard(self)
+
+
+class _Flow:
+    """One direction of one connection."""
+
+    def __init__(self, stream: Stream[bytes | _Mark], source: _End, sink: _End, proxy: TcpProxy) -> None:
+        self._stream, self._source, self._sink, self._clock = stream, source, sink, proxy.clock
+        self._timer = Timer(proxy.clock, self.pump, proxy.lateness)
+        self._bytes = 0
+        self._stopped = False
+
+    def feed(self, data: bytes) -> None:
+        """Send bytes that the source has given."""
+        for start in range(0, len(data), SEGMENT):
+            self._send(data[start : start + SEGMENT])
+        self.pump()
+
+    def end(self, mark: _Mark) -> None:
+        """Send word that the source has ended."""
+        self._send(mark)
+        self.pump()
+
+    def _send(self, payload: bytes | _Mark) -> None:
+        size = len(payload) if isinstance(payload, bytes) else 0
+        self._bytes += size
+        self._stream.send(payload, self._clock.now(), size)
+
+    def pump(self) -> None:
+        """Hand the sink what has arrived, and wait for the next."""
+        if self._stopped:
+            return
+        for delivery in self._stream.receive(self._clock.now()):
+            if isinstance(delivery.payload, bytes):
+                self._bytes -= len(delivery.payload)
+            self._sink.take(delivery.payload)
+        if self._stream.lost and not self._stopped:
+            self._sink.connection.broken()
+        if not self._stopped:
+            self._timer.set(self._stream.next_deadline())
+            self.throttle()
+
+    def throttle(self) -> None:
+        """Let the source wait while too much is on its way, or the sink doesn't read."""
+        full = self._bytes >= WINDOW_BYTES or self._stream.in_flight() >= WINDOW_PACKETS
+        if full or self._sink.blocked or not self._sink.open:
+            self._source.hold()
+        else:
+            self._source.go_on()
+
+    def stop(self) -> None:
+        """Drop what is on its way."""
+        self._stopped = True
+        self._timer.set(None)
+
+
+class _End(asyncio.Protocol):
+    """One socket of a connection."""
+
+    out: _Flow
+    """What it reads goes here."""
+    into: _Flow
+    """What comes from here it writes."""
+
+    def __init__(self, connection: _Connection) -> None:
+        self.connection = connection
+        self.unwanted = self.open = self.gone = self.blocked = False
+        self._heard_end = self._said_end = False
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin; a connection beyond the limit is reset."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport, self.open = transport, True
+        if self.unwanted:
+            self.reset()
+        else:
+            self.connection.opened(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Pass bytes on."""
+        self.out.feed(data)
+
+    def eof_received(self) -> bool:
+        """Pass on that the peer has closed its half; ours stays open."""
+        self._heard_end = True
+        self.out.end(_Mark.END)
+        self._close_when_done()
+        return True
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Pass on a reset; anything else has been passed on before."""
+        self.open, self.gone = False, True
+        if exc is not None and not self.unwanted and not (self._heard_end and self._said_end):
+            self.out.end(_Mark.ABORT)
+        else:
+            self.connection.closed()
+
+    def pause_writing(self) -> None:
+        """The peer doesn't read: what feeds us waits."""
+        self.blocked = True
+        self.into.throttle()
+
+    def resume_writing(self) -> None:
+        """The peer reads again."""
+        self.blocked = False
+        self.into.throttle()
+
+    def take(self, payload: bytes | _Mark) -> None:
+        """Write bytes, or do what a mark says; a closed socket ignores bytes."""
+        if payload is _Mark.ABORT:
+            self.connection.broken()
+        elif self.open and self._transport is not None:
+            if isinstance(payload, bytes):
+                self._transport.write(payload)
+            else:
+                self._said_end = True
+                if self._transport.can_write_eof():
+                    self._transport.write_eof()
+                self._close_when_done()
+
+    def hold(self) -> None:
+        """Read no more for now."""
+        if self.open and not self._heard_end and self._transport is not None:
+            self._transport.pause_reading()
+
+    def go_on(self) -> None:
+        """Read again; at the end there is nothing more to read."""
+        if self.open and not self._heard_end and self._transport is not None:
+            self._transport.resume_reading()
+
+    def reset(self) -> None:
+        """Close so that the peer sees a reset."""
+        if self._transport is not None and not self.gone:
+            self.open = False
+            sock = self._transport.get_extra_info("socket")
+            if sock is not None and sock.fileno() >= 0:
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            self._transport.abort()
+        self.unwanted = True
+
+    def _close_when_done(self) -> None:
+        if self._heard_end and self._said_end and self._transport is not None:
+            self.open = False
+            self._transport.close()

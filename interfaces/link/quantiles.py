@@ -1,0 +1,172 @@
+"""Exact quantiles and mean of the newest values: a sliding window, bounded in number and in age."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right, insort
+from collections import deque
+
+from vrs.commands import finite
+from vrs.errors import InvalidValueError
+
+MAX_CAPACITY = 100_000
+LARGEST = 1e12
+"""Largest magnitude of a value."""
+_BLOCK = 512
+"""Most values in a block: a memory move of 4 KiB costs less than one comparison in a tree of Python objects."""
+_FRACTION_BITS = 64
+_SCALE = 2.0**_FRACTION_BITS
+
+
+class SlidingQuantiles:
+    """Order statistics of the newest values.
+
+    An update takes O(log n) comparisons. The mean comes from a fixed-point sum: what enters and leaves cancels
+    exactly, and nothing accumulates, however long it runs.
+
+    Args:
+        capacity: Most values kept, in [1, 100,000].
+        horizon: Age at which a value leaves the window [s], > 0; infinite for never. Ages are as of the newest
+            value: through an outage the window keeps what it has.
+
+    Raises:
+        InvalidValueError: If an argument is out of range.
+    """
+
+    def __init__(self, capacity: int, horizon: float = math.inf) -> None:
+        if isinstance(capacity, bool) or not isinstance(capacity, int) or not 1 <= capacity <= MAX_CAPACITY:
+            raise InvalidValueError("capacity", capacity, f"an integer in [1, {MAX_CAPACITY}]")
+        if not horizon > 0:
+            raise InvalidValueError("horizon", horizon, "seconds > 0")
+        self._capacity, self._horizon = capacity, horizon
+        self._newest = -math.inf
+        self._values: deque[tuple[float, float]] = deque()
+        self._ordered = _Ordered()
+        self._sum = 0
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def add(self, value: float, *, now: float) -> None:
+        """Take in a value.
+
+        Args:
+            value: Any finite number, at most 1e12 in size.
+            now: Time [s], not before that of the value added last.
+
+        Raises:
+            InvalidValueError: If the value is out of range, or now isn't finite or runs back.
+        """
+        value, now = finite("value", value), finite("now", now, "finite seconds")
+        if abs(value) > LARGEST:
+            raise InvalidValueError("value", value, f"at most {LARGEST:g} in size")
+        if now < self._newest:
+            raise InvalidValueError("now", now, f"at least {self._newest}, the time of the last value")
+        self._newest = now
+        values = self._values
+        while values and (len(values) == self._capacity or now - values[0][0] >= self._horizon):
+            self._forget(values.popleft()[1])
+        values.append((now, value))
+        self._ordered.add(value)
+        self._sum += int(value * _SCALE)
+
+    def clear(self) -> None:
+        """Forget every value, as when the clock that they were measured with has stepped."""
+        self._values.clear()
+        self._ordered = _Ordered()
+        self._sum = 0
+
+    @property
+    def mean(self) -> float | None:
+        """Arithmetic mean; None of an empty window."""
+        return self._sum / (len(self._values) << _FRACTION_BITS) if self._values else None
+
+    @property
+    def median(self) -> float | None:
+        """The middle value, or the mean of the two in the middle; None of an empty window."""
+        return self.quantile(0.5)
+
+    @property
+    def minimum(self) -> float | None:
+        """The smallest value; None of an empty window."""
+        return self._ordered[0] if self._values else None
+
+    @property
+    def maximum(self) -> float | None:
+        """The largest value; None of an empty window."""
+        return self._ordered[len(self._values) - 1] if self._values else None
+
+    def quantile(self, share: float) -> float | None:
+        """Value that the given share of the window doesn't exceed, linear between neighbours (as `numpy.quantile`).
+
+        Args:
+            share: In [0, 1].
+
+        Returns:
+            The quantile; None of an empty window.
+
+        Raises:
+            InvalidValueError: If share is out of range.
+
+        Source: Hyndman and Fan, Sample quantiles in statistical packages (1996), definition 7.
+        """
+        if not 0 <= share <= 1:
+            raise InvalidValueError("share", share, "in [0, 1]")
+        if not self._values:
+            return None
+        place = (len(self._values) - 1) * share
+        index = int(place)
+        low, rest = self._ordered[index], place - index
+        if rest == 0:
+            return low
+        high = self._ordered[index + 1]
+        # From the nearer neighbour, as NumPy does: then the quantile never decreases with the share.
+        return low + (high - low) * rest if rest < 0.5 else high - (high - low) * (1 - rest)
+
+    def _forget(self, value: float) -> None:
+        self._ordered.remove(value)
+        self._sum -= int(value * _SCALE)
+
+
+class _Ordered:
+    """Sorted numbers in blocks: a value is put in or taken out of one short list."""
+
+    def __init__(self) -> None:
+        self._blocks: list[list[float]] = []
+        self._least: list[float] = []
+
+    def add(self, value: float) -> None:
+        if not self._blocks:
+            self._blocks, self._least = [[value]], [value]
+            return
+        i = max(0, bisect_right(self._least, value) - 1)
+        block = self._blocks[i]
+        insort(block, value)
+        if len(block) > _BLOCK:
+            self._blocks[i : i + 1] = [block[: _BLOCK // 2], block[_BLOCK // 2 :]]
+            self._least[i : i + 1] = [block[0], block[_BLOCK // 2]]
+        else:
+            self._least[i] = block[0]
+
+    def remove(self, value: float) -> None:
+        """Take out one of the numbers equal to value, which must be there."""
+        i = bisect_right(self._least, value) - 1
+        block = self._blocks[i]
+        del block[bisect_left(block, value)]
+        if not block:
+            del self._blocks[i], self._least[i]
+            return
+        self._least[i] = block[0]
+        if len(block) < _BLOCK // 4 and len(self._blocks) > 1:
+            i = max(i, 1)
+            joined = self._blocks[i - 1] + self._blocks[i]
+            if len(joined) <= _BLOCK // 2:
+                self._blocks[i - 1 : i + 1] = [joined]
+                self._least[i - 1 : i + 1] = joined[:1]
+
+    def __getitem__(self, index: int) -> float:
+        for block in self._blocks:
+            if index < len(block):
+                return block[index]
+            index -= len(block)
+        raise IndexError(index)

@@ -1,0 +1,379 @@
+"""Round trips and relative one-way delays: probes, their echoes, and what these say about the link.
+
+The prober sends `Probe`s, the other side answers each with `Probe.echo`, the prober matches them. The stamps are
+NTP's: t0 sent by A, t1 received by B, t2 sent by B, t3 received by A; t0 and t3 in A's clock, t1 and t2 in B's.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from interfaces.link.quantiles import LARGEST, MAX_CAPACITY, SlidingQuantiles
+from vrs.commands import finite
+from vrs.errors import InvalidValueError
+
+SEQUENCE_NUMBERS = 1 << 16
+"""Sequence numbers run from 0 to one less than this, and begin again."""
+SESSIONS = 1 << 32
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A question that the other side answers at once."""
+
+    session: int
+    """Who asks, in [0, 2**32): random, so that echoes of an earlier life aren't taken for ours."""
+    sequence: int
+    """In [0, 65536), wrapping."""
+    sent: float
+    """t0: time of sending in the prober's clock [s]."""
+
+    def echo(self, received: float, replied: float | None = None) -> Echo:
+        """Answer the probe.
+
+        The two stamps must belong to one unbroken run of the clock: read it once (the default), or add the time
+        since then of a clock that doesn't step. A step between them would look like a faster link.
+
+        Args:
+            received: t1, time of arrival in the answering side's clock [s].
+            replied: t2, time of answering in the same clock [s], ≥ received; by default received.
+        """
+        return Echo(self.session, self.sequence, self.sent, received, received if replied is None else replied)
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """The answer to a probe."""
+
+    session: int
+    sequence: int
+    sent: float
+    """t0, as the probe had it [s]."""
+    received: float
+    """t1 in the answering side's clock [s]."""
+    replied: float
+    """t2 in the answering side's clock [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoundTrip:
+    """A probe that came back."""
+
+    sent: float
+    """t0 [s]."""
+    received: float
+    """t1 [s], in the other side's clock."""
+    replied: float
+    """t2 [s], in the other side's clock, ≥ received."""
+    arrived: float
+    """t3 [s], ≥ sent."""
+
+    @property
+    def delay(self) -> float:
+        """Time on the link, there and back [s], ≥ 0: (t3 − t0) − (t2 − t1)."""
+        return max(0.0, (self.arrived - self.sent) - (self.replied - self.received))
+
+
+class Refusal(enum.StrEnum):
+    """Why an echo was of no use."""
+
+    FOREIGN = "foreign"
+    """It answers somebody else's probe."""
+    UNEXPECTED = "unexpected"
+    """No such probe is in flight: a duplicate, or later than the timeout."""
+    IMPOSSIBLE = "impossible"
+    """Its stamps can't be true: not finite, beyond 1e12 s, answered before received, or held longer than away."""
+
+
+@dataclass(frozen=True, slots=True)
+class WindowConfig:
+    """What statistics of delays look back on."""
+
+    capacity: int = 1000
+    """Most delays kept, in [1, 100,000]."""
+    horizon: float = 60.0
+    """Age at which a delay is forgotten [s], > 0; infinite for never."""
+    smoothing: float = 16.0
+    """Time constant of the jitter [messages], ≥ 1; RFC 3550 has 16."""
+
+    def __post_init__(self) -> None:
+        capacity = self.capacity
+        if isinstance(capacity, bool) or not isinstance(capacity, int) or not 1 <= capacity <= MAX_CAPACITY:
+            raise InvalidValueError("capacity", capacity, f"an integer in [1, {MAX_CAPACITY}]")
+        if not self.horizon > 0:
+            raise InvalidValueError("horizon", self.horizon, "seconds > 0")
+        if not 1 <= self.smoothing < math.inf:
+            raise InvalidValueError("smoothing", self.smoothing, "a finite number of messages, at least 1")
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeConfig:
+    """How a link is probed."""
+
+    period: float = 0.1
+    """Time between probes [s], > 0."""
+    timeout: float = 5.0
+    """Time after which a probe counts as lost [s], > 0; a later echo is refused."""
+    most_in_flight: int = 256
+    """Most probes that wait for their echo, in [1, 32768]; no more are sent meanwhile."""
+    window: WindowConfig = field(default_factory=WindowConfig)
+    """What the statistics look back on."""
+
+    def __post_init__(self) -> None:
+        for name in ("period", "timeout"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise InvalidValueError(name, getattr(self, name), "finite seconds > 0")
+        most = self.most_in_flight
+        if isinstance(most, bool) or not isinstance(most, int) or not 1 <= most <= SEQUENCE_NUMBERS // 2:
+            raise InvalidValueError("most_in_flight", most, f"an integer in [1, {SEQUENCE_NUMBERS // 2}]")
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStatistics:
+    """What a round-trip estimator knows, at one moment; None where nothing has come back yet."""
+
+    count: int
+    """Round trips in the window."""
+    median: float | None
+    """[s]."""
+    mean: float | None
+    """[s]."""
+    minimum: float | None
+    """[s]."""
+    maximum: float | None
+    """[s]."""
+    interquartile_range: float | None
+    """Between the quarters of the window [s]."""
+    jitter: float
+    """Smoothed size of the change from one round trip to the next [s]."""
+    loss_share: float | None
+    """Probes lost among the newest that were decided, as many as the window holds, in [0, 1]."""
+    sent: int
+    """Probes sent so far."""
+    returned: int
+    """Probes that came back so far."""
+    lost: int
+    """Probes that timed out so far."""
+    refused: int
+    """Echoes refused so far."""
+
+
+class DelayStatistics(SlidingQuantiles):
+    """Quantiles, mean and jitter of a run of delays [s], all of one kind."""
+
+    def __init__(self, config: WindowConfig | None = None) -> None:
+        self.config = config or WindowConfig()
+        super().__init__(self.config.capacity, self.config.horizon)
+        self._jitter = 0.0
+        self._last: float | None = None
+
+    def add(self, value: float, *, now: float) -> None:
+        """Take in a delay [s]; see `SlidingQuantiles.add`."""
+        super().add(value, now=now)
+        if self._last is not None:
+            self._jitter += (abs(value - self._last) - self._jitter) / self.config.smoothing
+        self._last = value
+
+    def clear(self) -> None:
+        """Forget everything, as when the clock that the delays were measured with has stepped."""
+        super().clear()
+        self._jitter, self._last = 0.0, None
+
+    @property
+    def jitter(self) -> float:
+        """Interarrival jitter [s]: J ← J + (|D| − J) / 16, D the change from one delay to the next to arrive.
+
+        A constant offset between the clocks of the two sides cancels. Source: RFC 3550, section 6.4.1.
+        """
+        return self._jitter
+
+    @property
+    def interquartile_range(self) -> float | None:
+        """Quantile 0.75 less quantile 0.25 [s]: jitter that outliers don't reach; None of an empty window."""
+        high, low = self.quantile(0.75), self.quantile(0.25)
+        return None if high is None or low is None else high - low
+
+
+class RelativeDelays(DelayStatistics):
+    """One-way delays up to an unknown constant: the receiver's stamp less the sender's.
+
+    The offset between the two clocks shifts every delay and every quantile alike. A play-out needs the receiver's
+    time at which the given share of messages have come: the sender's stamp plus the quantile.
+    Drift of 100 ppm moves a quantile by 6 ms in a minute: keep the horizon short. After a step of either clock call
+    `clear`, or hand over stamps that `ClockSync.unstepped` has mended.
+    """
+
+    def receive(self, sent: float, *, now: float) -> float:
+        """Take note of a message that has arrived.
+
+        Args:
+            sent: Its stamp in the sender's clock [s].
+            now: Time of arrival in the receiver's clock [s], not before that of the last.
+
+        Returns:
+            The relative delay [s]; negative where the sender's clock is far ahead.
+
+        Raises:
+            InvalidValueError: If a time isn't finite, or now runs back.
+        """
+        delay = finite("now", now, "finite seconds") - finite("sent", sent, "finite seconds")
+        self.add(delay, now=now)
+        return delay
+
+    def spread(self, share: float) -> float | None:
+        """Quantile above the smallest delay of the window [s], ≥ 0: the offset cancels; None of an empty window."""
+        high, low = self.quantile(share), self.minimum
+        return None if high is None or low is None else high - low
+
+
+class RoundTripEstimator:
+    """Probes a link and keeps statistics of the round trips.
+
+    A state machine without input or output: when `next_deadline` has come call `to_send`, and hand every echo to
+    `receive`. Each probe counts once, whatever the link does to it: in order or not, once or twice, late or never.
+
+    Args:
+        session: Random number in [0, 2**32), new for each life of an estimator.
+        config: How to probe.
+        start: When the first probe is due [s].
+
+    Raises:
+        InvalidValueError: If session or start is out of range.
+    """
+
+    def __init__(self, session: int, config: ProbeConfig | None = None, *, start: float = 0.0) -> None:
+        if isinstance(session, bool) or not isinstance(session, int) or not 0 <= session < SESSIONS:
+            raise InvalidValueError("session", session, f"an integer in [0, {SESSIONS})")
+        self.config = config or ProbeConfig()
+        self._session = session
+        self._due = finite("start", start, "finite seconds")
+        self._now = -math.inf
+        self._sequence = 0
+        self._in_flight: dict[int, float] = {}
+        self._delays = DelayStatistics(self.config.window)
+        self._fates: deque[bool] = deque()
+        self._recently_lost = 0
+        self._sent = self._returned = self._lost = self._refused = 0
+
+    def next_deadline(self) -> float:
+        """When `to_send` has something to do [s]: a probe is due or one in flight is lost. May have passed."""
+        if not self._in_flight:
+            return self._due
+        expiry = next(iter(self._in_flight.values())) + self.config.timeout
+        return expiry if len(self._in_flight) >= self.config.most_in_flight else min(expiry, self._due)
+
+    def to_send(self, *, now: float) -> Probe | None:
+        """Give up on probes whose time is over, and give the next if it's due: one, however late the call.
+
+        Args:
+            now: Time [s], not before that of any call before.
+
+        Raises:
+            InvalidValueError: If now isn't finite or runs back.
+        """
+        self._advance(now)
+        if now < self._due or len(self._in_flight) >= self.config.most_in_flight:
+            return None
+        while self._sequence in self._in_flight:
+            self._sequence = (self._sequence + 1) % SEQUENCE_NUMBERS
+        probe = Probe(self._session, self._sequence, now)
+        self._in_flight[self._sequence] = now
+        self._sequence = (self._sequence + 1) % SEQUENCE_NUMBERS
+        self._sent += 1
+        due = self._due + self.config.period
+        self._due = due if due > now else now + self.config.period
+        return probe
+
+    def receive(self, echo: Echo, *, now: float) -> RoundTrip | Refusal:
+        """Take an echo.
+
+        Args:
+            echo: From the link.
+            now: Time of its arrival [s], not before that of any call before.
+
+        Returns:
+            The round trip, also for `ClockSync`; or why the echo was refused, nothing but a counter being changed.
+
+        Raises:
+            InvalidValueError: If now isn't finite or runs back.
+        """
+        self._advance(now)
+        refusal = self._refuse(echo, now)
+        if refusal is not None:
+            self._refused += 1
+            return refusal
+        trip = RoundTrip(self._in_flight.pop(echo.sequence), echo.received, echo.replied, now)
+        self._returned += 1
+        self._decide(lost=False)
+        self._delays.add(trip.delay, now=now)
+        return trip
+
+    @property
+    def median(self) -> float | None:
+        """Median round trip of the window [s]; None before the first."""
+        return self._delays.median
+
+    @property
+    def mean(self) -> float | None:
+        """Mean round trip of the window [s]; None before the first."""
+        return self._delays.mean
+
+    def quantile(self, share: float) -> float | None:
+        """Round trip that the given share of those in the window doesn't exceed [s]; None before the first.
+
+        Raises:
+            InvalidValueError: If share lies outside [0, 1].
+        """
+        return self._delays.quantile(share)
+
+    def statistics(self) -> LinkStatistics:
+        """Everything known now."""
+        delays = self._delays
+        return LinkStatistics(
+            count=len(delays),
+            median=delays.median,
+            mean=delays.mean,
+            minimum=delays.minimum,
+            maximum=delays.maximum,
+            interquartile_range=delays.interquartile_range,
+            jitter=delays.jitter,
+            loss_share=self._recently_lost / len(self._fates) if self._fates else None,
+            sent=self._sent,
+            returned=self._returned,
+            lost=self._lost,
+            refused=self._refused,
+        )
+
+    def _refuse(self, echo: Echo, now: float) -> Refusal | None:
+        if echo.session != self._session:
+            return Refusal.FOREIGN
+        sent = self._in_flight.get(echo.sequence)
+        if sent is None or sent != echo.sent:
+            return Refusal.UNEXPECTED
+        if not (abs(echo.received) <= LARGEST and abs(echo.replied) <= LARGEST):
+            return Refusal.IMPOSSIBLE
+        held = echo.replied - echo.received
+        # The other clock may run faster than ours, by less than a hundredth; a reading has its rounding.
+        rounding = 4 * math.ulp(max(abs(echo.received), abs(echo.replied), abs(now)))
+        return None if 0 <= held <= (now - sent) * 1.01 + rounding else Refusal.IMPOSSIBLE
+
+    def _advance(self, now: float) -> None:
+        if finite("now", now, "finite seconds") < self._now:
+            raise InvalidValueError("now", now, f"at least {self._now}, the time of the last call")
+        self._now = now
+        while self._in_flight:
+            sequence, sent = next(iter(self._in_flight.items()))
+            if now < sent + self.config.timeout:
+                break
+            del self._in_flight[sequence]
+            self._lost += 1
+            self._decide(lost=True)
+
+    def _decide(self, *, lost: bool) -> None:
+        if len(self._fates) == self.config.window.capacity:
+            self._recently_lost -= self._fates.popleft()
+        self._fates.append(lost)
+        self._recently_lost += lost
