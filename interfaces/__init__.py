@@ -1,1 +1,8 @@
 """Everything that joins a person or a machine to a robot."""
+
+from interfaces.designer import Designer
+from interfaces.observer import Observer
+from interfaces.supervisor import Supervisor
+from interfaces.viewer import Viewer
+
+__all__ = ["Designer", "Observer", "Supervisor", "Viewer"]

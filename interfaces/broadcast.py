@@ -1,0 +1,203 @@
+"""The streaming server near the engine: frames at a rate, each made once and shared by many viewers.
+
+Source: Doulgeri, Zikos, Delopoulos, sections III and VI-B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+
+from interfaces.forecasts import WINDOW, Forecasts
+from interfaces.journal import Journal
+from interfaces.messages import Broadcast, Frame, FrameStatus, Verdict, Verdicts
+from vrs.commands import finite
+from vrs.engine import Engine
+from vrs.errors import InvalidValueError
+from vrs.model import frozen_array
+
+MOST_VIEWERS = 1024
+"""Viewers of one broadcaster."""
+
+RANGES = 64
+"""Most ranges of falsified frames in a message."""
+
+DUE = 2e-9
+"""How much too early [s] a deadline counts as reached: engine times are whole nanoseconds."""
+
+
+class Slot:
+    """A viewer's place: the newest frame, and nothing else, however slow the viewer is."""
+
+    def __init__(self) -> None:
+        self._newest: Broadcast | None = None
+        self.missed = 0
+        """Frames that were never taken."""
+
+    def put(self, message: Broadcast) -> None:
+        """Put the newest frame in place of what's there."""
+        self.missed += self._newest is not None
+        self._newest = message
+
+    def take(self) -> Broadcast | None:
+        """Take the newest frame; None where there's none that wasn't taken."""
+        message, self._newest = self._newest, None
+        return message
+
+    def __bool__(self) -> bool:
+        return self._newest is not None
+
+
+class Broadcaster:
+    """Transmits g(t_c + lead) periodically, t_c being the engine's time.
+
+    With `lead` = D_f + D_b this is the paper's predicted transmission. Each frame says whether it's predicted, and
+    later messages say what became of it.
+    """
+
+    def __init__(self, source: Engine | Journal, *, rate: float, lead: float = 0.0) -> None:
+        """Begin at the next `advance`.
+
+        Args:
+            source: The engine, or its journal where others serve it too.
+            rate: Frames a second, 0.1 to 1000.
+            lead: How far ahead of the engine's time the frames are [s], −60 to 60; it may be changed.
+
+        Raises:
+            InvalidValueError: If rate or lead is out of range.
+        """
+        self.rate = finite("rate", rate, "0.1 to 1000 frames a second")
+        if not 0.1 <= self.rate <= 1000:
+            raise InvalidValueError("rate", rate, "0.1 to 1000 frames a second")
+        self.lead = lead
+        self.journal = source if isinstance(source, Journal) else Journal(source)
+        self._edit = self.journal.look()
+        self._forecasts = Forecasts()
+        self._falsified: list[Verdict] = []
+        self._ranges: tuple[tuple[int, int, int | None], ...] = ()
+        self._since = 1
+        self._slots: list[Slot] = []
+        self._begun: float | None = None
+        self._beat = 0
+        self.number = 0
+        """Number of the newest frame."""
+        self.skipped = 0
+        """Frames that weren't made because `advance` came too late for them."""
+
+    @property
+    def lead(self) -> float:
+        """How far ahead of the engine's time the frames are [s]."""
+        return self._lead
+
+    @lead.setter
+    def lead(self, value: float) -> None:
+        lead = finite("lead", value, "−60 to 60 s")
+        if abs(lead) > 60:
+            raise InvalidValueError("lead", value, "−60 to 60 s")
+        self._lead = lead
+
+    @property
+    def share_falsified(self) -> float | None:
+        """Share of the predicted frames with a verdict that a command falsified; None before the first verdict."""
+        return self._forecasts.share_falsified
+
+    @property
+    def viewers(self) -> int:
+        """How many viewers there are."""
+        return len(self._slots)
+
+    def join(self) -> Slot:
+        """Give a viewer a place.
+
+        Raises:
+            InvalidValueError: If there are too many.
+        """
+        if len(self._slots) >= MOST_VIEWERS:
+            raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_VIEWERS} a broadcaster")
+        slot = Slot()
+        self._slots.append(slot)
+        return slot
+
+    def leave(self, slot: Slot) -> None:
+        """Give a place back; one that was given back already is none."""
+        self._slots = [other for other in self._slots if other is not slot]
+
+    def next_deadline(self) -> float | None:
+        """When the next frame is due [s], in the engine's time; None before the first `advance`."""
+        return None if self._begun is None else self._begun + self._beat / self.rate
+
+    def advance(self, *, now: float) -> tuple[Broadcast, ...]:
+        """Make the frame that is due, and put it into every slot.
+
+        Args:
+            now: The engine's time [s].
+
+        Returns:
+            The message, or nothing. Frames that are overdue aren't made up for: there's never a burst.
+        """
+        if self._begun is None:
+            self._begun = now
+        due = self._begun + self._beat / self.rate
+        if now < due - DUE:
+            return ()
+        late = int((now - due + DUE) * self.rate)
+        self.skipped += late
+        self._beat += 1 + late
+        message = self._make(now)
+        for slot in self._slots:
+            slot.put(message)
+        return (message,)
+
+    def _make(self, now: float) -> Broadcast:
+        self._catch_up()
+        t = now + self._lead
+        q = frozen_array(self.journal.engine.timeline.sample(t))
+        self.number += 1
+        status = self._forecasts.add(self.number, t, q, now=self.journal.past)
+        frame = Frame(self.number, t, now, q, status)
+        through = int(min(self._forecasts.oldest - 1, self.number))
+        since = max(self._since, self.number - WINDOW + 1, self._forecasts.forgotten + 1)
+        return Broadcast(frame, Verdicts(since, through, self._ranges))
+
+    def _catch_up(self) -> None:
+        found = 0
+        newest = self.journal.look()
+        for edit in self.journal.since(self._edit):
+            self._forecasts.settle(edit.at)
+            verdicts = self._forecasts.edited(edit.timeline, edit.culprit)
+            found += len(verdicts)
+            self._falsified.extend(verdicts)
+        self._edit = newest
+        self._forecasts.settle(self.journal.past)
+        oldest = self.number + 1 - WINDOW
+        if found or (self._ranges and self._ranges[0][0] < oldest):
+            self._falsified = [verdict for verdict in self._falsified if verdict.number >= oldest]
+            self._ranges, left_out = ranges(self._falsified)
+            self._since = max(self._since, left_out + 1)
+
+    def status(self, number: int) -> Verdict | None:
+        """What became of a predicted frame; None while that's open, if it never was, or where it's forgotten."""
+        self._catch_up()
+        return self._forecasts.verdict(number)
+
+
+def ranges(falsified: Iterable[Verdict]) -> tuple[tuple[tuple[int, int, int | None], ...], int]:
+    """Verdicts as ranges of numbers, the newest 64; and the highest number that's left out, or 0."""
+    found: list[tuple[int, int, int | None]] = []
+    for verdict in sorted(falsified, key=lambda verdict: verdict.number):
+        if found and found[-1][1] == verdict.number - 1 and found[-1][2] == verdict.falsified_by:
+            found[-1] = found[-1][0], verdict.number, verdict.falsified_by
+        else:
+            found.append((verdict.number, verdict.number, verdict.falsified_by))
+    left_out = max((last for _, last, _ in islice(found, max(len(found) - RANGES, 0))), default=0)
+    return tuple(found[-RANGES:]), left_out
+
+
+def status_of(number: int, verdicts: Verdicts) -> Verdict | None:
+    """What a message says of a frame that was predicted; None where it says nothing."""
+    for first, last, command_id in verdicts.falsified:
+        if first <= number <= last:
+            return Verdict(number, FrameStatus.FALSIFIED, command_id)
+    if verdicts.since <= number <= verdicts.through:
+        return Verdict(number, FrameStatus.CONFIRMED)
+    return None

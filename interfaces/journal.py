@@ -1,0 +1,132 @@
+"""The edits of an engine's timeline, one by one: who changed what, for all that serve readers of it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+
+from interfaces.changes import difference
+from interfaces.messages import Change
+from vrs.commands import Command
+from vrs.engine import Engine
+from vrs.errors import UnknownCommandError
+from vrs.receipt import Receipt, Status
+from vrs.timeline import Timeline
+
+KEPT = 256
+"""Edits that are kept. Timelines share what they have in common."""
+
+NAMES = 1000
+"""Commands that a receipt names on the wire, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edit:
+    """A timeline, and what made it of the one before."""
+
+    number: int
+    """Counts edits, from 1."""
+    before: Timeline
+    timeline: Timeline
+    command_id: int | None
+    """The command that made it; None where the journal didn't see that."""
+    at: float
+    """The engine's time [s]; −∞ offline."""
+    others: tuple[tuple[float, int], ...] = ()
+    """Commands that came meanwhile and begin at these times [s], where the journal saw only what they made."""
+
+    @cached_property
+    def change(self) -> Change | None:
+        """The edit as a message; None where the timeline begins elsewhere now."""
+        return difference(self.before, self.timeline, self.at, edit=self.number, command_id=self.command_id)
+
+    def culprit(self, t: float) -> int | None:
+        """The command by which this edit changed what happens at t [s].
+
+        Where several commands made it that the journal didn't see, the first of them that begins by then.
+        """
+        if self.command_id is not None:
+            return self.command_id
+        begun = [command_id for start, command_id in self.others if start <= t]
+        if begun:
+            return begun[0]
+        index = self.timeline.index_at(t)
+        owner = self.timeline.owner_of(index) if 0 <= index < len(self.timeline) else 0
+        return owner or None
+
+
+class Journal:
+    """The newest edits of one engine.
+
+    What goes through `execute` and `undo` is written down exactly. What others do to the engine is found when
+    somebody looks, as one edit for all that was done since.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self._timeline = engine.timeline
+        ids = (receipt.command_id for receipt in engine.receipts)
+        owners = self._timeline.owners(0, len(self._timeline))
+        self._newest = max((*ids, *owners), default=0)
+        self._edits: deque[Edit] = deque(maxlen=KEPT)
+        self.number = 0
+        """Number of the newest edit; 0 before the first."""
+
+    @property
+    def past(self) -> float:
+        """What lies before this time doesn't change any more [s]: the present; −∞ for an offline engine."""
+        return -math.inf if self.engine.clock is None else self.engine.now()
+
+    def execute(self, command: Command | None) -> Receipt | None:
+        """Let the engine carry out a command, or take back its newest where it's None.
+
+        Returns:
+            The receipt; None where there is none.
+
+        Raises:
+            VrsError: As `Engine.execute`.
+        """
+        self.look()
+        result = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
+        receipt = result if isinstance(result, Receipt) else None
+        self._newest = max(self._newest, 0 if receipt is None else receipt.command_id)
+        if self.engine.timeline is not self._timeline:
+            self._write(None if receipt is None else receipt.command_id, ())
+        return receipt
+
+    def look(self) -> int:
+        """Find out what others did to the engine; the number of the newest edit."""
+        if self.engine.timeline is not self._timeline:
+            begun = []
+            while True:
+                try:
+                    receipt = self.engine.receipt(self._newest + 1)
+                except UnknownCommandError:
+                    break
+                self._newest += 1
+                if receipt.status is not Status.REJECTED and receipt.execute_at is not None:
+                    begun.append((receipt.execute_at, receipt.command_id))
+            alone = self.engine.timeline.version == self._timeline.version + 1 and len(begun) == 1
+            self._write(begun[0][1] if alone else None, () if alone else tuple(begun))
+        return self.number
+
+    def _write(self, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
+        before, self._timeline = self._timeline, self.engine.timeline
+        self.number += 1
+        self._edits.append(Edit(self.number, before, self._timeline, command_id, self.past, others))
+
+    def since(self, number: int) -> tuple[Edit, ...]:
+        """The edits after one, oldest first; where they aren't all kept, the newest alone, by nobody known."""
+        missing = self.number - number
+        if missing > len(self._edits):
+            return (replace(self._edits[-1], command_id=None, others=()),)
+        return tuple(islice(self._edits, len(self._edits) - missing, None)) if missing > 0 else ()
+
+
+def portable(receipt: Receipt) -> Receipt:
+    """A receipt that holds nothing of the engine: names are found, the first 1000 of each kind."""
+    names = receipt.shifted[:NAMES], receipt.superseded[:NAMES]
+    return replace(receipt, shifted_names=names[0], superseded_names=names[1])

@@ -1,0 +1,278 @@
+"""The server submodule: what resides near the engine and serves one client of it.
+
+Source: Doulgeri, Zikos, Delopoulos, section III.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from collections.abc import Sequence
+from dataclasses import replace
+
+from interfaces.broadcast import DUE, MOST_VIEWERS, Broadcaster, Slot
+from interfaces.changes import parts
+from interfaces.forecasts import Forecasts
+from interfaces.journal import Journal, portable
+from interfaces.messages import (
+    Answer,
+    Ask,
+    Follow,
+    Form,
+    Frame,
+    FrameStatus,
+    Order,
+    Outcome,
+    Pulse,
+    Reply,
+    Request,
+    Scene,
+    Verdict,
+    Want,
+)
+from vrs.commands import Stop
+from vrs.engine import Engine
+from vrs.errors import InvalidValueError, VrsError
+from vrs.model import frozen_array
+from vrs.timeline import Timeline
+
+BACKLOG = 256
+"""Orders that wait for an earlier one that's still under way, at most."""
+
+REMEMBERED = 1024
+"""Outcomes and answers that are kept, to be sent again."""
+
+WATCHED = 64
+"""Newest outcomes that are sent again when later commands change them."""
+
+OUTBOX = 1024
+"""Replies that wait to be sent; the oldest is dropped first, and asked for again by the client."""
+
+PULSE = 0.1
+"""Period at which a follower of segments is told how far the timeline is complete [s]."""
+
+OVERTAKEN = "issued before a stop that came first"
+"""Why an order is refused that a stop has overtaken."""
+
+
+class Servlet:
+    """Carries out a client's orders once each, in their order, and answers what it asks.
+
+    An order that comes twice is answered twice and carried out once. One that comes too early waits for those
+    before it. A stop doesn't wait: orders that were issued before it and come later are refused, since it would
+    have dropped them.
+    """
+
+    def __init__(
+        self,
+        source: Engine | Journal,
+        *,
+        lead: float = 0.0,
+        broadcasters: Sequence[Broadcaster] = (),
+    ) -> None:
+        """Serve one client.
+
+        Args:
+            source: The engine, or its journal where others serve it too.
+            lead: How far ahead of the engine's time answers to `Ask(None)` are [s].
+            broadcasters: Where followers of frames find them.
+        """
+        self.journal = source if isinstance(source, Journal) else Journal(source)
+        self.lead = lead
+        self._broadcasters = tuple(broadcasters)
+        self._outbox: deque[Reply] = deque(maxlen=OUTBOX)
+        self._next = 1
+        self._early: dict[int, Order] = {}
+        self._outcomes: OrderedDict[int, Outcome] = OrderedDict()
+        self._answers: OrderedDict[int, Frame] = OrderedDict()
+        self._forecasts = Forecasts(REMEMBERED)
+        self._edit = self.journal.look()
+        self._follow: Follow | None = None
+        self._snapshot: tuple[int, Timeline] = (0, self.journal.engine.timeline)
+        self._slot: Slot | None = None
+        self._source: Broadcaster | None = None
+        self._beat: float | None = None
+
+    def receive(self, message: Request, *, now: float) -> None:
+        """Take a message of the client.
+
+        Args:
+            message: What has arrived.
+            now: The engine's time [s].
+
+        Raises:
+            InvalidValueError: If it's no request.
+        """
+        self._catch_up(now)
+        if isinstance(message, Order):
+            self._take(message, now)
+        elif isinstance(message, Ask):
+            self._answer(message, now)
+        elif isinstance(message, Follow):
+            self._begin(message, now)
+        elif isinstance(message, Want):
+            self._fetch(message, now)
+        else:
+            raise InvalidValueError("message", message, "an Order, Ask, Follow or Want")
+        self._catch_up(now)
+
+    def advance(self, *, now: float) -> tuple[Reply, ...]:
+        """What is to be sent to the client.
+
+        A transport that can't send doesn't call: the newest frame takes the place of the one that waits.
+
+        Args:
+            now: The engine's time [s].
+        """
+        self._catch_up(now)
+        if self._beat is not None and now >= self._beat - DUE:
+            self._beat = now + PULSE
+            self._outbox.append(Pulse(self._edit, now, self.journal.past))
+        message = self._slot.take() if self._slot is not None else None
+        if message is not None:
+            self._outbox.append(message)
+        replies = tuple(self._outbox)
+        self._outbox.clear()
+        return replies
+
+    def next_deadline(self) -> float | None:
+        """When `advance` has something to send [s], in the engine's time; −∞ for at once."""
+        if self._outbox or self._slot:
+            return float("-inf")
+        return self._beat
+
+    def close(self) -> None:
+        """Leave the broadcaster."""
+        if self._source is not None and self._slot is not None:
+            self._source.leave(self._slot)
+        self._slot = self._source = self._beat = self._follow = None
+
+    def _take(self, order: Order, now: float) -> None:
+        number = order.number
+        if number < self._next:
+            outcome = self._outcomes.get(number) or Outcome(number, None, OVERTAKEN, 0, now)
+            self._keep(outcome)
+            self._outbox.append(outcome)
+            return
+        if isinstance(order.command, Stop):
+            for early in sorted(n for n in self._early if n < number):
+                del self._early[early]
+                self._settle(Outcome(early, None, OVERTAKEN, 0, now))
+            self._next = number
+        if number - self._next <= BACKLOG:
+            self._early[number] = order
+        while self._next in self._early:
+            self._next += 1
+            self._carry_out(self._early.pop(self._next - 1), now)
+
+    def _carry_out(self, order: Order, now: float) -> None:
+        try:
+            receipt = self.journal.execute(order.command)
+        except VrsError as error:
+            self._settle(Outcome(order.number, None, str(error), 0, now))
+            return
+        self._settle(Outcome(order.number, None if receipt is None else portable(receipt), "", 0, now))
+
+    def _settle(self, outcome: Outcome) -> None:
+        self._keep(outcome)
+        self._outbox.append(outcome)
+
+    def _keep(self, outcome: Outcome) -> None:
+        self._outcomes[outcome.number] = outcome
+        if len(self._outcomes) > REMEMBERED:
+            self._outcomes.popitem(last=False)
+
+    def _answer(self, ask: Ask, now: float) -> None:
+        frame = self._answers.get(ask.number)
+        if frame is None:
+            engine = self.journal.engine
+            t = engine.now() + self.lead if ask.t is None else ask.t
+            q = frozen_array(engine.timeline.sample(t))
+            status = self._forecasts.add(ask.number, t, q, now=self.journal.past)
+            frame = Frame(ask.number, t, now, q, status)
+            self._answers[ask.number] = frame
+            if len(self._answers) > REMEMBERED:
+                self._answers.popitem(last=False)
+        self._outbox.append(Answer(frame, now))
+
+    def _begin(self, follow: Follow, now: float) -> None:
+        if self._follow is None or self._follow.number != follow.number:
+            self.close()
+            self._follow = follow
+            self._snapshot = self._edit, self.journal.engine.timeline
+            if follow.form is Form.SEGMENTS:
+                self._beat = now
+            elif free := [source for source in self._broadcasters if source.viewers < MOST_VIEWERS]:
+                wished = follow.rate or max(source.rate for source in free)
+                self._source = min(free, key=lambda source: abs(source.rate - wished))
+                self._slot = self._source.join()
+        self._show_scene(now)
+
+    def _show_scene(self, now: float) -> None:
+        if self._follow is None:
+            return
+        edit, timeline = self._snapshot
+        robot = self.journal.engine.model.name
+        rate = None if self._source is None else self._source.rate
+        initial = frozen_array(timeline.initial)
+        span = timeline.start, timeline.end, len(timeline)
+        self._outbox.append(Scene(self._follow.number, robot, initial, *span, edit, now, rate))
+
+    def _fetch(self, want: Want, now: float) -> None:
+        if want.index is not None and want.edit == self._snapshot[0]:
+            self._outbox.extend(parts(*self._snapshot, want.index))
+        elif want.index is None and self._send_changes(want.edit):
+            return
+        else:
+            self._snapshot = self._edit, self.journal.engine.timeline
+            self._show_scene(now)
+
+    def _send_changes(self, since: int) -> bool:
+        """Send every edit after one; whether they are all still there."""
+        edits = self.journal.since(since)
+        changes = [edit.change for edit in edits]
+        if edits and edits[0].number != since + 1:
+            return False
+        known = [change for change in changes if change is not None]
+        if len(known) < len(changes):
+            return False
+        self._outbox.extend(known)
+        return True
+
+    def _catch_up(self, now: float) -> None:
+        """Look what has been done to the timeline, and tell the client."""
+        newest = self.journal.look()
+        if newest != self._edit:
+            found: list[Verdict] = []
+            for edit in self.journal.since(self._edit):
+                found += self._forecasts.settle(edit.at)
+                found += self._forecasts.edited(edit.timeline, edit.culprit)
+            if self._beat is not None and not self._send_changes(self._edit):
+                self._snapshot = newest, self.journal.engine.timeline
+                self._show_scene(now)
+            self._edit = newest
+            self._tell(found, now)
+            self._revise(now)
+        self._tell(self._forecasts.settle(self.journal.past), now)
+
+    def _tell(self, verdicts: Sequence[Verdict], now: float) -> None:
+        for verdict in verdicts:
+            frame = self._answers.get(verdict.number)
+            if frame is None:
+                continue
+            frame = replace(frame, status=verdict.status, falsified_by=verdict.falsified_by)
+            self._answers[verdict.number] = frame
+            if verdict.status is FrameStatus.FALSIFIED:
+                self._outbox.append(Answer(frame, now))
+
+    def _revise(self, now: float) -> None:
+        """Send the receipts again that a later command changed."""
+        for number in list(self._outcomes)[-WATCHED:]:
+            outcome = self._outcomes[number]
+            old = outcome.receipt
+            if old is None or not old.stands:
+                continue
+            new = self.journal.engine.receipt(old.command_id)
+            if new.version != old.version:
+                revised = Outcome(number, portable(new), "", outcome.revision + 1, now)
+                self._outcomes[number] = revised
+                self._outbox.append(revised)

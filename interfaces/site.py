@@ -1,0 +1,123 @@
+"""What runs near an engine, under a clock that is shifted by D; and the loop that drives parts in virtual time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from interfaces.broadcast import Broadcaster
+from interfaces.journal import Journal
+from interfaces.servlet import Servlet
+from vrs.clock import ManualClock
+from vrs.commands import finite
+from vrs.engine import Engine
+from vrs.errors import InvalidValueError
+
+PATIENCE = 1000
+"""Turns without any time passing, after which something is wrong."""
+
+
+class Part(Protocol):
+    """Anything that a driver moves on, in the users' time."""
+
+    def advance(self, *, now: float) -> object:
+        """Do what is due at now [s]."""
+
+    def next_deadline(self) -> float | None:
+        """When it wants to be called next [s]; None for not before something arrives."""
+
+
+def engine_time(t_user: float, D: float) -> float:
+    """t_e = t_u + D [s] in whole nanoseconds, rounded down. Source: Doulgeri et al., section IV-A.
+
+    In floats (t + D_f) − D_f may lie a rounding error after t, and a command just in time would count as late.
+    """
+    return math.floor((t_user + D) * 1e9) / 1e9
+
+
+class Site:
+    """An engine with its journal, broadcasters and servlets, all under one clock."""
+
+    def __init__(self, engine: Engine, *, D: float = 0.0) -> None:
+        """Gather round an engine.
+
+        Args:
+            engine: Under a `ManualClock`, which this site then moves; under another clock, or none, D is that
+                clock's affair.
+            D: How far the engine's clock is ahead of the users' [s]; −D_f and +D_b are the paper's choices. It may
+                be changed, but the engine's clock never runs back: it stands until time has caught up.
+        """
+        self.engine = engine
+        self.D = finite("D", D, "finite seconds")
+        self.journal = Journal(engine)
+        self._broadcasters: list[Broadcaster] = []
+
+    @property
+    def broadcasters(self) -> tuple[Broadcaster, ...]:
+        """The broadcasters, in the order in which they were made."""
+        return tuple(self._broadcasters)
+
+    def broadcast(self, rate: float, *, lead: float = 0.0) -> Broadcaster:
+        """Add a broadcaster; see there."""
+        self._broadcasters.append(Broadcaster(self.journal, rate=rate, lead=lead))
+        return self._broadcasters[-1]
+
+    def servlet(self, *, lead: float = 0.0) -> Servlet:
+        """Make the server submodule of one more client, which finds the broadcasters that are there now."""
+        return Servlet(self.journal, lead=lead, broadcasters=self._broadcasters)
+
+    def time(self, now: float) -> float:
+        """The engine's time [s] when the users' clock shows now [s]; moves a manual clock on to it.
+
+        An offline engine has no time of its own: its plan is looked at by the users'.
+        """
+        clock = self.engine.clock
+        if clock is None:
+            return now
+        if isinstance(clock, ManualClock):
+            clock.set(max(clock.now(), engine_time(now, self.D)))
+        return self.engine.now()
+
+    def advance(self, *, now: float) -> None:
+        """Make the frames that are due at the users' time now [s]."""
+        t = self.time(now)
+        for broadcaster in self._broadcasters:
+            broadcaster.advance(now=t)
+
+    def next_deadline(self) -> float | None:
+        """When the next frame is due [s], in the users' time; None without a broadcaster that has begun."""
+        times = [broadcaster.next_deadline() for broadcaster in self._broadcasters]
+        return min((t - self.D for t in times if t is not None), default=None)
+
+
+def drive(parts: Sequence[Part], *, now: float, until: float, most: int = 10_000_000) -> float:
+    """Run parts in virtual time: at each deadline, those that are due advance in turn, until all are quiet.
+
+    Args:
+        parts: Sites first, then transports, then clients.
+        now: Users' time to begin at [s].
+        until: Users' time to end at [s].
+        most: Most turns.
+
+    Returns:
+        The users' time reached: `until`.
+
+    Raises:
+        InvalidValueError: If the parts don't come to `until` within that many turns.
+    """
+    due: Sequence[Part] = parts
+    again = 0
+    for _ in range(most):
+        for part in due:
+            part.advance(now=now)
+        deadlines = [math.inf if (t := part.next_deadline()) is None else t for part in parts]
+        upcoming = min(deadlines, default=math.inf)
+        if upcoming > now:
+            if now >= until:
+                return now
+            now, again = min(upcoming, until), 0
+        elif (again := again + 1) > PATIENCE:
+            raise InvalidValueError("deadline", upcoming, f"after {now} s, when its part has advanced")
+        due = parts if now >= until else [part for part, t in zip(parts, deadlines, strict=True) if t <= now]
+    raise InvalidValueError("turns", most, "enough to come to the end")

@@ -1,0 +1,294 @@
+"""Where a viewer's frames come from: a copy of the timeline, or frames that a servlet sends."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import takewhile
+from typing import Protocol, TypeAlias, TypeVar
+
+from interfaces.broadcast import status_of
+from interfaces.forecasts import WINDOW, Forecasts
+from interfaces.messages import Broadcast, Follow, Form, Frame, FrameStatus, Pulse, Reply, Scene, Verdict
+from interfaces.mirror import Mirror
+from interfaces.observer import Observer
+from interfaces.playhead import LiveEdge
+from interfaces.ports import EnginePort, earliest
+from vrs.model import frozen_array
+
+BUFFERED = 256
+"""Frames at hand, at most."""
+
+NEAR = 0.6
+"""A frame is shown for a time of the play head this many of the viewer's periods away, or less."""
+
+LEAD = 0.02
+"""How much sooner than the slowest round trip demands a frame is asked for [s]."""
+
+SAME = 1e-9
+"""Times that differ by less [s] are the same."""
+
+
+Ahead: TypeAlias = Callable[[float], float | None]
+"""Where a play head will be in so many seconds [s], if nobody moves it."""
+
+
+class Source(Protocol):
+    """What a viewer needs of its source."""
+
+    live: LiveEdge
+
+    @property
+    def delay(self) -> float:
+        """How long a frame takes to come that is asked for [s]."""
+
+    @property
+    def scene(self) -> Scene | None:
+        """What there is to see; None before it's known."""
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """Start and end of the timeline as far as it's known [s]."""
+
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Take a reply."""
+
+    def advance(self, *, now: float) -> None:
+        """Ask for what's missing."""
+
+    def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:
+        """The frame for the place of the play head, under the viewer's number.
+
+        Args:
+            number: Number that the viewer gives it.
+            t: The place [s].
+            now: The user's time [s].
+            live: Whether the newest frame is wanted.
+            ahead: Where the play head will be, from now on [s] in so many seconds.
+            floor: The newest frame isn't wanted if it shows an earlier time than this [s].
+
+        Returns:
+            The frame; None where there's none, or none that is new.
+        """
+
+    def settled(self) -> tuple[Verdict, ...]:
+        """What became of frames since the last call."""
+
+    def next_deadline(self) -> float | None:
+        """When something is to be done [s]."""
+
+    def close(self) -> None:
+        """Listen no more."""
+
+
+class SegmentSource:
+    """Evaluates a copy of the timeline: any time, at any rate, without asking."""
+
+    def __init__(self, port: EnginePort, *, lead: float, resend: float) -> None:
+        self._mirror = Mirror(port, resend=resend)
+        self._lead = lead
+        self._forecasts = Forecasts()
+        self._settled: list[Verdict] = []
+        self.live = LiveEdge()
+
+    @property
+    def delay(self) -> float:
+        """Nothing need be asked for [s]."""
+        return 0.0
+
+    @property
+    def mirror(self) -> Mirror:
+        """The copy."""
+        return self._mirror
+
+    @property
+    def scene(self) -> Scene | None:
+        """What it began with."""
+        return self._mirror.scene
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """Start and end of the timeline [s]."""
+        timeline = self._mirror.timeline
+        return None if timeline is None else (timeline.start, timeline.end)
+
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Take a reply."""
+        self._mirror.receive(message, now=now)
+        if isinstance(message, Pulse):
+            self.live.heard(message.now + self._lead, now=now)
+            self._compare()
+            self._settled += self._forecasts.settle(self._mirror.past)
+
+    def advance(self, *, now: float) -> None:
+        """Ask for what's missing, and compare what was shown with new edits."""
+        self._mirror.advance(now=now)
+        self._compare()
+
+    def _compare(self) -> None:
+        for timeline, command_id in self._mirror.edited():
+            self._settled += self._forecasts.edited(timeline, lambda _, by=command_id: by)  # type: ignore[misc]
+
+    def frame(
+        self,
+        number: int,
+        t: float,
+        *,
+        now: float,  # noqa: ARG002 - what a copy shows depends on t alone
+        live: bool,  # noqa: ARG002
+        ahead: Ahead,  # noqa: ARG002
+        floor: float,  # noqa: ARG002
+    ) -> Frame | None:
+        """The frame for a time; None before the timeline has come."""
+        timeline = self._mirror.timeline
+        if timeline is None:
+            return None
+        q = frozen_array(timeline.sample(t))
+        status = self._forecasts.add(number, t, q, now=self._mirror.past)
+        return Frame(number, t, max(self._mirror.past, timeline.start), q, status)
+
+    def settled(self) -> tuple[Verdict, ...]:
+        """What became of frames since the last call."""
+        settled, self._settled = tuple(self._settled), []
+        return settled
+
+    def next_deadline(self) -> float | None:
+        """When something is asked for again [s]."""
+        return self._mirror.next_deadline()
+
+    def close(self) -> None:
+        """Nothing else listens."""
+
+
+class FrameSource:
+    """Shows a broadcaster's frames while live, and asks for others, early enough that they come in time."""
+
+    def __init__(self, port: EnginePort, *, rate: float, resend: float) -> None:
+        self._port, self._resend, self._period = port, resend, 1.0 / rate
+        self._follow = Follow(port.number(), Form.FRAMES, rate)
+        self._observer = Observer(port, resend=resend)
+        self._due = -math.inf
+        self._asked: OrderedDict[int, float] = OrderedDict()
+        self._round_trip = 0.0
+        self._buffer: OrderedDict[int, Frame] = OrderedDict()
+        self._newest: Frame | None = None
+        self._broadcast: OrderedDict[int, int] = OrderedDict()
+        self._answered: OrderedDict[int, int] = OrderedDict()
+        self._falsified: tuple[tuple[int, int, int | None], ...] = ()
+        self._last: Frame | None = None
+        self._settled: list[Verdict] = []
+        self._scene: Scene | None = None
+        self.live = LiveEdge()
+
+    @property
+    def delay(self) -> float:
+        """The slowest round trip of late, and a little more [s]; 0 before the first."""
+        return self._round_trip + LEAD if self._round_trip else 0.0
+
+    @property
+    def scene(self) -> Scene | None:
+        """What there is to see."""
+        return self._scene
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """From the start of the timeline on [s]; where it ends by now, frames don't say."""
+        return None if self._scene is None else (self._scene.start, math.inf)
+
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Take a frame or the scene; answers come by the observer."""
+        if isinstance(message, Scene) and message.number == self._follow.number:
+            self._scene = message
+            if message.rate is None:
+                self.live.heard(message.now, now=now)
+        elif isinstance(message, Broadcast):
+            frame = message.frame
+            self.live.heard(frame.t, now=now)
+            if self._newest is None or frame.number > self._newest.number:
+                self._newest = frame
+                self._judge(message)
+
+    def _judge(self, message: Broadcast) -> None:
+        """Learn what became of the frames that were shown; the older come first."""
+        shown, verdicts = self._broadcast, message.verdicts
+        if verdicts.falsified != self._falsified:
+            self._falsified = verdicts.falsified
+            numbers = list(shown)
+        else:
+            numbers = list(takewhile(verdicts.through.__ge__, shown))
+        for number in numbers:
+            verdict = status_of(number, verdicts)
+            if verdict is not None:
+                self._settled.append(replace(verdict, number=shown.pop(number)))
+            elif number < verdicts.since:
+                del shown[number]
+
+    def advance(self, *, now: float) -> None:
+        """Follow the broadcaster, and take what was asked for."""
+        if self._scene is None and now >= self._due:
+            self._port.send(self._follow, now=now)
+            self._due = now + self._resend
+        for observation in self._observer.advance(now=now):
+            frame = observation.frame
+            if self._asked.pop(frame.number, None) is not None:
+                self._round_trip = max(observation.lateness, 0.9 * self._round_trip)
+            if frame.status is FrameStatus.FALSIFIED:
+                self._buffer.pop(frame.number, None)
+            else:
+                _put(self._buffer, frame.number, frame, BUFFERED)
+            shown = self._answered.get(frame.number)
+            if shown is not None and frame.status is not FrameStatus.PREDICTED:
+                del self._answered[frame.number]
+                self._settled.append(Verdict(shown, frame.status, frame.falsified_by))
+
+    def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:
+        """The frame nearest to a time, if it's near enough and not the last one; what comes next is asked for."""
+        if live and self._newest is not None:
+            return None if self._newest.t < floor else self._show(self._newest, number, self._broadcast)
+        next_, later = ahead(self._period), ahead(self.delay)
+        self._ask(t if later is None else later, now)
+        near = SAME + (0.0 if next_ is None else NEAR * abs(next_ - t))
+        nearest = min(self._buffer.values(), key=lambda frame: abs(frame.t - t), default=None)
+        if nearest is None or abs(nearest.t - t) > near:
+            self._ask(t, now)
+            return None
+        return self._show(nearest, number, self._answered)
+
+    def _ask(self, t: float, now: float) -> None:
+        known = (*self._asked.values(), *(frame.t for frame in self._buffer.values()))
+        if all(abs(t - other) > SAME for other in known):
+            _put(self._asked, self._observer.ask(t, now=now), t, BUFFERED)
+
+    def _show(self, frame: Frame, number: int, shown: OrderedDict[int, int]) -> Frame | None:
+        if frame is self._last:
+            return None
+        last, self._last = self._last, frame
+        if last is not None and (last.number, last.t) == (frame.number, frame.t):
+            return None
+        if frame.status is FrameStatus.PREDICTED:
+            _put(shown, frame.number, number, WINDOW)
+        return replace(frame, number=number)
+
+    def settled(self) -> tuple[Verdict, ...]:
+        """What became of frames since the last call."""
+        settled, self._settled = tuple(self._settled), []
+        return settled
+
+    def next_deadline(self) -> float | None:
+        """When something is asked for again [s]."""
+        return earliest(self._observer.next_deadline(), self._due if self._scene is None else None)
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._observer.close()
+
+
+_Value = TypeVar("_Value")
+
+
+def _put(kept: OrderedDict[int, _Value], number: int, value: _Value, most: int) -> None:
+    kept[number] = value
+    if len(kept) > most:
+        kept.popitem(last=False)

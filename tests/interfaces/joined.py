@@ -1,0 +1,66 @@
+"""Clients and engines joined here and over emulated links, in virtual time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from interfaces.link import BernoulliLoss, Channel, Conditions, ConstantDelay, GammaDelay, Service
+from interfaces.ports import LocalPort, MemoryTransport
+from interfaces.site import Site, drive
+from robots import puma560
+from vrs import Engine, JointTarget, ManualClock, MotionCommand
+
+MODEL = puma560.model()
+HOME = MODEL.poses["nominal"]
+
+
+def place(k: int) -> np.ndarray:
+    """A place near home, another one for each k."""
+    return HOME + np.random.default_rng(k).uniform(-0.4, 0.4, 6)
+
+
+def to(k: int, **options) -> MotionCommand:
+    return MotionCommand(JointTarget(place(k)), **options)
+
+
+class Joined:
+    """A site, ports to it and clients, driven in turn; `now` is the users' time."""
+
+    def __init__(self, D: float = 0.0, now: float = 0.0, **options) -> None:
+        start = options if "timeline" in options else {"q": HOME, **options}
+        self.site = Site(Engine(MODEL, clock=ManualClock(now + D), **start), D=D)
+        self.engine = self.site.engine
+        self.parts = [self.site]
+        self.now = now
+
+    def local(self, lead: float = 0.0) -> LocalPort:
+        port = LocalPort(self.site, lead=lead)
+        self.parts.append(port)
+        return port
+
+    def remote(self, forward, backward, *, seed: int = 0, lead: float = 0.0):
+        rng = np.random.default_rng(seed).spawn(2)
+        transport = MemoryTransport(self.site, Channel(forward, rng[0]), Channel(backward, rng[1]), lead=lead)
+        self.parts.append(transport)
+        return transport.port
+
+    def add(self, client):
+        self.parts.append(client)
+        return client
+
+    def run(self, seconds: float) -> None:
+        self.now = drive(self.parts, now=self.now, until=self.now + seconds)
+
+
+def constant(seconds: float) -> ConstantDelay:
+    return ConstantDelay(f"constant:{seconds}", seconds)
+
+
+def bad(loss: float, duplicate: float, mean: float = 0.1, spread: float = 0.2) -> Conditions:
+    """A link that loses, copies and reorders: the wider the spread, the more."""
+    return Conditions(
+        delay=GammaDelay("gamma", mean, max(spread, 1e-3) * 5 * mean, 0.2 * mean, 0.0),
+        loss=BernoulliLoss(loss),
+        duplicate=duplicate,
+        service=Service.DATAGRAM,
+    )
