@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks import machine, page
 from benchmarks.running import run
 
-PARTS = ("sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "physics")
+PARTS = ("sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "twins", "physics")
 """Benchmarks that give results."""
 DETAILS = ("timeline", "planning", "lines", "steering")
 """Benchmarks that print more about one thing."""

@@ -200,10 +200,11 @@ def accuracy(count: int, profile: Profile) -> None:
         errors.append(error(move))
         pieces.append(len(move.plan))
         passed += violation(move.plan, LIMITS, jerk=profile is Profile.JERK_LIMITED) is not None
-    worst = np.max(errors, axis=0)
+    worst, joints = np.max(errors, axis=0), np.array(errors)[:, 2]
     print(
         f"{profile}, {count} lines: off the line {worst[0]:.1e} m, off an even turn {worst[1]:.1e} rad, off the "
-        f"inverse kinematics {worst[2]:.1e} rad (fitted to {TOLERANCE:g}); pieces median {np.median(pieces):.0f}, "
+        f"inverse kinematics {worst[2]:.1e} rad (fitted to {TOLERANCE:g}), more than 1e-9 rad in "
+        f"{np.count_nonzero(joints > 1e-9)}; pieces median {np.median(pieces):.0f}, "
         f"largest {max(pieces)}; limits passed by {passed}; {time.perf_counter() - start:.0f} s"
     )
 

@@ -242,9 +242,12 @@ class Engine:
         """Highest command id given out; 0 while there's none."""
         return self._plan.ledger.newest
 
-    def skip_to(self, command_id: int) -> None:
-        """Give the next command an id above this one: a replica skips what the engine that it follows rejected."""
-        self._plan.ledger.newest = max(self._plan.ledger.newest, command_id)
+    def count_from(self, command_id: int) -> None:
+        """Give the next command the id after this one; a replica numbers as the engine that it follows.
+
+        An id that was given out before must not come again.
+        """
+        self._plan.ledger.newest = command_id
 
     def refuse(self, command: Command, reason: str) -> Receipt:
         """Answer a command that something outside the engine forbids."""

@@ -11,15 +11,18 @@ import typer
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
-    from interfaces.link import DelayProfile
+    from collections.abc import Callable
+
+    from interfaces.link import DelayProfile, Service
     from interfaces.runtime import TwinRun
-    from interfaces.runtime.attribution import Attribution
+    from interfaces.runtime.attribution import Attribution, OffsetOutcome
     from interfaces.runtime.plan import Plan
     from vrs.model import RobotModel
 
+ADAPTIVE = "adaptive"
 DEFAULT_DELAY = "thu"
 DEFAULT_SEED = 6
-"""With it the default link delivers four commands too late, so that the report has something to explain."""
+"""With it the default link stalls four times in mid-motion, so that the report has something to explain."""
 
 
 def demo(
@@ -35,6 +38,17 @@ def demo(
             help="none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar or trace:FILE.csv.",
         ),
     ] = DEFAULT_DELAY,
+    offset: Annotated[
+        str,
+        typer.Option(
+            "--offset",
+            metavar="OFFSET",
+            help="How far the real robot plays behind: adaptive, fixed (the profile's 95 % quantile) or fixed:S.",
+        ),
+    ] = ADAPTIVE,
+    service: Annotated[
+        str, typer.Option("--service", metavar="ORDER", help="Delivery on the link: datagram or in-order.")
+    ] = "datagram",
     seed: Annotated[
         int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random.")
     ] = DEFAULT_SEED,
@@ -44,16 +58,19 @@ def demo(
     as_json: Annotated[bool, typer.Option("--json", help="Write the summary as JSON on standard output.")] = False,
 ) -> None:
     """Run virtual and real robot on one plan across an emulated internet, and compare them."""
-    from interfaces.link import delay_profile
+    from interfaces.link import Conditions, delay_profile
+    from interfaces.report.summary import summarize
+    from interfaces.runtime.offset import fixed_offset
     from interfaces.runtime.plan import default_plan, read_plan
     from robots import puma560
 
     profile = delay_profile(delay)
+    D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     model = puma560.model()
     plan = default_plan(model) if commands is None else read_plan(commands, model)
     prepare(out)
-    run, attributions = _run(plan, model, profile, seed)
-    _finish(run, attributions, out, as_json=as_json)
+    run, attributions, offsets = _run(plan, model, profile, seed, D, order)
+    _finish(summarize(run, attributions, offsets), run, out, as_json=as_json)
 
 
 def prepare(out: Path) -> None:
@@ -71,30 +88,36 @@ def prepare(out: Path) -> None:
 
 
 def _run(
-    plan: Plan, model: RobotModel, profile: DelayProfile, seed: int
-) -> tuple[TwinRun, tuple[Attribution, ...]]:
+    plan: Plan, model: RobotModel, profile: DelayProfile, seed: int, D: float | None, service: Service
+) -> tuple[TwinRun, tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    from interfaces.runtime.attribution import CAUSES, attribute, measures, run_without
+    from interfaces.runtime.attribution import CAUSES, attribute, measures, offset_outcome, run_without
+    from interfaces.runtime.offset import FIXED, fixed_offset, spelled
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        stages = []
+
+        def shown(name: str) -> Callable[[float], None]:
+            task = bar.add_task(f"{name:30}", total=_length(plan))
+            return lambda t: bar.update(task, completed=t, total=max(t, _length(plan)))
+
+        stages, offsets = [], []
         for off in range(len(CAUSES) + 1):
             name = f"without {CAUSES[off - 1].replace('_', ' ')}" if off else "both twins"
-            task = bar.add_task(f"{name:30}", total=_length(plan))
+            causes = frozenset(CAUSES[:off])
             run = run_without(
-                frozenset(CAUSES[:off]),
-                plan,
-                model,
-                profile,
-                seed=seed,
-                progress=lambda t, task=task: bar.update(task, completed=t),  # type: ignore[misc]
+                causes, plan, model, profile, seed=seed, offset=D, service=service, progress=shown(name)
             )
-            bar.update(task, total=float(run.t[-1]), completed=float(run.t[-1]))
             stages.append((run, measures(run)))
-    return stages[0][0], attribute(tuple(measured for _, measured in stages))
+        for other in (None, fixed_offset(FIXED, profile) if D is None else D):
+            progress = shown(f"offset {spelled(other)}")
+            outcome = offset_outcome(
+                plan, model, profile, seed=seed, offset=other, service=service, progress=progress
+            )
+            offsets.append(outcome)
+    return stages[0][0], attribute(tuple(measured for _, measured in stages)), tuple(offsets)
 
 
 def _length(plan: Plan) -> float:
@@ -102,11 +125,10 @@ def _length(plan: Plan) -> float:
     return max(motion.command.execute_at or motion.registered_at for motion in plan.motions) + 8.0
 
 
-def _finish(run: TwinRun, attributions: tuple[Attribution, ...], out: Path, *, as_json: bool) -> None:
+def _finish(summary: dict[str, Any], run: TwinRun, out: Path, *, as_json: bool) -> None:
     from interfaces.report.html import write_report
-    from interfaces.report.summary import summarize, to_json
+    from interfaces.report.summary import to_json
 
-    summary = summarize(run, attributions)
     text = to_json(summary)
     try:
         (out / "summary.json").write_text(text, encoding="utf-8")
@@ -122,12 +144,14 @@ def _finish(run: TwinRun, attributions: tuple[Attribution, ...], out: Path, *, a
 def _show(summary: dict[str, Any], out: Path) -> None:
     from rich.console import Console
 
-    from interfaces.report.tables import attribution_table, error_table, time_lines
+    from interfaces.report.tables import attribution_table, error_table, offset_table, time_lines
 
     console = Console()
     console.print(error_table(summary))
     if summary["attribution"]:
         console.print(attribution_table(summary))
+    if summary["offsets"]:
+        console.print(offset_table(summary))
     for line in time_lines(summary):
         console.print(line, highlight=False)
     typer.echo(f"Wrote {out / 'report.html'} and {out / 'summary.json'}")

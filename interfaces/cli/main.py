@@ -11,6 +11,8 @@ import typer
 
 from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
+from interfaces.cli.link import link
+from interfaces.cli.reproduce import reproduce
 from vrs.errors import VrsError
 
 # Typer exports only one of its usage errors; the class above it is the root of all of them.
@@ -25,6 +27,8 @@ app = typer.Typer(
 )
 app.command()(demo)
 app.command()(doctor)
+app.command()(link)
+app.command()(reproduce)
 
 
 def _version(value: bool) -> None:

@@ -80,13 +80,23 @@ def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:
     facts = {
         "robot": run.model.name,
         "delay": run.delay,
-        "clock offset D": f"{run.D:.3f} s".replace("-", "−"),
+        "service": run.service,
+        "offset": run.offset,
+        "D": _span(run),
+        "link loss": run.link_loss,
+        "corrections": str(len(run.corrections)),
         "seed": str(run.seed),
         "duration": f"{run.t[-1] - run.t[0]:.1f} s",
         "commands": str(len(run.receipts_virtual)),
         "counterfactuals off": order,
     }
     return "".join(f"<li><span>{name}</span>{escape(value)}</li>" for name, value in facts.items() if value)
+
+
+def _span(run: TwinRun) -> str:
+    low, high = float(run.D.min()), float(run.D.max())
+    text = f"{high:.3f} s" if high - low < 1e-9 else f"{high:.3f} to {low:.3f} s"
+    return text.replace("-", "−")
 
 
 def _figure(plot: Plot) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, Final
 
-from interfaces.report.tables import MEASURES
+from interfaces.report.tables import MEASURES, OFFSETS, offset_rows
 from vrs.receipt import Receipt
 
 Json = Mapping[str, Any]
@@ -18,6 +18,11 @@ ELSEWHERE: Final = frozenset(
         "robot",
         "seed",
         "delay",
+        "service",
+        "link_loss",
+        "offset",
+        "offsets",
+        "corrections",
         "receipts_virtual",
         "receipts_real",
         "packets",
@@ -81,12 +86,15 @@ def tiles(summary: Json) -> str:
     user = _part(_part(summary, "errors"), "user_time")
     path, commands = _part(summary, "path"), _part(summary, "commands")
     joint_rms = timeline.get("joint_rms_deg") or [None]
-    late, lost = commands.get("late"), commands.get("lost")
+    late, lost, behind = commands.get("late"), commands.get("lost"), _part(summary, "behind")
+    shares = [behind.get("mean_s"), summary.get("lag_timeline_s")]
+    played = None if None in shares else " + ".join(map(_number, shares))
     found = [
         (_with_unit(max(joint_rms, key=lambda x: x or 0.0), "deg"), "worst joint, rms, equal timeline time"),
         (_with_unit(timeline.get("tool_rms_m"), "mm"), "tool, rms, equal timeline time"),
         (_with_unit(user.get("tool_rms_m"), "mm"), "tool, rms, as the user sees it"),
         (_with_unit(path.get("time_difference_mean"), "s"), "mean time difference along the path"),
+        (None if played is None else f"{played} s", "network: behind by the clock, mean; control: the joints' lag"),
         (None if late is None or lost is None else f"{late} / {lost}", "commands late / lost"),
     ]
     shown = [
@@ -106,6 +114,14 @@ def figures(summary: Json) -> str:
         order = [str(cause) for cause in summary.get("attribution_order", attribution[0]["parts"])]
         note = f"Counterfactual runs, switched off one after the other: {', then '.join(map(words, order))}."
         out.append(card("Where the error comes from (rms)", _attribution(attribution, order), note, wide=True))
+    if offsets := summary.get("offsets"):
+        note = (
+            "The same messages with the same delays. A fixed offset postpones commands that take longer; an "
+            "adaptive one slows the robot down along the committed path. The body follows exactly here, so that "
+            "what is left is the network's."
+        )
+        body = table(OFFSETS, offset_rows({"offsets": offsets}))
+        out.append(card("What the choice of the offset does", body, note, wide=True))
     if path := _part(summary, "path"):
         rows = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
         out.append(card("Tool path and time difference, user time", table(("", ""), rows)))
@@ -125,7 +141,8 @@ def receipts(title: str, items: Sequence[Receipt]) -> str:
         status = f'<span class="status status-{escape(str(r.status))}">{escape(str(r.status))}</span>'
         reason = r.reason
         if r.superseded_by is not None:
-            reason += f"{'; ' if reason else ''}superseded by {r.superseded_by}"
+            by = r.superseded_by or "a correction"
+            reason += f"{'; ' if reason else ''}superseded by {by}"
         rows.append((str(r.command_id), status, r.asked_at, r.execute_at, r.end, escape(reason)))
     body = table(head, rows, markup=True) if rows else '<p class="note">None.</p>'
     return card(title, body)

@@ -64,22 +64,23 @@ class Plot:
 
 
 def plots(run: TwinRun) -> tuple[Plot, ...]:
-    """Draw joint errors, tool error, delays, and the trajectory of every joint."""
-    tau, q_virtual, q_real = equal_timeline_time(run)
-    error = np.degrees(q_real - q_virtual)
+    """Draw how far behind the real robot was, joint errors, tool error, and the trajectory of every joint."""
+    error = np.degrees(run.q_real - run.q_matched)
     n = error.shape[1]
-    same = f"Real minus virtual at equal timeline time (the real robot's clock runs {-run.D:.3g} s behind)."
+    same = "Control: real minus virtual at the same place in the plan, when the real robot was there."
     out = [
-        _plot(run, "joint-errors", "Joint errors", "deg", lambda ax: _lines(ax, tau, error), note=same),
-        _plot(run, "tool-error", "Tool error", "mm", lambda ax: _tool_error(ax, run), note=same),
         _plot(
             run,
-            "delays",
-            "Delay of each packet",
+            "behind",
+            "How far the real robot is behind",
             "s",
-            lambda ax: _delays(ax, run),
-            note="At the time of sending. The dashed line is the offset that the clocks allow for.",
+            lambda ax: _behind(ax, run),
+            note="Network: −D, the user's time less the robot's play time. A dot is the delay of a message, at its "
+            "arrival, or at the upper edge if it's longer. Where messages "
+            "were late the robot slowed down, and was further behind from there on.",
         ),
+        _plot(run, "joint-errors", "Joint errors", "deg", lambda ax: _lines(ax, run.t, error), note=same),
+        _plot(run, "tool-error", "Tool error", "mm", lambda ax: _tool_error(ax, run), note=same),
     ]
     out.extend(
         _plot(
@@ -96,26 +97,11 @@ def plots(run: TwinRun) -> tuple[Plot, ...]:
     return tuple(out)
 
 
-def equal_timeline_time(run: TwinRun) -> tuple[Array, Array, Array]:
-    """Bring both twins to the same timeline time τ.
-
-    Returns:
-        τ [s], (m,); joints of the virtual robot at τ and of the real one when its clock reads τ [rad], (m, n).
-    """
-    keep = run.t - run.D <= run.t[-1] + 1e-9
-    if np.count_nonzero(keep) < 2:
-        keep = np.arange(len(run.t)) < 2
-    tau = run.t[keep]
-    real = np.column_stack([np.interp(tau - run.D, run.t, column) for column in run.q_real.T])
-    return tau, run.q_virtual[keep], real
-
-
 def _tool_error(ax: Axes, run: TwinRun) -> None:
-    tau, q_virtual, q_real = equal_timeline_time(run)
-    p_virtual = np.asarray(run.model.forward(q_virtual))[:, :3, 3]
-    p_real = np.asarray(run.model.forward(q_real))[:, :3, 3]
+    p_virtual = np.asarray(run.model.forward(run.q_matched))[:, :3, 3]
+    p_real = np.asarray(run.model.forward(run.q_real))[:, :3, 3]
     distance = 1e3 * np.linalg.norm(p_real - p_virtual, axis=1)
-    ax.plot(*_thin(tau, distance), color=REAL, linewidth=1.4)
+    ax.plot(*_thin(run.t, distance), color=REAL, linewidth=1.4)
     ax.set_ylim(bottom=0.0)
 
 
@@ -125,22 +111,25 @@ def _lines(ax: Axes, t: Array, values: Array) -> None:
     _legend(ax, columns=values.shape[1])
 
 
-def _delays(ax: Axes, run: TwinRun) -> None:
-    arrived = [(p.sent, p.arrived - p.sent) for p in run.packets if p.arrived is not None]
-    lost = [p.sent for p in run.packets if p.arrived is None]
-    sent, delay = np.array(arrived, dtype=np.float64).reshape(-1, 2).T
-    top = 1.15 * max([-run.D, *delay, 1e-3])
-    ax.axhline(-run.D, color=MUTED, linewidth=1.0, linestyle=(0, (4, 3)))
-    ax.vlines(sent, 0.0, delay, color=VIRTUAL, linewidth=1.0, alpha=0.5)
-    ax.plot(sent, delay, "o", color=VIRTUAL, markersize=4, label="arrived")
-    if lost:
-        ax.plot(lost, np.full(len(lost), 0.95 * top), "x", color=BAD, markersize=6, label="lost")
-        _legend(ax, columns=2)
+def _behind(ax: Axes, run: TwinRun) -> None:
+    sent, arrived = run.messages.T
+    there = np.isfinite(arrived) & (arrived <= run.t[-1])
+    delay = arrived[there] - sent[there]
+    behind = -run.D
+    # The delays of a bad network span decades; above what matters here they are drawn at the edge.
+    top = 1.25 * max(float(behind.max()), float(np.quantile(delay, 0.9)) if len(delay) else 0.0, 1e-3)
+    at, height = _thin(arrived[there], np.minimum(delay, top))
+    ax.plot(at, height, ".", color=VIRTUAL, markersize=2.2, alpha=0.55, label="message", clip_on=False)
+    lost = sent[~np.isfinite(arrived)]
+    if len(lost):
+        ax.plot(lost, np.full(len(lost), 0.0), "x", color=BAD, markersize=5, label="lost", clip_on=False)
+    ax.plot(*_thin(run.t, behind), color=REAL, linewidth=1.5, label="real robot")
+    _legend(ax, columns=3)
     ax.set_ylim(0.0, top)
 
 
 def _trajectory(ax: Axes, *, run: TwinRun, j: int) -> None:
-    ax.plot(*_thin(run.t, np.degrees(run.q_virtual[:, j])), color=VIRTUAL, linewidth=1.3, label="virtual")
+    ax.plot(*_thin(run.t, np.degrees(run.q_shown[:, j])), color=VIRTUAL, linewidth=1.3, label="virtual")
     ax.plot(*_thin(run.t, np.degrees(run.q_real[:, j])), color=REAL, linewidth=1.3, label="real")
     _legend(ax, columns=2)
 

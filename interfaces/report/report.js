@@ -18,6 +18,7 @@
 
   const times = floats(run.t);
   const n = run.chain.length;
+  const behind = floats(run.behind);
   const samples = { virtual: floats(run.q_virtual), real: floats(run.q_real) };
   const duration = run.t_end - run.t_start;
 
@@ -38,6 +39,21 @@
       q[j] = a + share * (samples[twin][high * n + j] - a);
     }
     return q;
+  }
+
+  // When the real robot is at a place of the timeline; its play time never runs back.
+  function whenPlayed(tau) {
+    let low = 0;
+    let high = times.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] - behind[middle] <= tau) low = middle;
+      else high = middle;
+    }
+    const from = times[low] - behind[low];
+    const span = times[high] - behind[high] - from;
+    const share = span > 0 ? Math.min(1, Math.max(0, (tau - from) / span)) : 0;
+    return times[low] + share * (times[high] - times[low]);
   }
 
   // Column-major products of rigid transforms, X_i = X_(i-1) Rz(q_i) A_i.
@@ -257,7 +273,7 @@
     slider.value = String(t);
     el("clock").textContent = (t + run.t_start).toFixed(2) + " s";
     slider.setAttribute("aria-valuetext", el("clock").textContent);
-    if (scene) scene.show(t, aligned ? t - run.D : t);
+    if (scene) scene.show(t, aligned ? whenPlayed(t) : t);
     for (const cursor of document.querySelectorAll(".cursor")) {
       const { low, high, left, right } = cursor.dataset;
       const share = (t + run.t_start - low) / (high - low);
@@ -317,5 +333,5 @@
     });
 
   seek(0);
-  window.report = { links, joints, seek, play, scene, time: () => t + run.t_start };
+  window.report = { links, joints, whenPlayed, seek, play, scene, time: () => t + run.t_start };
 })();

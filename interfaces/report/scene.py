@@ -27,7 +27,7 @@ def scene(run: TwinRun) -> Json:
 
     Returns:
         A JSON value: `links` (meshes in link frames), `base` and `chain` (constant transforms, column-major),
-        `t`, `q_virtual`, `q_real` (base64 of little-endian float32), `D`, `floor`, `box` and `markers`.
+        `t`, `q_virtual`, `q_real`, `behind` (−D; base64 of little-endian float32), `floor`, `box` and `markers`.
 
     Raises:
         InvalidValueError: If the model isn't a chain of revolute joints in standard Denavit-Hartenberg frames.
@@ -44,9 +44,9 @@ def scene(run: TwinRun) -> Json:
         "t": _packed(run.t[::stride] - run.t[0]),
         "t_start": float(run.t[0]),
         "t_end": float(run.t[::stride][-1]),
-        "q_virtual": _packed(run.q_virtual[::stride]),
+        "q_virtual": _packed(run.q_shown[::stride]),
         "q_real": _packed(run.q_real[::stride]),
-        "D": float(run.D),
+        "behind": _packed(-run.D[::stride]),
         "floor": floor,
         "box": [low, high],
         "markers": markers(run),
@@ -95,9 +95,9 @@ def markers(run: TwinRun) -> list[Json]:
         out.append({"t": receipt.issued_at, "kind": str(receipt.status), "text": text})
     known_lost = {event.t for event in run.events if event.kind == "lost"}
     out.extend(
-        {"t": packet.sent, "kind": "lost", "text": f"command {packet.command_id}: packet lost"}
+        {"t": packet.sent, "kind": "lost", "text": f"command {packet.command_id}: message lost"}
         for packet in run.packets
-        if packet.arrived is None and packet.sent not in known_lost
+        if packet.lost and packet.sent not in known_lost
     )
     out.extend({"t": event.t, "kind": event.kind, "text": event.text} for event in run.events)
     return sorted(out, key=lambda marker: (marker["t"], marker["kind"], marker["text"]))
@@ -106,7 +106,7 @@ def markers(run: TwinRun) -> list[Json]:
 def _box(run: TwinRun, floor: float) -> tuple[list[float], list[float]]:
     """Corners of what the camera must see: the pedestal, every link origin of both twins, some margin."""
     stride = max(1, len(run.t) // 400)
-    q = np.concatenate([run.q_virtual[::stride], run.q_real[::stride]])
+    q = np.concatenate([run.q_shown[::stride], run.q_real[::stride]])
     points = np.asarray(run.model.links(q))[:, :, :3, 3].reshape(-1, 3)
     low = np.minimum(points.min(axis=0), (-0.2, -0.2, floor)) - 0.05
     high = np.maximum(points.max(axis=0), (0.2, 0.2, 0.15)) + 0.05

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from interfaces.runtime.attribution import CAUSES, Attribution
+from interfaces.runtime.attribution import CAUSES, Attribution, OffsetOutcome
 from interfaces.runtime.run import TwinRun
-from interfaces.runtime.virtual import QUANTILE, status_counts
+from interfaces.runtime.virtual import status_counts
 from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
 from vrs.model import Array
 from vrs.receipt import Receipt
@@ -24,23 +25,27 @@ MOST_CELLS = 4000
 Json = dict[str, Any]
 
 
-def summarize(run: TwinRun, attributions: tuple[Attribution, ...] = ()) -> Json:
+def summarize(
+    run: TwinRun,
+    attributions: tuple[Attribution, ...] = (),
+    offsets: tuple[OffsetOutcome, ...] = (),
+) -> Json:
     """Measure a run.
 
     Args:
         run: The record of both twins.
         attributions: Its measures split among causes; none where no counterfactual was run.
+        offsets: What other choices of the offset make of the same network; none where none was tried.
 
     Returns:
         A JSON value; `docs/summary.md` describes its fields. The same run gives the same value.
     """
-    q_timeline = shifted(run.t, run.q_virtual, run.D)
-    lag = best_lag(run.t, q_timeline, run.q_real)
-    aligned = shifted(run.t, q_timeline, -lag)
+    lag, D = best_lag(run.t, run.q_matched, run.q_real), float(run.D.mean())
+    aligned = shifted(run.t, run.q_matched, -lag)
     errors = {
-        "timeline_time": agreement(run.model, q_timeline, run.q_real),
+        "timeline_time": agreement(run.model, run.q_matched, run.q_real),
         "lag_removed": agreement(run.model, aligned, run.q_real),
-        "user_time": agreement(run.model, run.q_virtual, run.q_real),
+        "user_time": agreement(run.model, run.q_shown, run.q_real),
         "servo": agreement(run.model, run.q_reference, run.q_real),
     }
     value = {
@@ -49,16 +54,30 @@ def summarize(run: TwinRun, attributions: tuple[Attribution, ...] = ()) -> Json:
         "robot": run.model.name,
         "seed": run.seed,
         "delay": run.delay,
-        "delay_quantile": QUANTILE,
-        "clock_offset_s": run.D,
+        "service": run.service,
+        "link_loss": run.link_loss,
+        "offset": run.offset,
+        "clock_offset_s": D,
+        "behind": _behind(run),
+        "messages": _messages(run),
         "duration_s": float(run.t[-1]),
         "commands": _commands(run),
         "errors": {name: _errors(value) for name, value in errors.items()},
         "lag_timeline_s": lag,
-        "lag_user_s": lag - run.D,
+        "lag_user_s": lag - D,
         "path": _path(run),
         "attribution_order": list(CAUSES),
         "attribution": [_attribution(item) for item in attributions],
+        "offsets": [asdict(outcome) for outcome in offsets],
+        "corrections": [
+            {
+                "t_s": made.t,
+                "end_s": made.end,
+                "error_deg": _degrees(made.error),
+                "reason": made.reason,
+            }
+            for made in run.corrections
+        ],
         "receipts_virtual": [_receipt(receipt) for receipt in run.receipts_virtual],
         "receipts_real": [_receipt(receipt) for receipt in run.receipts_real],
         "packets": [
@@ -67,6 +86,7 @@ def summarize(run: TwinRun, attributions: tuple[Attribution, ...] = ()) -> Json:
                 "real_id": packet.real_id,
                 "sent_s": packet.sent,
                 "arrived_s": packet.arrived,
+                "lost": packet.lost,
             }
             for packet in run.packets
         ],
@@ -88,9 +108,37 @@ def _commands(run: TwinRun) -> Json:
         "virtual": status_counts(run.receipts_virtual),
         "real": status_counts(run.receipts_real),
         "sent": len(run.packets),
-        "lost": sum(packet.arrived is None for packet in run.packets),
+        "lost": sum(packet.lost for packet in run.packets),
         "late": kinds.count("late"),
         "diverged": kinds.count("diverged"),
+        "corrections": len(run.corrections),
+    }
+
+
+def _behind(run: TwinRun) -> Json:
+    """How far the real robot played behind the operator."""
+    behind = -run.D
+    kinds = [event.kind for event in run.events]
+    return {
+        "mean_s": float(behind.mean()),
+        "p95_s": float(np.quantile(behind, 0.95)),
+        "max_s": float(behind.max()),
+        "slowed": kinds.count("slowed"),
+        "waited": kinds.count("waited"),
+    }
+
+
+def _messages(run: TwinRun) -> Json:
+    """What the network did to the messages to the robot."""
+    sent, arrived = run.messages.T
+    delay = (arrived - sent)[np.isfinite(arrived)]
+    some = len(delay) > 0
+    return {
+        "count": len(sent),
+        "lost": len(sent) - len(delay),
+        "delay_mean_s": float(delay.mean()) if some else None,
+        "delay_p95_s": float(np.quantile(delay, 0.95)) if some else None,
+        "delay_max_s": float(delay.max()) if some else None,
     }
 
 

@@ -20,7 +20,10 @@ def error_table(summary: Json) -> Table:
     """Joint and tool errors, a row a way of comparing."""
     from rich.table import Table
 
-    table = Table(title=f"Virtual and real {summary['robot']}, delay {summary['delay']}", title_justify="left")
+    table = Table(
+        title=f"Virtual and real {summary['robot']}, delay {summary['delay']}, offset {summary['offset']}",
+        title_justify="left",
+    )
     for name in ("at equal", "joint", "rms\ndeg", "max\ndeg"):
         table.add_column(name, justify="left" if name == "at equal" else "right")
     for name in ("tool rms\nmm", "max\nmm", "angle\nrms deg", "max\ndeg"):
@@ -56,6 +59,34 @@ def attribution_table(summary: Json) -> Table:
     return table
 
 
+def offset_table(summary: Json) -> Table:
+    """What other choices of the offset make of the same network."""
+    from rich.table import Table
+
+    table = Table(title="The same network, a body that follows exactly", title_justify="left")
+    for name in OFFSETS:
+        table.add_column(name, justify="left" if name == "offset" else "right")
+    for row in offset_rows(summary):
+        table.add_row(*(f"{value:.3f}" if isinstance(value, float) else str(value) for value in row))
+    return table
+
+
+def offset_rows(summary: Json) -> list[tuple[str | float, ...]]:
+    """Cells below the heads of OFFSETS."""
+    return [
+        (
+            row["offset"],
+            float(row["behind_mean_s"]),
+            float(row["behind_max_s"]),
+            row["late"],
+            row["waits"],
+            1e3 * row["tool_rms_timeline_m"],
+        )
+        for row in summary["offsets"]
+    ]
+
+
+OFFSETS = ("offset", "behind, mean [s]", "at most [s]", "commands late", "waits", "tool rms [mm]")
 MEASURES = {
     "tool_rms_timeline_m": ("tool, timeline", 1e3, "mm"),
     "tool_rms_user_m": ("tool, user time", 1e3, "mm"),
@@ -65,17 +96,18 @@ MEASURES = {
 
 def time_lines(summary: Json) -> list[str]:
     """Time difference, path error and what became of the commands, a sentence each."""
-    path, commands = summary["path"], summary["commands"]
+    path, commands, behind = summary["path"], summary["commands"], summary["behind"]
     lines = [
-        f"Best lag {_seconds(summary['lag_user_s'])} in user time, of which the clock offset is "
-        f"{_seconds(-summary['clock_offset_s'])}.",
+        f"Network: the robot played {_seconds(behind['mean_s'])} behind the operator on average, at most "
+        f"{_seconds(behind['max_s'])} (offset {summary['offset']}); it slowed down {behind['slowed']} times and "
+        f"waited {behind['waited']} times. Control: its joints lag another {_seconds(summary['lag_timeline_s'])}.",
         f"Time difference along the tool path: mean {_seconds(path['time_difference_mean'])}, "
         f"sd {_seconds(path['time_difference_sd'])}, max {_seconds(path['time_difference_max'])}.",
         f"Tool path error: mean {_millimetres(path['path_error_mean'])}, "
         f"95 % {_millimetres(path['path_error_p95'])}, max {_millimetres(path['path_error_max'])}.",
         f"Commands at the virtual robot: {_counts(commands['virtual'])}; at the real one: "
         f"{_counts(commands['real'])}; {commands['sent']} sent, {commands['lost']} lost, "
-        f"{commands['late']} late.",
+        f"{commands['late']} late; the virtual robot was corrected {commands['corrections']} times.",
     ]
     if path["progress"] is not None and path["progress"] < 0.97:
         lines.append(

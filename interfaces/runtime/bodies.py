@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from interfaces.runtime.virtual import Arm, ArmFactory
+from interfaces.teleop import Reference
 from vrs.model import Array
 
 if TYPE_CHECKING:
@@ -16,9 +17,9 @@ if TYPE_CHECKING:
 class ExactArm:
     """A body with no dynamics: it is where its reference is, whatever it holds."""
 
-    def run(self, q_ref: Array, qd_ref: Array, qdd_ref: Array) -> Array:  # noqa: ARG002
+    def follow(self, reference: Reference) -> Array:
         """Return the references (m, n) [rad]."""
-        return q_ref
+        return reference.q
 
     def attach(self, mass: float) -> None:
         """Take a load, which changes nothing."""
@@ -33,8 +34,8 @@ class _Puma:
     def __init__(self, arm: RealArm) -> None:
         self._arm = arm
 
-    def run(self, q_ref: Array, qd_ref: Array, qdd_ref: Array) -> Array:
-        return self._arm.run(q_ref, qd_ref, qdd_ref).q
+    def follow(self, reference: Reference) -> Array:
+        return self._arm.run(*reference).q
 
     def attach(self, mass: float) -> None:
         from robots.bullet import Payload

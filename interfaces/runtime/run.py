@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from interfaces.teleop import Correction
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.receipt import Receipt
@@ -20,9 +21,11 @@ class Packet:
     sent: float
     """User time of sending [s]."""
     arrived: float | None
-    """User time of arrival [s]; None when the packet was lost."""
+    """User time at which it first arrived [s]; None when it never did."""
     real_id: int | None = None
     """Id that the real robot's engine gave the command; None when it never arrived."""
+    lost: bool = False
+    """Whether the link lost the first message with it; later messages repeat it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,7 @@ class Event:
     t: float
     """User time [s]."""
     kind: str
-    """`payload`, `release`, `late`, `lost` or `diverged`."""
+    """`payload`, `release`, `late`, `lost`, `slowed`, `waited`, `corrected`, `halted`, `diverged`, `unfinished`."""
     text: str
     """What happened, one line."""
 
@@ -41,8 +44,9 @@ class Event:
 class TwinRun:
     """Both twins over one run, sampled on a common grid of user time.
 
-    The real robot's clock reads t_robot = t_user + D with D = −D_f (Doulgeri, Zikos, Delopoulos, section
-    IV-A), so equal timeline time τ is row t = τ of the virtual robot and row t = τ − D of the real one.
+    At user time t the real robot is where its timeline is at the play time p(t) = t + D(t). With D = −D_f all along
+    that is the paper's clock offset (Doulgeri, Zikos, Delopoulos, section IV-A); adaptive, D follows the network.
+    Equal timeline time compares the real robot at t with the virtual one at p(t).
     """
 
     model: RobotModel
@@ -53,30 +57,50 @@ class TwinRun:
     """Seed of everything random in the run."""
     delay: str
     """Delay profile, as it was asked for."""
-    D: float
-    """Clock offset of the real robot [s], ≤ 0."""
+    offset: str
+    """How D was chosen: `adaptive`, or `fixed:S` for D = −S."""
+    service: str
+    """Order of delivery on the link: `datagram` or `in-order`."""
+    link_loss: str
+    """What the robot does when messages stay away: `hold` stops, and goes on when they come again."""
     t: Array
     """User time [s], (k,), evenly spaced, ascending."""
+    play: Array
+    """Play time p of the real robot at user time t, on the timeline [s], (k,), never descending."""
     q_virtual: Array
-    """Joints of the virtual robot at user time t [rad], (k, 6)."""
+    """Joints of the virtual robot at user time t, as the commands make it [rad], (k, n)."""
+    q_shown: Array
+    """Joints of the virtual robot that the user saw, corrections included [rad], (k, n)."""
+    q_matched: Array
+    """Joints of the virtual robot, as the commands make it, at timeline time p(t) [rad], (k, n)."""
     q_real: Array
-    """Joints of the real robot as measured at user time t [rad], (k, 6)."""
+    """Joints of the real robot as measured at user time t [rad], (k, n)."""
     q_reference: Array
-    """What the real robot's own timeline asked for at that moment [rad], (k, 6)."""
+    """What the real robot's own timeline asked for at that moment [rad], (k, n)."""
     receipts_virtual: tuple[Receipt, ...]
     """Receipts of the operator's engine."""
     receipts_real: tuple[Receipt, ...]
-    """Receipts of the real robot's engine; its ids follow the order of arrival."""
+    """Receipts of the real robot's engine."""
     packets: tuple[Packet, ...]
     """Every command that was sent, in the order of sending."""
+    messages: Array
+    """Every message to the robot, heartbeats too: when it was sent and arrived, user time [s], (m, 2); NaN for one
+    that was lost or was still under way at the end."""
+    corrections: tuple[Correction, ...]
+    """When the virtual robot was put where the real one was going."""
     events: tuple[Event, ...]
     """Everything else that happened, by time."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "t", frozen_array(self.t))
+        for name in ("t", "play", "messages"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name)))
         if self.t.ndim != 1 or len(self.t) < 2 or not (np.diff(self.t) > 0).all():
             raise InvalidValueError("t", self.t.shape, "at least two ascending times, shape (k,)")
-        for name in ("q_virtual", "q_real", "q_reference"):
+        if self.play.shape != self.t.shape or (np.diff(self.play) < 0).any():
+            raise InvalidValueError("play", self.play.shape, f"never descending, of shape {self.t.shape}")
+        if self.messages.ndim != 2 or self.messages.shape[1] != 2:
+            raise InvalidValueError("messages", self.messages.shape, "of shape (m, 2)")
+        for name in ("q_virtual", "q_shown", "q_matched", "q_real", "q_reference"):
             value = frozen_array(getattr(self, name))
             if value.ndim != 2 or len(value) != len(self.t):
                 raise InvalidValueError(name, value.shape, f"of shape ({len(self.t)}, n)")
@@ -86,3 +110,8 @@ class TwinRun:
     def dt(self) -> float:
         """Step of the grid [s]."""
         return float(self.t[1] - self.t[0])
+
+    @property
+    def D(self) -> Array:
+        """Clock offset of the real robot, play time less user time [s], (k,)."""
+        return self.play - self.t

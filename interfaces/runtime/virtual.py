@@ -1,44 +1,48 @@
-"""The laboratory driver: both twins and the link in virtual time, repeatable from a seed.
+"""A plan on both twins in the laboratory: virtual time, as fast as the processor goes, repeatable from a seed.
 
-The operator's engine takes each command at once. Across the link, the real robot's own engine takes those
-that arrive, under a clock that runs D_f behind the user's (Doulgeri, Zikos, Delopoulos, section IV-A), and
-its body follows its own timeline. A command that needs longer than D_f comes late, and is postponed there.
+The operator's site takes each command at once and sends it on; the robot's site carries it out, plays its timeline,
+and its body follows at 1 kHz. How far behind it plays adapts to the network, or is fixed as in the paper (Doulgeri,
+Zikos, Delopoulos, section IV-A): commands that take longer are then postponed.
 """
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link import Channel, ConstantDelay, DelayProfile, Service
+from interfaces.link import Conditions, DelayProfile, LinkConditions, PacketRecord, Service
+from interfaces.runtime.happenings import command_events, correction_events, waits
+from interfaces.runtime.laboratory import Body, Laboratory
+from interfaces.runtime.offset import QUANTILE, spelled
 from interfaces.runtime.plan import Plan, PlannedMotion, PlannedPayload
 from interfaces.runtime.run import Event, Packet, TwinRun
-from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Receipt, Status
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from vrs import Engine, Lateness, ManualClock, MotionCommand, Receipt, Status
 from vrs.model import Array, RobotModel
+from vrs.timeline import Timeline
 
 TICK = 0.001
 """Period of the real robot's servo [s]."""
 STEP = 0.02
 """Period of the record [s]."""
-BLOCK = 500
-"""Most ticks between two progress reports."""
-QUANTILE = 0.95
-"""Share of packets that a random profile's D_f covers."""
+REPORT = 0.1
+"""Time between two reports of the robot [s]; between them the body runs without a break."""
+TURN = 0.5
+"""How often it's looked whether the run is over [s]."""
 SETTLE = 2.0
 """How long the record goes on after the last motion [s]."""
+PATIENCE = 120.0
+"""How long the operator waits for what is still to be done [s], beside four times what the link usually takes."""
+LINK_LOSS = "hold"
+"""What the robot does when messages stay away."""
 
 
-class Arm(Protocol):
-    """A robot's body that follows references, a row a tick."""
-
-    def run(self, q_ref: Array, qd_ref: Array, qdd_ref: Array) -> Array:
-        """Follow references (m, n) [rad, rad/s, rad/s²]; return measured joints after each tick, (m, n)."""
+class Arm(Body, Protocol):
+    """A robot's body, with a hand."""
 
     def attach(self, mass: float) -> None:
         """Take a load [kg] that the servo doesn't know."""
@@ -53,30 +57,6 @@ Progress: TypeAlias = Callable[[float], None]
 """Told the user time reached [s]."""
 
 
-def clock_offset(profile: DelayProfile) -> float:
-    """D = −D_f [s]: the constant delay, or the 95 % quantile rounded up to a step of the record."""
-    if isinstance(profile, ConstantDelay):
-        return 0.0 - profile.delay
-    return -STEP * math.ceil(profile.quantile(QUANTILE) / STEP - 1e-9)
-
-
-def robot_time(t_user: float, D: float) -> float:
-    """What the robot's clock reads at user time t_user [s]: whole nanoseconds, rounded down.
-
-    Floats alone don't do: (t + D_f) − D_f may lie a rounding error after t, and a command that arrives just
-    in time would count as late.
-    """
-    return math.floor((t_user + D) * 1e9) / 1e9
-
-
-@dataclass(frozen=True, slots=True)
-class _Wire:
-    """What crosses the link: the command as the operator's engine resolved it."""
-
-    command_id: int
-    command: MotionCommand
-
-
 def run_twins(
     plan: Plan,
     model: RobotModel,
@@ -84,7 +64,8 @@ def run_twins(
     arm: ArmFactory,
     *,
     seed: int,
-    service: Service = Service.IN_ORDER,
+    offset: float | None = None,
+    service: Service = Service.DATAGRAM,
     progress: Progress | None = None,
 ) -> TwinRun:
     """Run a plan on both twins.
@@ -92,36 +73,21 @@ def run_twins(
     Args:
         plan: What the operator does.
         model: The robot.
-        profile: The link's delay.
+        profile: The link's delay, either way.
         arm: Makes the real robot's body.
         seed: Seed of the link, ≥ 0.
+        offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
         service: Order of delivery on the link.
         progress: Called now and then with the user time reached [s].
 
     Returns:
         The record, every 20 ms of user time, until both robots have been at rest for 2 s.
     """
-    D = clock_offset(profile)
-    link: Channel[_Wire] = Channel(profile, np.random.default_rng(seed), service)
+    conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
     with arm(plan.start) as body:
-        session = _Session(plan, model, D, link, body)
-        session.run(progress or _ignore)
-    t = STEP * np.arange(len(session.measured), dtype=np.float64)
-    return TwinRun(
-        model=model,
-        title=plan.title,
-        seed=seed,
-        delay=profile.name,
-        D=D,
-        t=t,
-        q_virtual=session.virtual.timeline.sample(t),
-        q_real=np.array(session.measured),
-        q_reference=session.real.timeline.sample(t + D),
-        receipts_virtual=session.virtual.receipts,
-        receipts_real=session.real.receipts,
-        packets=tuple(session.packets.values()),
-        events=tuple(sorted(session.events, key=lambda event: event.t)),
-    )
+        session = _Session(plan, model, conditions, body, seed, offset)
+        end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or _ignore)
+    return session.record(end, plan.title, conditions.forward, seed)
 
 
 def _ignore(t: float) -> None:
@@ -131,88 +97,173 @@ def _ignore(t: float) -> None:
 class _Session:
     """State of one run."""
 
-    def __init__(self, plan: Plan, model: RobotModel, D: float, link: Channel[_Wire], body: Arm) -> None:
-        self._D, self._link, self._body = D, link, body
-        self._clock_virtual, self._clock_real = ManualClock(0.0), ManualClock(robot_time(0.0, D))
-        self.virtual = Engine(model, q=plan.start, clock=self._clock_virtual, lateness=Lateness.POSTPONE)
-        self.real = Engine(model, q=plan.start, clock=self._clock_real, lateness=Lateness.POSTPONE)
-        agenda = [(item.registered_at, i, item) for i, item in enumerate(plan.motions)]
-        hand = [(item.t - D, len(agenda) + i, item) for i, item in enumerate(plan.payloads)]
-        self._agenda: list[tuple[float, int, PlannedMotion | PlannedPayload]] = [*agenda, *hand]
-        heapq.heapify(self._agenda)
-        self.measured: list[Array] = [np.array(plan.start)]
-        self._ticks = 0
-        self.packets: dict[int, Packet] = {}
-        self.events: list[Event] = []
+    def __init__(
+        self, plan: Plan, model: RobotModel, conditions: LinkConditions, body: Arm, seed: int, offset: float | None
+    ) -> None:
+        self._start, self._model, self._offset = plan.start, model, offset
+        self._operator = OperatorSite(model, plan.start, now=0.0, lateness=Lateness.POSTPONE)
+        config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
+        self._robot = RobotSite(model, plan.start, now=0.0, config=config)
+        self._lab = Laboratory(
+            self._operator, self._robot, conditions, np.random.default_rng(seed),
+            tick=TICK, every=round(STEP / TICK), body=body,
+        )  # fmt: skip
+        self._sent: list[tuple[float, MotionCommand, Receipt]] = []
+        self._messages: list[PacketRecord] = []
+        self._events: list[Event] = []
+        self._cues = len(plan.payloads)
+        self._last_action = max(motion.registered_at for motion in plan.motions)
+        for motion in plan.motions:
+            self._lab.schedule(motion.registered_at, lambda now, motion=motion: self._register(motion, now))  # type: ignore[misc]
+        for item in plan.payloads:
+            self._lab.cue(item.t, lambda t, item=item: self._handle(item, body, t))  # type: ignore[misc]
 
-    def run(self, progress: Progress) -> None:
-        now = 0.0
-        while (upcoming := self._next()) is not None:
-            now = upcoming
-            self._advance(now, progress)
-            for delivery in self._link.receive(now):
-                self._arrive(delivery.payload, now)
-            while self._agenda and self._agenda[0][0] <= now:
-                item = heapq.heappop(self._agenda)[2]
-                if isinstance(item, PlannedMotion):
-                    self._register(item, now)
-                else:
-                    self._handle(item, now)
-        end = max(now, self.virtual.timeline.end, self.real.timeline.end - self._D) + SETTLE
-        self._advance(STEP * math.ceil(end / STEP), progress)
+    def run(self, patience: float, progress: Progress) -> float:
+        """Let the plan be carried out.
 
-    def _next(self) -> float | None:
-        times = [self._agenda[0][0]] if self._agenda else []
-        arrival = self._link.next_deadline()
-        return min([*times, *([] if arrival is None else [arrival])], default=None)
+        Args:
+            patience: How long to wait for anything that's still to happen [s].
+            progress: Told the user time reached [s].
 
-    def _advance(self, now: float, progress: Progress) -> None:
-        """Run the real body up to user time now [s]."""
-        every = round(STEP / TICK)
-        last = math.floor(now / TICK + 1e-6)
-        while self._ticks < last:
-            ticks = np.arange(self._ticks + 1, min(self._ticks + BLOCK, last) + 1)
-            tau = TICK * ticks + self._D
-            q = self._body.run(*(self.real.timeline.sample(tau, derivative=d) for d in range(3)))
-            self.measured.extend(q[ticks % every == 0])
-            self._ticks = int(ticks[-1])
-            progress(TICK * self._ticks)
+        Returns:
+            When the record is to end [s].
+        """
+        lab = self._lab
+        while True:
+            lab.run(lab.now + TURN)
+            self._messages += lab.link.forward.log.take()
+            progress(lab.now)
+            rest = max(self._last_action, self._operator.engine.timeline.end)
+            arrived = self._robot_rests() if lab.now >= rest else None
+            if arrived is not None and self._agree(arrived):
+                rest = max(rest, arrived)
+                break
+            if lab.now > rest + patience:
+                self._tell(lab.now, "unfinished", f"not everything was done {patience:.0f} s after the last motion")
+                rest = lab.now
+                break
+        end = STEP * math.ceil((rest + SETTLE) / STEP - 1e-9)
+        lab.run(max(end, lab.now))
+        self._messages += lab.link.forward.log.take()
+        progress(lab.now)
+        return end
+
+    def _robot_rests(self) -> float | None:
+        """When the robot had done everything that it was told [s]; None if it hasn't."""
+        everything = self._robot.halted or len(self._lab.answers) == len(self._sent)
+        began = self._robot.epoch > 0 or self._offset is not None
+        end = self._robot.engine.timeline.end - 1e-9
+        if not (everything and began) or self._cues or self._play_at(self._lab.now) < end:
+            return None
+        return STEP * float(np.searchsorted(self._play(), end))
+
+    def _agree(self, arrived: float) -> bool:
+        """Whether the operator has heard of all that the robot did otherwise."""
+        report = self._operator.report
+        return not self._robot.parted or (report is not None and report.sent_at >= arrived)
+
+    def _play(self) -> Array:
+        """Play time in each row of the record, the first moment included [s]."""
+        p = np.concatenate([self._robot.play_at(np.zeros(1)).p, self._lab.play[:, 1]])
+        # An adaptive play time is set back when the first message comes.
+        ascending: Array = np.minimum.accumulate(p[::-1])[::-1]
+        return ascending
 
     def _register(self, item: PlannedMotion, now: float) -> None:
-        self._clock_virtual.set(now)
-        receipt = self.virtual.execute(item.command)
-        if receipt.status is Status.REJECTED or receipt.q is None:
-            return  # what the virtual robot refused isn't sent
-        # The wire carries joints and the resolved time, so that both robots mean the same motion.
-        command = replace(item.command, target=JointTarget(receipt.q), execute_at=receipt.execute_at)
-        arrival = self._link.send(_Wire(receipt.command_id, command), now)
-        self.packets[receipt.command_id] = Packet(receipt.command_id, now, arrival)
-        if arrival is None:
-            self._tell(now, "lost", f"command {receipt.command_id} was lost on the link")
+        receipt = self._operator.execute(item.command, now=now)
+        # What the virtual robot refused isn't sent.
+        if isinstance(receipt, Receipt) and receipt.status is not Status.REJECTED:
+            self._sent.append((now, item.command, receipt))
 
-    def _arrive(self, wire: _Wire, now: float) -> None:
-        self._clock_real.set(robot_time(now, self._D))
-        receipt = self.real.execute(wire.command)
-        asked, command = wire.command.execute_at, wire.command_id
-        self.packets[command] = replace(self.packets[command], real_id=receipt.command_id)
-        if receipt.status is Status.REJECTED or receipt.execute_at is None or asked is None:
-            self._tell(now, "diverged", f"the real robot rejected command {command}: {receipt.reason}")
-        elif receipt.execute_at > asked + 1e-9:
-            late = now + self._D - asked
-            why = f"came {late:.3f} s too late" if late > 0 else "met a plan that had changed"
-            text = f"command {command} {why}: executed at {receipt.execute_at:.3f} s instead of {asked:.3f} s"
-            self._tell(now, "late", text)
-
-    def _handle(self, item: PlannedPayload, now: float) -> None:
+    def _handle(self, item: PlannedPayload, body: Arm, t: float) -> None:
+        self._cues, self._last_action = self._cues - 1, max(self._last_action, t)
         if item.mass is None:
-            self._body.release()
-            self._tell(now, "release", "the real gripper released its load")
+            body.release()
+            self._tell(t, "release", "the real gripper released its load")
         else:
-            self._body.attach(item.mass)
-            self._tell(now, "payload", f"the real gripper took {item.mass:g} kg")
+            body.attach(item.mass)
+            self._tell(t, "payload", f"the real gripper took {item.mass:g} kg")
 
     def _tell(self, t: float, kind: str, text: str) -> None:
-        self.events.append(Event(t, kind, text))
+        self._events.append(Event(t, kind, text))
+
+    def record(self, end: float, title: str, link: Conditions, seed: int) -> TwinRun:
+        """Write down what happened up to the end [s]."""
+        rows = round(end / STEP) + 1
+        t, play = STEP * np.arange(rows, dtype=np.float64), self._play()[:rows]
+        shown = self._operator.engine.timeline
+        commanded = self._commanded() if self._operator.corrections else shown
+        reference = np.vstack([self._start, self._lab.reference.q])[:rows]
+        corrections = tuple(self._operator.corrections)
+        packets = self._packets()
+        fates = zip(packets, (receipt for _, _, receipt in self._sent), self._answers(), strict=True)
+        events = [
+            *self._events,
+            *(event for fate in fates for event in command_events(*fate, play_at=self._play_at)),
+            *waits(t, play, reference, slowest=1.0 - self._robot.config.playout.slew),
+            *correction_events(corrections),
+            *(Event(at, "halted", f"the real robot stopped: {why}") for at, why in self._lab.halts.values()),
+        ]
+        arrivals = [(m.sent, math.nan if m.arrived is None else m.arrived) for m in self._messages]
+        return TwinRun(
+            model=self._model,
+            title=title,
+            seed=seed,
+            delay=link.delay.name,
+            offset=spelled(self._offset),
+            service=str(link.service),
+            link_loss=LINK_LOSS,
+            t=t,
+            play=play,
+            q_virtual=commanded.sample(t),
+            q_shown=shown.sample(t),
+            q_matched=commanded.sample(play),
+            q_real=np.vstack([self._start, self._lab.measured])[:rows],
+            q_reference=reference,
+            receipts_virtual=self._operator.engine.receipts,
+            receipts_real=self._receipts(),
+            packets=packets,
+            messages=np.array(arrivals, dtype=np.float64).reshape(-1, 2),
+            corrections=corrections,
+            events=tuple(sorted((e for e in events if e.t <= end), key=lambda event: event.t)),
+        )
+
+    def _play_at(self, t: float) -> float:
+        return float(self._robot.play_at(np.array([t])).p[0])
+
+    def _answers(self) -> list[Receipt | None]:
+        """What the robot's engine answered to each command that was sent."""
+        return [self._lab.answers.get((1, number)) for number in range(1, len(self._sent) + 1)]
+
+    def _packets(self) -> tuple[Packet, ...]:
+        lost = {m.sent for m in self._messages if m.lost is not None or m.attempts > 1}
+        return tuple(
+            Packet(
+                receipt.command_id,
+                sent,
+                self._lab.arrivals.get((1, number)),
+                None if answer is None else answer.command_id,
+                sent in lost,
+            )
+            for number, ((sent, _, receipt), answer) in enumerate(
+                zip(self._sent, self._answers(), strict=True), start=1
+            )
+        )
+
+    def _receipts(self) -> tuple[Receipt, ...]:
+        """The truth about every command at the robot; of those before a stop, what was answered then."""
+        answered = {answer.command_id: answer for answer in self._answers() if answer is not None}
+        answered |= {receipt.command_id: receipt for receipt in self._robot.engine.receipts}
+        return tuple(answered[command_id] for command_id in sorted(answered))
+
+    def _commanded(self) -> Timeline:
+        """What the commands alone make of the virtual robot."""
+        clock = ManualClock(0.0)
+        engine = Engine(self._model, q=self._start, clock=clock, lateness=Lateness.POSTPONE)
+        for now, command, _ in self._sent:
+            clock.set(now)
+            engine.execute(command)
+        return engine.timeline
 
 
 def status_counts(receipts: tuple[Receipt, ...]) -> dict[str, int]:

@@ -200,11 +200,17 @@ class Playout:
         t = np.asarray(t, float)
         if not len(t) or t[0] >= self._leg.begin:
             return _along(self._leg, t)
-        bounds = np.searchsorted(t, [leg.begin for leg in self._legs])
+        legs = []
+        for leg in reversed(self._legs):
+            legs.append(leg)
+            if leg.begin <= t[0]:
+                break
+        legs.reverse()
+        bounds = np.searchsorted(t, [leg.begin for leg in legs])
         bounds[0] = 0
         parts = [
             _along(leg, t[low:high])
-            for leg, low, high in zip(self._legs, bounds, [*bounds[1:], len(t)], strict=True)
+            for leg, low, high in zip(legs, bounds, [*bounds[1:], len(t)], strict=True)
             if high > low
         ]
         return PlayState(*(np.concatenate([part[i] for part in parts]) for i in range(3)))

@@ -44,14 +44,31 @@ def test_demo_writes_the_same_summary_twice(plan, tmp_path):
         assert (tmp_path / name / "report.html").stat().st_size > 10_000
         files.append((tmp_path / name / "summary.json").read_bytes())
     assert files[0] == files[1]
-    for item in json.loads(files[0])["attribution"]:
+    summary = json.loads(files[0])
+    assert (summary["offset"], summary["link_loss"], summary["service"]) == ("adaptive", "hold", "datagram")
+    assert [row["offset"].split(":")[0] for row in summary["offsets"]] == ["adaptive", "fixed"]
+    assert summary["commands"]["late"] == 0
+    for item in summary["attribution"]:
         assert sum(item["parts"].values()) + item["residual"] == pytest.approx(item["total"], abs=1e-8)
+
+
+def test_demo_takes_a_fixed_offset_on_an_in_order_link(plan, tmp_path):
+    arguments = ("--delay", "constant:0.4", "--offset", "fixed:0.3", "--service", "in-order", "--json")
+    done = run("demo", "--commands", plan, *arguments, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert (summary["offset"], summary["service"], summary["clock_offset_s"]) == ("fixed:0.3", "in-order", -0.3)
+    assert summary["commands"]["late"] == 1
+    assert summary["offsets"][1]["offset"] == "fixed:0.3"
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["demo", "--delay", "soon"], "constant:S"),
+        (["demo", "--offset", "soon"], "'adaptive', 'fixed', or 'fixed:S'"),
+        (["demo", "--offset", "fixed:-1"], "'adaptive', 'fixed', or 'fixed:S'"),
+        (["demo", "--service", "pigeon"], "'in-order' or 'datagram'"),
         (["demo", "--seed", "-1"], "--seed"),
         (["demo", "--seed", "x"], "--seed"),
         (["demo", "--nonsense"], "--nonsense"),

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from interfaces.report.html import render, write_report
-from interfaces.report.plots import equal_timeline_time, plots
+from interfaces.report.plots import plots
 from interfaces.report.scene import revolute_chain, scene
 from interfaces.report.summary import summarize
 from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.teleop import Correction
 from robots import puma560
 from vrs.model import Array
 from vrs.receipt import Receipt, Status
@@ -38,17 +39,24 @@ def curve(t: Array) -> Array:
     return np.array([0, 0.7, -2.2, 0, 0.2, 0]) + 0.6 * np.sin(2 * np.pi * frequency * t[:, None])
 
 
-def make_run(title: str = "Sines", reason: str = "late", k: int = 401, D: float = -0.6) -> TwinRun:
+def make_run(title: str = "Sines", reason: str = "late", k: int = 401) -> TwinRun:
+    """A real robot that is further behind in the second half."""
     t = np.linspace(0.0, 20.0, k)
-    real = curve(np.maximum(t + D, 0.0))
+    play = np.maximum.accumulate(np.maximum(t - np.where(t < 10.0, 0.6, 1.1), 0.0))
+    real = curve(play)
     answers = (
         Receipt(1, Status.ACCEPTED, 0.5, 1.0, 1.0, 4.0),
         Receipt(2, Status.POSTPONED, 5.0, 4.9, 5.0, 8.0, reason=reason),
         Receipt(3, Status.REJECTED, 9.0, 8.0, reason=reason),
     )
-    packets = (Packet(1, 0.5, 0.9), Packet(2, 5.0, None), Packet(3, 9.0, 9.4))
-    events = (Event(3.0, "payload", reason),)
-    return TwinRun(puma560.model(), title, 7, "thu", D, t, curve(t), real, real, answers, answers, packets, events)
+    packets = (Packet(1, 0.5, 0.9), Packet(2, 5.0, 6.0, lost=True), Packet(3, 9.0, 9.4))
+    messages = np.array([[0.5, 0.9], [5.0, np.nan], [9.0, 9.4]])
+    corrections = (Correction(12.0, 13.0, np.full(6, 0.1), reason),)
+    events = (Event(3.0, "payload", reason), Event(13.0, "slowed", reason))
+    return TwinRun(
+        puma560.model(), title, 7, "thu", "adaptive", "datagram", "hold", t, play, curve(t), curve(t), real,
+        real, real, answers, answers, packets, messages, corrections, events,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +73,16 @@ def test_the_same_run_gives_the_same_bytes_and_a_small_file(report: str, tmp_pat
 
 
 def test_it_says_what_was_run(report: str) -> None:
-    for fact in ("Sines", "thu", "−0.600 s", "network, then payload and friction, then servo", "puma560"):
+    for fact in (
+        "Sines",
+        "thu",
+        "−1.100 s",
+        "adaptive",
+        "datagram",
+        "hold",
+        "network, then payload and friction, then servo",
+        "puma560",
+    ):
         assert fact in report
     for word in ("joint 6 rms [deg]", "tool rms [mm]", "time difference mean", "postponed", "rejected"):
         assert word in report
@@ -113,15 +130,22 @@ def test_the_chain_rebuilds_the_models_links() -> None:
         np.testing.assert_allclose(X, model.links(q)[i + 1], atol=1e-12)
 
 
-def test_equal_timeline_time_takes_the_clock_offset_out() -> None:
-    tau, q_virtual, q_real = equal_timeline_time(make_run(k=2001))
-    assert tau[-1] == pytest.approx(20.0 - 0.6)
-    np.testing.assert_allclose(q_real, q_virtual, atol=1e-9)
+def test_the_summary_takes_the_clock_offset_out_and_says_what_it_was() -> None:
+    run = make_run(k=2001)
+    value = summarize(run)
+    assert value["errors"]["timeline_time"]["tool_max_m"] == 0.0
+    assert value["errors"]["user_time"]["tool_max_m"] > 0.05
+    assert value["behind"]["max_s"] == pytest.approx(1.1)
+    assert value["clock_offset_s"] == pytest.approx(float(run.D.mean()))
+    assert value["messages"] == {
+        "count": 3, "lost": 1, "delay_mean_s": 0.4, "delay_p95_s": 0.4, "delay_max_s": 0.4
+    }  # fmt: skip
+    assert value["corrections"][0]["error_deg"] == pytest.approx([np.degrees(0.1)] * 6)
 
 
-def test_plots_cover_errors_delays_and_every_joint() -> None:
+def test_plots_cover_the_offset_errors_and_every_joint() -> None:
     names = [plot.name for plot in plots(make_run())]
-    assert names == ["joint-errors", "tool-error", "delays", *(f"joint-{j}" for j in range(1, 7))]
+    assert names == ["behind", "joint-errors", "tool-error", *(f"joint-{j}" for j in range(1, 7))]
 
 
 def test_a_run_of_an_hour_still_gives_a_small_file(tmp_path: Path) -> None:
@@ -243,7 +267,8 @@ def test_slider_play_rate_and_markers_move_time(open_page: Any, report: str) -> 
     assert line["x"] - plot["x"] == pytest.approx(share * plot["width"], abs=1.5)
     assert "command 3: rejected" in page.locator("#now").text_content()
     marks = page.locator("#marks .mark")
-    assert marks.count() == 5
+    assert marks.count() == 6
+    assert page.locator("#marks .mark-slowed").count() == 1
     assert page.locator("#marks .mark-lost").count() == 1
     page.locator("#marks .mark-payload").click()
     assert page.locator("#clock").text_content() == "3.00 s"
@@ -264,7 +289,11 @@ def test_aligned_clocks_bring_the_twins_together(open_page: Any, report: str) ->
         return Math.hypot(...out.real.map((x, k) => x - out.virtual[k])); }"""
     assert page.evaluate(first) > 0.02
     page.locator("#align").check()
-    assert page.evaluate(first) < 1e-3
+    for t in (8.0, 15.0):
+        page.evaluate(f"report.seek({t})")
+        assert page.evaluate(first) < 1e-3
+    assert page.evaluate("report.whenPlayed(8)") == pytest.approx(8.6, abs=1e-3)
+    assert page.evaluate("report.whenPlayed(15)") == pytest.approx(16.1, abs=1e-3)
 
 
 def test_evil_texts_do_not_run(open_page: Any) -> None:

@@ -7,14 +7,16 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from interfaces.link import delay_profile
+from interfaces.link import Service, delay_profile
 from interfaces.report.summary import summarize, to_json
 from interfaces.runtime.attribution import CAUSES, Measures, attribute, measures, run_without
 from interfaces.runtime.bodies import exact_arm, simulated_puma
+from interfaces.runtime.offset import fixed_offset
 from interfaces.runtime.plan import default_plan, parse_plan
 from interfaces.runtime.virtual import run_twins
 from robots import puma560
 from vrs import Status
+from vrs.errors import InvalidValueError
 
 model = puma560.model()
 PLAN = parse_plan(
@@ -28,15 +30,22 @@ PLAN = parse_plan(
 )
 
 
-def twins(profile, plan=PLAN, arm=exact_arm, seed=0):
-    return run_twins(plan, model, delay_profile(profile), arm, seed=seed)
+def twins(profile, plan=PLAN, arm=exact_arm, seed=0, offset="fixed", service=Service.DATAGRAM):
+    delay = delay_profile(profile)
+    D = fixed_offset(offset, delay)
+    return run_twins(plan, model, delay, arm, seed=seed, offset=D, service=service)
+
+
+def told(run, *kinds):
+    return [event for event in run.events if event.kind in kinds]
 
 
 @pytest.mark.parametrize("delay", ["none", "constant:0.5", "constant:0.123456789", "lunar"])
 def test_a_constant_delay_shifts_the_real_robot_and_nothing_else(delay):
     run = twins(delay)
     D_f = delay_profile(delay).quantile(0.95)
-    assert D_f == -run.D
+    assert np.abs(run.D + D_f).max() < 1e-12
+    assert run.offset == f"fixed:{D_f:.9g}"
     assert [event for event in run.events if event.kind != "payload"] == []
     statuses = [receipt.status for receipt in run.receipts_virtual]
     assert statuses == [Status.ACCEPTED, Status.ACCEPTED, Status.REJECTED, Status.POSTPONED]
@@ -44,55 +53,139 @@ def test_a_constant_delay_shifts_the_real_robot_and_nothing_else(delay):
         receipt.execute_at for receipt in run.receipts_virtual if receipt.status is not Status.REJECTED
     ]
     assert [packet.arrived - packet.sent for packet in run.packets] == pytest.approx([D_f] * 3)
-    assert [packet.real_id for packet in run.packets] == [1, 2, 3]
-    late = np.stack([np.interp(run.t + run.D, run.t, column) for column in run.q_virtual.T], axis=1)
+    assert [packet.real_id for packet in run.packets] == [1, 2, 4]
+    late = np.stack([np.interp(run.t - D_f, run.t, column) for column in run.q_virtual.T], axis=1)
     assert run.q_real == pytest.approx(late, abs=2e-3)
+    assert run.q_real == pytest.approx(run.q_matched, abs=1e-9)
     assert run.q_real[-1] == pytest.approx(run.q_virtual[-1], abs=1e-14)
 
 
-def test_a_late_command_is_postponed_and_told(tmp_path):
+@pytest.mark.parametrize("delay", ["constant:0.3", "mon", "thu", "wed@20"])
+@pytest.mark.parametrize("service", list(Service))
+def test_with_an_adaptive_offset_no_command_is_late(delay, service):
+    run = twins(delay, offset="adaptive", seed=3, service=service)
+    assert not told(run, "late", "diverged", "corrected", "halted", "unfinished")
+    assert run.q_real == pytest.approx(run.q_matched, abs=1e-12)
+    assert run.q_real[-1] == pytest.approx(run.q_virtual[-1], abs=1e-12)
+    assert measures(run).tool_rms_timeline_m < 1e-12
+    assert measures(run).tool_rms_user_m > 0.01
+    assert run.D.max() <= 0
+    assert [r.execute_at for r in run.receipts_real] == [
+        r.execute_at for r in run.receipts_virtual if r.status is not Status.REJECTED
+    ]
+
+
+def stalled(tmp_path):
+    """A link that takes 0.1 s, and once three seconds for two seconds' messages; an operator who moves on."""
     trace = tmp_path / "trace.csv"
-    trace.write_text("delay_s\n0.1\n0.1\n0.1\n3.0\n" + "0.1\n" * 100)
-    plan = parse_plan(
-        b"\n".join(b'{"issue": %d, "move": [%d, 60, -170, 0, 30, 0]}' % (5 * i, 10 * i) for i in range(5)),
-        "plan.jsonl",
-        model,
+    trace.write_text("delay_s\n" + "0.1\n" * 290 + "3.0\n" * 40 + "0.1\n" * 3000)
+    sides = (60, -60, 60, -60, 60)
+    lines = (
+        b'{"issue": %d, "move": [%d, 60, -170, 0, 30, 0], "speed": 0.3}' % (5 * i, q) for i, q in enumerate(sides)
     )
-    run = twins(f"trace:{trace}", plan)
-    assert round(run.D, 9) == -0.1
-    assert [event.kind for event in run.events] == ["late"]
+    return f"trace:{trace}", parse_plan(b"\n".join(lines), "plan.jsonl", model)
+
+
+def test_where_messages_stall_the_robot_slows_down_and_is_further_behind_by_that(tmp_path):
+    delay, plan = stalled(tmp_path)
+    run = twins(delay, plan, offset="adaptive", service=Service.IN_ORDER)
+    (slowed,) = (event for event in told(run, "slowed") if event.t > 5)
+    assert 14 < slowed.t < 16.5
+    grown = float(slowed.text.split("is ")[1].split()[0])
+    until = float(slowed.text.split("until ")[1].split()[0])
+    begin, end = (round(t / run.dt) for t in (slowed.t, until))
+    assert grown == pytest.approx(run.D[begin] - run.D[end], abs=2e-3)
+    assert 2.5 < grown < 3.5
+    assert summarize(run)["behind"]["slowed"] == len(told(run, "slowed"))
+
+
+def test_a_late_command_is_postponed_and_the_virtual_robot_follows(tmp_path):
+    delay, plan = stalled(tmp_path)
+    run = twins(delay, plan, service=Service.IN_ORDER)
+    assert run.D[0] == pytest.approx(-0.1)
+    (late,) = told(run, "late")
+    assert late.text.startswith("command 4 came ")
+    arrived = run.packets[3].arrived
     assert run.receipts_real[3].status is Status.POSTPONED
-    assert run.receipts_real[3].execute_at == pytest.approx(17.9)
+    assert run.receipts_real[3].execute_at == pytest.approx(arrived - 0.1)
     assert measures(run).tool_rms_timeline_m > 0.01
+    assert run.corrections
+    assert len(told(run, "corrected")) == len(run.corrections) == summarize(run)["commands"]["corrections"]
+    # What the commands make is kept apart from what the user saw.
+    assert np.abs(run.q_shown - run.q_virtual).max() > 0.01
+    assert run.q_shown[-1] == pytest.approx(run.q_real[-1], abs=1e-9)
 
 
-def test_a_lost_command_is_told(tmp_path):
+def test_a_lost_message_is_told_and_repeated(tmp_path):
     trace = tmp_path / "trace.csv"
-    trace.write_text('delay_s\n0.1\n""\n0.1\n')
-    run = twins(f"trace:{trace}")
-    assert [packet.arrived is None for packet in run.packets] == [False, True, False]
-    assert [event.kind for event in run.events] == ["lost", "payload"]
-    assert len(run.receipts_real) == 2
+    trace.write_text("delay_s\n" + "0.1\n" * 11 + '""\n' + "0.1\n" * 400)
+    run = twins(f"trace:{trace}", offset="adaptive")
+    assert [packet.lost for packet in run.packets] == [True, False, False]
+    assert run.packets[0].arrived - run.packets[0].sent == pytest.approx(0.15)
+    assert [event.kind for event in run.events if event.kind != "payload"][:1] == ["lost"]
+    assert len(run.receipts_real) == 3
     assert summarize(run)["commands"]["lost"] == 1
+    assert np.isnan(run.messages[:, 1]).sum() == 1
 
 
-def test_the_load_is_taken_by_the_robots_own_clock():
-    (event,) = twins("constant:0.5").events
-    assert event.t == pytest.approx(2.1)
+def test_a_robot_that_cannot_follow_stops_and_the_run_ends():
+    class Stuck:
+        def follow(self, reference):
+            return np.tile(PLAN.start, (len(reference.q), 1))
+
+        def attach(self, mass):
+            pass
+
+    run = twins("constant:0.6", arm=lambda q: nullcontext(Stuck()))
+    (halted,) = told(run, "halted")
+    assert "rad from where it should be" in halted.text
+    assert 1.6 < halted.t < 2.1
+    # A command that was under way then is never carried out, and the run doesn't wait for it.
+    assert len(run.packets) > len(run.receipts_real)
+    assert not told(run, "unfinished")
+    assert run.corrections
+    assert run.q_shown[-1] == pytest.approx(PLAN.start, abs=1e-9)
+    assert any("robot stopped by itself" in r.reason for r in run.receipts_virtual)
 
 
-def test_the_body_runs_every_millisecond_in_step_with_its_timeline():
+@pytest.mark.parametrize(
+    "text", ["", "adaptiv", "fixed:", "fixed:-1", "fixed:nan", "fixed:1e9", "-0.5", "constant:1"]
+)
+def test_an_offset_of_another_spelling_is_refused(text):
+    with pytest.raises(InvalidValueError, match="'adaptive', 'fixed', or 'fixed:S'"):
+        fixed_offset(text, delay_profile("none"))
+
+
+def test_a_fixed_offset_covers_the_profile_or_is_given():
+    assert fixed_offset("adaptive", delay_profile("thu")) is None
+    assert fixed_offset("fixed", delay_profile("constant:0.123")) == -0.123
+    assert fixed_offset("fixed:0.25", delay_profile("thu")) == -0.25
+    D = fixed_offset("fixed", delay_profile("thu"))
+    assert 0 <= -D - delay_profile("thu").quantile(0.95) < 0.02 + 1e-9
+
+
+@pytest.mark.parametrize("offset", ["fixed", "fixed:0.7", "adaptive"])
+def test_the_load_is_taken_when_the_robot_plays_its_time(offset):
+    run = twins("constant:0.5", offset=offset)
+    (event,) = told(run, "payload")
+    assert np.interp(event.t, run.t, run.play) == pytest.approx(1.6, abs=1e-4)
+    if offset == "fixed":
+        assert event.t == pytest.approx(2.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("offset", ["fixed", "adaptive"])
+def test_the_body_runs_every_millisecond_in_step_with_its_timeline(offset):
     seen = []
 
     class Spy:
-        def run(self, q_ref, qd_ref, qdd_ref):
-            seen.append((q_ref, qd_ref, qdd_ref))
-            return q_ref
+        def follow(self, reference):
+            seen.append(reference)
+            return reference.q
 
         def attach(self, mass):
             seen.append(mass)
 
-    run = twins("constant:0.25", arm=lambda q: nullcontext(Spy()))
+    run = twins("constant:0.25", arm=lambda q: nullcontext(Spy()), offset=offset)
     assert [s for s in seen if isinstance(s, float)] == [2.5]
     q, qd, _ = (np.concatenate([s[i] for s in seen if not isinstance(s, float)]) for i in range(3))
     assert len(q) == round(run.t[-1] * 1000)
@@ -101,7 +194,7 @@ def test_the_body_runs_every_millisecond_in_step_with_its_timeline():
 
 
 def test_same_seed_same_bytes_and_another_seed_other_arrivals():
-    first, second, other = (to_json(summarize(twins("thu", seed=seed))) for seed in (4, 4, 5))
+    first, second, other = (to_json(summarize(twins("thu", seed=seed, offset="adaptive"))) for seed in (4, 4, 5))
     assert first == second
     assert first != other
 

@@ -1,0 +1,75 @@
+"""`vrs reproduce`: what papers claim, measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.demo import prepare
+
+if TYPE_CHECKING:
+    from interfaces.lab import Paper, Reproduction, Study
+
+
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="doulgeri, or all for every paper there is.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where PAPER.json and the figures go.")],
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="Seed of everything random.")
+    ] = 0,
+    runs: Annotated[
+        int, typer.Option("--runs", min=2, max=1000, metavar="K", help="Runs behind each random figure.")
+    ] = 10,
+    length: Annotated[
+        float, typer.Option("--length", min=2, max=3600, metavar="S", help="Commands in each run last so long [s].")
+    ] = 20.0,
+    workers: Annotated[
+        int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
+    ] = 2,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Write PAPER.json on standard output too, a document a paper.")
+    ] = False,
+) -> None:
+    """Measure each claim of a paper: expected, measured, holds; and draw its figures."""
+    from interfaces.lab import Study, papers
+    from interfaces.lab.output import to_json, write
+
+    chosen, study = papers(paper), Study(seed, runs, length)
+    prepare(out)
+    for each in chosen:
+        reproduction = _run(each, study, workers)
+        path = write(reproduction, out)
+        if as_json:
+            typer.echo(to_json(reproduction), nl=False)
+        else:
+            _show(reproduction, path)
+
+
+def _run(paper: Paper, study: Study, workers: int) -> Reproduction:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from interfaces.lab import reproduce as measure
+
+    columns = (TextColumn("{task.description:26}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bar:
+        tasks = {part.title: bar.add_task(part.title, total=len(part.cases)) for part in paper.parts}
+        return measure(paper, study, workers=workers, progress=lambda title: bar.advance(tasks[title]))
+
+
+def _show(reproduction: Reproduction, path: Path) -> None:
+    from rich.console import Console
+
+    from interfaces.lab.output import rich_tables
+
+    console = Console()
+    for table in rich_tables(reproduction):
+        console.print(table)
+    failed, found = reproduction.failed, reproduction.findings
+    total = len(found.claims) + len(found.timings)
+    typer.echo(f"{total - len(failed)} of {total} claims hold.")
+    for claim in failed:
+        typer.echo(f"Doesn't hold: {claim.claim} ({claim.source})")
+    typer.echo(f"Wrote {path} and {len(found.figures)} figures")

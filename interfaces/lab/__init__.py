@@ -1,0 +1,19 @@
+"""Reproductions of papers: what each claims, measured by running it."""
+
+from interfaces.lab.claims import Claim, Figure, Findings, Paper, Part, Reproduction, Study, Table
+from interfaces.lab.papers import PAPERS, papers
+from interfaces.lab.running import reproduce
+
+__all__ = [
+    "PAPERS",
+    "Claim",
+    "Figure",
+    "Findings",
+    "Paper",
+    "Part",
+    "Reproduction",
+    "Study",
+    "Table",
+    "papers",
+    "reproduce",
+]

@@ -1,0 +1,283 @@
+"""Open problem (e): a direct link between the virtual and the real robot. How soon do they agree again?"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script
+from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.statistics import bootstrap, median
+from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, LinkConditions, Service, delay_profile
+from interfaces.runtime.laboratory import Laboratory
+from interfaces.teleop import Correction, OperatorSite, OperatorSiteConfig, RobotSite, RobotSiteConfig
+from vrs import JointTarget, MotionCommand, Timeline
+from vrs.commands import Command
+from vrs.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+DELAY: Final = 0.3
+"""Each way [s]."""
+SHORT: Final = -0.1
+"""An offset that hides too little of it: commands come late by 0.2 s [s]."""
+AGREE: Final = 1e-9
+"""Joints nearer than this [rad] agree."""
+AHEAD: Final = 30.0
+"""How far into the future timelines are compared [s]."""
+LOOK: Final = 0.05
+"""How often they are compared [s]."""
+PATIENCE: Final = 60.0
+"""How long agreement is waited for [s]."""
+LIMIT: Final = 10.0
+"""How soon the timelines must agree after the last command [s]: our own figure."""
+SOURCE: Final = "Section VII, (e)"
+CASES: Final = ("late", "blocked", "lossless", "lossy")
+
+
+class Seen(NamedTuple):
+    """One run."""
+
+    agreed: float
+    """From the last command, or the block, until the timelines agree for good [s]; infinite where they don't."""
+    noticed: float
+    """Until the virtual robot was first corrected after it [s]; infinite where it wasn't."""
+    corrections: tuple[float, ...]
+    """Largest error of a joint at the beginning of each [rad]."""
+    durations: tuple[float, ...]
+    """Of each [s]."""
+    unlinked: float
+    """How far they are apart at the end where nothing comes back [rad]."""
+    limits: float
+    """Largest speed or acceleration of the virtual robot, corrections included, as a share of its limit."""
+    t: Array
+    """From the last command or the block on [s]."""
+    apart: Array
+    """Of the timelines then, and from then on [rad]."""
+
+
+def apart(mine: Timeline, other: Timeline, now: float) -> float:
+    """Largest difference of two timelines' joints from now on [rad]."""
+    t = np.arange(now, max(mine.end, other.end, now) + 1.0, 0.02)
+    t = t[t <= now + AHEAD]
+    return float(np.abs(mine.sample(t) - other.sample(t)).max())
+
+
+def _watch(lab: Laboratory, since: float) -> tuple[float, Array, Array]:
+    """Compare the timelines until they agree; when they did for good, and how far they were apart."""
+    t, gaps = [], []
+    while lab.now < since + PATIENCE:
+        t.append(lab.now - since)
+        gaps.append(apart(lab.operator.engine.timeline, lab.robot.engine.timeline, lab.now))
+        if len(gaps) > 100 and max(gaps[-100:]) <= AGREE:
+            break
+        lab.run(lab.now + LOOK)
+    away = [i for i, gap in enumerate(gaps) if gap > AGREE]
+    agreed = t[away[-1] + 1] if away and away[-1] + 1 < len(t) else np.inf if away else 0.0
+    return float(agreed), np.array(t), np.array(gaps)
+
+
+def _seen(lab: Laboratory, since: float, unlinked: float) -> Seen:
+    agreed, t, gaps = _watch(lab, since)
+    made: list[Correction] = lab.operator.corrections
+    after = [c.t - since for c in made if c.t >= since]
+    grid = np.arange(0.0, lab.now, 0.01)
+    limits, timeline = MODEL.limits, lab.operator.engine.timeline
+    used = [
+        np.abs(timeline.sample(grid, derivative=k) / top).max()
+        for k, top in ((1, limits.qd_max), (2, limits.qdd_max))
+    ]
+    return Seen(
+        agreed,
+        min(after, default=np.inf),
+        tuple(float(np.abs(c.error).max()) for c in made),
+        tuple(c.end - c.t for c in made),
+        unlinked,
+        float(max(used)),
+        t,
+        gaps,
+    )
+
+
+def _lab(seed: int, way: Conditions, D: float | None) -> Laboratory:
+    operator = OperatorSite(MODEL, HOME, now=0.0, config=OperatorSiteConfig())
+    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    return Laboratory(operator, robot, LinkConditions.symmetric(way), np.random.default_rng((seed, 21)))
+
+
+def _say(lab: Laboratory, command: Command, now: float) -> None:
+    lab.operator.execute(command, now=now)
+
+
+def _give(lab: Laboratory, acts: tuple[Act, ...]) -> float:
+    """Let the commands be given; when the last one is [s]."""
+    for act in acts:
+        lab.schedule(act.t, partial(_say, lab, act.command))
+    return max(act.t for act in acts)
+
+
+def talk(seed: int, length: float, way: Conditions, D: float | None) -> Seen:
+    """Commands for some seconds, then quiet."""
+    acts = script(np.random.default_rng((seed, 20)), length)
+    lab = _lab(seed, way, D)
+    last = _give(lab, acts)
+    lab.run(last)
+    seen = _seen(lab, last, 0.0)
+    plain = replay(acts).timeline
+    return seen._replace(unlinked=apart(plain, lab.robot.engine.timeline, lab.now))
+
+
+def block(seed: int) -> Seen:
+    """The real arm is held in the middle of a move."""
+    rng = np.random.default_rng((seed, 22))
+    lab = _lab(seed, Conditions(delay=ConstantDelay("constant", DELAY)), None)
+    command = MotionCommand(
+        JointTarget(HOME + rng.choice((-0.8, 0.8), 6) * (0.7, 0.4, 0.4, 0.8, 0.6, 0.8)), speed=0.5
+    )
+    lab.schedule(0.5, partial(_say, lab, command))
+    moment = 1.6 + rng.uniform(0.0, 0.4)
+    lab.run(moment)
+    play, reference = played(lab)
+    held = reference.q[-1] + 0.5 * (HOME - reference.q[-1])
+    assert len(play.p)
+    lab.robot.measured(held, now=lab.now)
+    before = lab.operator.engine.timeline
+    seen = _seen(lab, lab.now, 0.0)
+    return seen._replace(unlinked=apart(before, lab.robot.engine.timeline, lab.now))
+
+
+def work(study: Study, case: str) -> list[Seen]:
+    """Measure a case for every seed."""
+    seeds = range(study.seed + 700, study.seed + 700 + study.runs)
+    length = min(study.length, 15.0)
+    constant = Conditions(delay=ConstantDelay("constant", DELAY))
+    lossy = Conditions(delay=delay_profile("mon"), loss=BernoulliLoss(0.2), duplicate=0.1, service=Service.DATAGRAM)
+    if case == "blocked":
+        return [block(seed) for seed in seeds]
+    way = lossy if case == "lossy" else constant
+    return [talk(seed, length, way, SHORT if case == "late" else None) for seed in seeds]
+
+
+def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
+    """How soon they agree, and by how much the virtual robot was corrected."""
+    cases: dict[str, list[Seen]] = dict(zip(CASES, found, strict=True))
+    claims: list[Claim] = []
+    names = {
+        "late": f"commands late by {DELAY + SHORT:g} s at the robot",
+        "blocked": "the real arm blocked in a move",
+        "lossless": "adaptive D, no losses",
+        "lossy": "adaptive D, `mon`, 20 % lost, 10 % twice",
+    }
+    rows = []
+    for case, seen in cases.items():
+        agreed = [s.agreed for s in seen]
+        finite = bool(np.isfinite(agreed).all())
+        middle = bootstrap(agreed, study.seed, median) if finite else None
+        since = "the block" if case == "blocked" else "the last command"
+        claims.append(
+            Claim(
+                f"{names[case]}: timelines agree to 1e-9 rad after {since}, at most [s]",
+                SOURCE,
+                f"≤ {LIMIT:g}",
+                max(agreed),
+                max(agreed) <= LIMIT,
+            )
+        )
+        if case in {"late", "blocked"}:
+            parted = [s.unlinked for s in seen]
+            claims.append(
+                Claim(
+                    f"{names[case]}, no direct link: the timelines stay apart, by [rad]",
+                    SOURCE,
+                    "> 1e-9",
+                    max(parted) if case == "late" else min(parted),
+                    (max(parted) if case == "late" else min(parted)) > AGREE,
+                )
+            )
+        sizes = [size for s in seen for size in s.corrections]
+        spans = [span for s in seen for span in s.durations]
+        limits = max(s.limits for s in seen)
+        if case in {"late", "blocked"}:
+            claims.append(
+                Claim(
+                    f"{names[case]}: limits of the virtual robot, corrections included, as a share",
+                    SOURCE,
+                    "≤ 1",
+                    limits,
+                    limits <= 1 + 1e-9,
+                )
+            )
+        else:
+            claims.append(
+                Claim(f"{names[case]}: corrections of the virtual robot", SOURCE, 0, len(sizes), not sizes)
+            )
+        rows.append(
+            (
+                names[case],
+                None if middle is None else middle.value,
+                None if middle is None else f"{middle.low:.2f} to {middle.high:.2f}",
+                max(agreed),
+                len(sizes),
+                float(np.degrees(np.mean(sizes))) if sizes else None,
+                float(np.degrees(max(sizes))) if sizes else None,
+                float(np.mean(spans)) if spans else None,
+                max(spans) if spans else None,
+            )
+        )
+    noticed = [s.noticed for s in cases["blocked"]]
+    beats = DELAY + 2 * 0.05
+    claims.append(
+        Claim(
+            "the virtual robot turns to where the blocked one is after [s], at most: the way back and two beats",
+            SOURCE,
+            f"≤ {beats:g}",
+            max(noticed),
+            max(noticed) <= beats + 1e-6,
+        )
+    )
+    columns = (
+        "what",
+        "agree after s, median",
+        "95 %",
+        "max",
+        "corrections",
+        "size deg, mean",
+        "max",
+        "lasts s, mean",
+        "max",
+    )
+    table = Table("agreement", f"(e) virtual and real, {DELAY} s each way; {study.runs} runs", columns, tuple(rows))
+    picture = draw(
+        "e-agreement",
+        "(e) how far the timelines of the virtual and the real robot are apart",
+        lambda canvas: _paint(canvas, cases),
+    )
+    return Findings(tuple(claims), (table,), (picture,))
+
+
+def _paint(canvas: Canvas, cases: dict[str, list[Seen]]) -> None:
+    axes = canvas.subplots(1, 2, sharey=True)
+    titles = ("after the last of some late commands", "after the real arm was blocked")
+    for ax, case, title in zip(axes, ("late", "blocked"), titles, strict=True):
+        for k, seen in enumerate(cases[case]):
+            gaps = np.maximum(seen.apart, 1e-12)
+            ax.semilogy(
+                seen.t,
+                gaps,
+                color=VIRTUAL if k else REAL,
+                linewidth=1.5 if k == 0 else 0.7,
+                alpha=1.0 if k == 0 else 0.5,
+                label="first seed" if k == 0 else ("others" if k == 1 else None),
+            )
+        ax.axhline(AGREE, color=BAD, linewidth=0.9)
+        ax.axvline(2 * DELAY if case == "late" else DELAY, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
+        ax.set_title(title)
+        ax.set_xlim(0.0, 4.0)
+        ax.set_xlabel("s (dashed: there and back, or the way back)")
+    axes[0].set_ylabel("largest joint difference from then on, rad")
+    axes[0].annotate("1e-9", (3.9, AGREE), (0, 3), textcoords="offset points", ha="right", color=BAD)
+    legend(axes[1], place="upper right")

@@ -1,0 +1,166 @@
+"""Section VI-B: several broadcasters on one engine, each with several viewers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from interfaces import Designer, Viewer
+from interfaces.broadcast import Broadcaster
+from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.doulgeri.script import HOME, MODEL, Joined, target
+from interfaces.lab.drawing import REAL, VIRTUAL, draw
+from interfaces.messages import Broadcast, Form, Reply
+from interfaces.ports import RemotePort
+from vrs import Engine, ManualClock, MotionCommand, WallClock
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+RATES: Final = (10, 20, 30, 40, 50, 60)
+"""Frames a second."""
+VIEWERS: Final = 4
+"""Of each broadcaster."""
+DELAY: Final = 0.1
+"""Each way [s]."""
+TIMED: Final = 2000
+"""Frames that are timed."""
+SECTION: Final = "Section VI-B"
+
+
+class Arrivals:
+    """When frames come by a port."""
+
+    def __init__(self, port: RemotePort) -> None:
+        self.times: list[float] = []
+        self.numbers: list[int] = []
+        port.join(self)
+
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Note a frame."""
+        if isinstance(message, Broadcast):
+            self.times.append(now)
+            self.numbers.append(message.frame.number)
+
+
+def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
+    """All rates at once, on one engine that moves; then the time that a frame takes."""
+    rng = np.random.default_rng((study.seed, 4))
+    joined = Joined(0.0)
+    broadcasters = [joined.site.broadcast(rate) for rate in RATES]
+    taps: dict[int, list[Arrivals]] = {rate: [] for rate in RATES}
+    for rate in RATES:
+        for _ in range(VIEWERS):
+            port = joined.connect(DELAY, DELAY)
+            joined.add(Viewer(port, rate=rate, form=Form.FRAMES))
+            taps[rate].append(Arrivals(port))
+    designer = Designer(joined.connect(DELAY, DELAY))
+    joined.add(designer)
+    begin, length = 1.0, min(study.length, 10.0)
+    for k in range(int(length)):
+        joined.run(begin + k)
+        designer.issue(MotionCommand(target(rng)), now=joined.now)
+    joined.run(begin + length + 1.0)
+
+    claims, rows, gaps = [], [], {}
+    for rate, broadcaster in zip(RATES, broadcasters, strict=True):
+        made = broadcaster.number
+        missing = [_missing(tap.numbers) for tap in taps[rate]]
+        gaps[rate] = np.concatenate([np.diff(tap.times) for tap in taps[rate]])
+        delivered = min(len(tap.times) for tap in taps[rate])
+        counted = sum(missing) == 0 and broadcaster.skipped == 0 and delivered >= rate * length
+        even = float(np.abs(gaps[rate] - 1.0 / rate).max())
+        rows.append(
+            (rate, VIEWERS, made, delivered, sum(missing), float(gaps[rate].mean()), float(gaps[rate].max()))
+        )
+        claims.append(
+            Claim(
+                f"{rate} frames a second to {VIEWERS} viewers, beside other rates: missing or skipped",
+                SECTION,
+                0,
+                sum(missing) + broadcaster.skipped,
+                counted,
+            )
+        )
+        claims.append(
+            Claim(
+                f"{rate} frames a second: interval between frames at the viewers off by at most [s]",
+                SECTION,
+                "≤ 1e-6",
+                even,
+                even <= 1e-6,
+            )
+        )
+    columns = (
+        "frames a second",
+        "viewers",
+        "frames made",
+        "delivered to each, least",
+        "missing",
+        "interval, mean s",
+        "largest s",
+    )
+    table = Table("broadcasters", "Six broadcasters at once on one engine", columns, tuple(rows))
+    picture = draw(
+        "broadcasters",
+        "Frames at the viewers, six broadcasters on one engine",
+        lambda canvas: _paint(canvas, rows, gaps),
+    )
+    return Findings(tuple(claims), (table,), (picture,), load())
+
+
+def _missing(numbers: list[int]) -> int:
+    """Frames between the first and the last that didn't come."""
+    return numbers[-1] - numbers[0] + 1 - len(numbers) if numbers else 1
+
+
+def load() -> tuple[Claim, ...]:
+    """What a frame costs the server: the median of many, made at 50 a second for some viewers."""
+    clock, wall = ManualClock(0.0), WallClock()
+    engine = Engine(MODEL, q=HOME, clock=clock)
+    rng = np.random.default_rng(0)
+    broadcaster = Broadcaster(engine, rate=50.0, lead=0.5)
+    slots = [broadcaster.join() for _ in range(VIEWERS)]
+    costs = []
+    for k in range(TIMED):
+        if k % 50 == 0:
+            engine.execute(MotionCommand(target(rng)))
+        begin = wall.now()
+        made = broadcaster.advance(now=clock.now())
+        costs.append(wall.now() - begin)
+        assert len(made) == 1
+        assert all(slot.take() for slot in slots)
+        clock.set((k + 1) / 50.0)
+    cost = float(np.median(costs))
+    return (
+        Claim(
+            f"a frame for {VIEWERS} viewers costs the server [s], median", SECTION, "≤ 0.002", cost, cost <= 0.002
+        ),
+        Claim(
+            "50 frames a second take of one processor, a share",
+            SECTION,
+            "≤ 0.1: no serious overload",
+            50 * cost,
+            50 * cost <= 0.1,
+        ),
+    )
+
+
+def _paint(canvas: Canvas, rows: Sequence[tuple[float, ...]], gaps: dict[int, np.ndarray]) -> None:
+    left, right = canvas.subplots(1, 2)
+    x = np.arange(len(rows))
+    left.bar(x, [row[3] for row in rows], 0.6, color=VIRTUAL)
+    left.set_xticks(x, [str(row[0]) for row in rows])
+    left.set_title("frames delivered to each viewer")
+    left.grid(visible=False, axis="x")
+    right.plot(x, [1e3 / row[0] for row in rows], color=VIRTUAL, marker="_", markersize=16, linestyle="none")
+    for k, row in enumerate(rows):
+        times = 1e3 * gaps[int(row[0])]
+        right.plot([k, k], [times.min(), times.max()], "o", color=REAL, markersize=3.5)
+    right.set_xticks(x, [str(row[0]) for row in rows])
+    right.set_ylim(bottom=0.0)
+    right.set_title("interval, ms: asked (–), measured (•)")
+    for ax in (left, right):
+        ax.set_xlabel("frames a second")

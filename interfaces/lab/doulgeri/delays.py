@@ -1,0 +1,386 @@
+"""Figs 4 to 6: what delays do to commands and frames, for each offset D of the engine's clock."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+
+import numpy as np
+
+from interfaces import Designer, Viewer
+from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.doulgeri.script import Joined, arrivals, target
+from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.statistics import Estimate, bootstrap
+from interfaces.messages import Broadcast, Form, FrameStatus, Outcome, Reply
+from interfaces.ports import RemotePort
+from vrs import MotionCommand
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+D_F: Final = 0.3
+"""Forward delay [s]."""
+D_B: Final = 0.2
+"""Backward delay [s]."""
+RATE: Final = 50.0
+"""Frames a second."""
+COMMANDS: Final = 0.8
+"""Commands a second, on average."""
+LEADS: Final = (0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5)
+"""How far ahead frames are foretold [s]."""
+NANOSECONDS: Final = 5e-9
+"""The engine's clock reads whole nanoseconds [s]."""
+
+
+class Setting(NamedTuple):
+    """A clock offset, and how far ahead frames are."""
+
+    title: str
+    D: float
+    lead: float
+    source: str
+
+    @property
+    def lateness(self) -> float:
+        """How late a command is that's to be carried out at once, by the paper's formulas [s]."""
+        return max(D_F + self.D, 0.0)
+
+    @property
+    def age(self) -> float:
+        """How old a frame is by the user's clock when it comes, by the paper's formulas [s]."""
+        return D_B - self.D - self.lead
+
+
+SETTINGS: Final = {
+    "0": Setting("D = 0", 0.0, 0.0, "Fig. 4"),
+    "-Df": Setting("D = −D_f", -D_F, 0.0, "Fig. 5"),
+    "-Df, predicted": Setting("D = −D_f, frames for t_c + D_f + D_b", -D_F, D_F + D_B, "Section IV-A"),
+    "+Db": Setting("D = +D_b", D_B, 0.0, "Fig. 6"),
+}
+CASES: Final = (*SETTINGS, "leads")
+
+
+class Seen(NamedTuple):
+    """One run."""
+
+    lateness: tuple[float, ...]
+    """How late each command was when it came to the engine [s]."""
+    postponed: float
+    """Share of commands that were."""
+    ages: tuple[float, float, float]
+    """Of frames when they came, by the user's clock: least, mean, largest [s]."""
+    shown: float
+    """Largest age of a frame when it was shown [s]."""
+    falsified: float
+    """Share of the frames."""
+    foretold: float
+    """Share of the frames in whose lead a command was carried out."""
+
+
+class Sent(NamedTuple):
+    """What crossed the link, for the timing diagrams; users' time but where it says otherwise [s]."""
+
+    commands: tuple[tuple[float, float], ...]
+    """Issued; and the engine's time when it came."""
+    frames: tuple[tuple[float, float, float], ...]
+    """The engine's time when it was made, the time it shows, and when it came."""
+
+
+class Tap:
+    """Writes down what comes by a port."""
+
+    def __init__(self, port: RemotePort) -> None:
+        self.frames: list[tuple[float, float, float]] = []
+        self.numbers: list[int] = []
+        self.outcomes: dict[int, float] = {}
+        port.join(self)
+
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Note when it was made, and when it came [s]."""
+        if isinstance(message, Broadcast):
+            self.frames.append((message.frame.made_at, message.frame.t, now))
+            self.numbers.append(message.frame.number)
+        elif isinstance(message, Outcome):
+            self.outcomes.setdefault(message.number, message.made_at)
+
+
+def run(setting: Setting, seed: int, length: float) -> tuple[Seen, Sent]:
+    """Commands that come at random, each to be carried out at once, over constant delays."""
+    rng = np.random.default_rng(seed)
+    joined = Joined(setting.D)
+    broadcaster = joined.site.broadcast(RATE, lead=setting.lead)
+    port = joined.connect(D_F, D_B)
+    designer, viewer = Designer(port), Viewer(port, rate=RATE, form=Form.FRAMES)
+    tap = Tap(port)
+    joined.add(designer)
+    joined.add(viewer)
+    joined.run(1.0)
+    issued = arrivals(rng, COMMANDS, 1.0, 1.0 + length)
+    for t in issued:
+        joined.run(float(t))
+        designer.issue(MotionCommand(target(rng), speed=0.3), now=joined.now, execute_in=0.0)
+    joined.run(1.0 + length + 3.0)
+    late = [tap.outcomes[i.number] - i.issued_at for i in designer.history]
+    postponed = [i.receipt is not None and i.late > 0 for i in designer.history]
+    began = np.array(
+        [i.receipt.execute_at for i in designer.history if i.receipt is not None and i.receipt.q is not None]
+    )
+    ages = np.array([came - shows for _, shows, came in tap.frames])
+    # While commands come: before and after there's nothing that could falsify.
+    busy = [i for i, frame in enumerate(tap.frames) if 1.0 + setting.lead <= frame[1] - setting.D <= 1.0 + length]
+    verdicts = [broadcaster.status(tap.numbers[i]) for i in busy]
+    share = float(np.mean([v is not None and v.status is FrameStatus.FALSIFIED for v in verdicts]))
+    seen = Seen(
+        tuple(late),
+        float(np.mean(postponed)) if postponed else 0.0,
+        (float(ages.min()), float(ages.mean()), float(ages.max())),
+        max(shown.age for shown in viewer.history),
+        share,
+        foretold([tap.frames[i] for i in busy], began),
+    )
+    return seen, Sent(
+        tuple(zip(issued.tolist(), (tap.outcomes[i.number] for i in designer.history), strict=True)),
+        tuple(tap.frames),
+    )
+
+
+def foretold(frames: list[tuple[float, float, float]], began: np.ndarray) -> float:
+    """Share of frames with a motion that began after they were made and before the time that they show."""
+    if not len(frames):
+        return 0.0
+    made, shows, _ = np.array(frames).T
+    hits = np.searchsorted(began, shows - 1e-4) > np.searchsorted(began, made)
+    return float(hits.mean())
+
+
+def leads(seed: int, length: float) -> tuple[float, ...]:
+    """Share of falsified frames for each lead, all broadcast at once, D = −D_f."""
+    rng = np.random.default_rng(seed)
+    joined = Joined(-D_F)
+    broadcasters = [joined.site.broadcast(RATE, lead=lead) for lead in LEADS]
+    designer = Designer(joined.connect(D_F, D_B))
+    joined.add(designer)
+    for t in arrivals(rng, COMMANDS, 0.0, length):
+        joined.run(float(t))
+        designer.issue(MotionCommand(target(rng), speed=0.3), now=joined.now, execute_in=0.0)
+    joined.run(length)
+    return tuple(broadcaster.share_falsified or 0.0 for broadcaster in broadcasters)
+
+
+def work(study: Study, case: str) -> object:
+    """Measure a setting, or all leads."""
+    if case == "leads":
+        return [leads(study.seed + 300 + k, study.length) for k in range(study.runs)]
+    if case not in SETTINGS:
+        raise InvalidValueError("case", case, f"one of {', '.join(CASES)}")
+    found = [run(SETTINGS[case], study.seed + k, study.length) for k in range(study.runs)]
+    return [seen for seen, _ in found], found[0][1]
+
+
+def conclude(study: Study, found: tuple[object, ...]) -> Findings:
+    """Compare with what the paper's formulas say."""
+    claims: list[Claim] = []
+    rows = []
+    diagrams = []
+    for case, result in zip(SETTINGS, found, strict=False):
+        setting = SETTINGS[case]
+        seen, sent = cast("tuple[list[Seen], Sent]", result)
+        claims += _claims(study, setting, seen)
+        rows.append(_row(study, setting, seen))
+        diagrams.append((setting, sent))
+    shares = np.array(found[-1])
+    claims += _lead_claims(study, shares)
+    columns = (
+        "clock",
+        "lateness, paper s",
+        "measured s",
+        "postponed %",
+        "age, paper s",
+        "measured s",
+        "shown at most s",
+        "falsified %",
+        "95 %",
+        "foretold by commands %",
+    )
+    table = Table(
+        "delays", f"Figs 4 to 6: D_f = {D_F} s, D_b = {D_B} s, {COMMANDS:g} commands a second", columns, tuple(rows)
+    )
+    pictures = (
+        draw(
+            "figs4-6-timing",
+            "Figs 4 to 6, from a run: a command and a frame under each clock offset",
+            lambda canvas: _paint(canvas, diagrams),
+            height=7.0,
+        ),
+        draw(
+            "falsified",
+            "Share of predicted frames that a command falsified",
+            lambda canvas: _paint_leads(canvas, study, shares),
+        ),
+    )
+    return Findings(tuple(claims), (table,), pictures)
+
+
+def _claims(study: Study, setting: Setting, seen: list[Seen]) -> list[Claim]:
+    late = np.concatenate([s.lateness for s in seen])
+    off = float(np.abs(late - setting.lateness).max())
+    low, high = min(s.ages[0] for s in seen), max(s.ages[2] for s in seen)
+    age = float(np.mean([s.ages[1] for s in seen]))
+    aged = abs(low - setting.age) <= NANOSECONDS and abs(high - setting.age) <= NANOSECONDS
+    claims = [
+        Claim(
+            f"{setting.title}: commands to be carried out at once come late by [s]",
+            setting.source,
+            setting.lateness,
+            float(late.mean()),
+            off <= NANOSECONDS,
+        ),
+        Claim(
+            f"{setting.title}: age of frames by the user's clock when they come [s]",
+            setting.source,
+            setting.age,
+            age,
+            aged,
+        ),
+    ]
+    if setting.lateness == 0:
+        most = max(s.postponed for s in seen)
+        claims.append(Claim(f"{setting.title}: share of commands postponed", setting.source, 0.0, most, most == 0))
+    share = bootstrap([s.falsified for s in seen], study.seed)
+    if setting.lead:
+        gap = max(abs(s.falsified - s.foretold) for s in seen)
+        claims.append(
+            Claim(
+                "predicted frames are false exactly where a command is executed between t_c and t_c + D_f + D_b: "
+                "largest difference of both shares in a run",
+                setting.source,
+                "≤ 0.01",
+                gap,
+                gap <= 0.01,
+            )
+        )
+        claims.append(
+            Claim(
+                f"share of predicted frames falsified, {COMMANDS:g} commands/s: 1 − exp(−rate · lead)",
+                setting.source,
+                -float(np.expm1(-COMMANDS * setting.lead)),
+                share.value,
+                _equals(share, -float(np.expm1(-COMMANDS * setting.lead))),
+                share.interval,
+            )
+        )
+    else:
+        claims.append(
+            Claim(
+                f"{setting.title}: share of frames falsified, none being predicted",
+                setting.source,
+                0.0,
+                share.value,
+                share.value == 0,
+            )
+        )
+    return claims
+
+
+def _equals(share: Estimate, expected: float) -> bool:
+    """Whether the interval holds what's expected, or both are within 10 %: then they're called equal."""
+    return share.low <= expected <= share.high or abs(share.value - expected) <= 0.1 * expected
+
+
+def _row(study: Study, setting: Setting, seen: list[Seen]) -> tuple[float | str, ...]:
+    late = np.concatenate([s.lateness for s in seen])
+    share = bootstrap([100 * s.falsified for s in seen], study.seed)
+    return (
+        setting.title,
+        setting.lateness,
+        float(late.mean()),
+        100 * float(np.mean([s.postponed for s in seen])),
+        setting.age,
+        float(np.mean([s.ages[1] for s in seen])),
+        max(s.shown for s in seen),
+        share.value,
+        f"{share.low:.1f} to {share.high:.1f}",
+        100 * float(np.mean([s.foretold for s in seen])) if setting.lead else 0.0,
+    )
+
+
+def _lead_claims(study: Study, shares: np.ndarray) -> list[Claim]:
+    claims = []
+    for k in (1, 4, 6):
+        lead = LEADS[k]
+        share = bootstrap(shares[:, k], study.seed)
+        expected = -float(np.expm1(-COMMANDS * lead))
+        claims.append(
+            Claim(
+                f"frames {lead:g} s ahead, {COMMANDS:g} commands/s: share falsified, 1 − exp(−rate · lead)",
+                "Section IV-A",
+                expected,
+                share.value,
+                _equals(share, expected),
+                share.interval,
+            )
+        )
+    return claims
+
+
+def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
+    ax = canvas.add_subplot()
+    x = np.linspace(0.0, 1.6, 200)
+    ax.plot(x, -100 * np.expm1(-COMMANDS * x), color=MUTED, label="1 − exp(−rate · lead)")
+    points = [bootstrap(100 * column, study.seed) for column in shares.T]
+    y = np.array([p.value for p in points])
+    error = np.array([[p.value - p.low for p in points], [p.high - p.value for p in points]])
+    ax.errorbar(LEADS, y, error, fmt="o", color=REAL, markersize=4, capsize=3, label="measured, 95 % over seeds")
+    ax.set_xlabel("lead, s")
+    ax.set_ylabel("falsified, %")
+    ax.set_ylim(0.0, 100.0)
+    legend(ax, place="upper left")
+
+
+def _paint(canvas: Canvas, diagrams: list[tuple[Setting, Sent]]) -> None:
+    rows = canvas.subplots(len(diagrams), 1, sharex=True)
+    for ax, (setting, sent) in zip(rows, diagrams, strict=True):
+        _timing(ax, setting, sent)
+    rows[-1].set_xlabel("time from the issue of the command, s")
+
+
+def _timing(ax: Axes, setting: Setting, sent: Sent) -> None:
+    """A command from the user's line to the engine's, and a frame back; each line has its own clock."""
+    issued, came = sent.commands[0]
+    arrived = came - setting.D - issued
+    made, shows, back = next(frame for frame in sent.frames if frame[0] - setting.D >= issued + arrived + 0.2)
+    x_made, x_back = made - setting.D - issued, back - issued
+    for y, name in ((1.0, "user"), (0.0, "engine")):
+        ax.axhline(y, color=MUTED, linewidth=1.0)
+        ax.annotate(name, (-0.24, y), (0, 3), textcoords="offset points", color=MUTED)
+    arrow = {"arrowstyle": "-|>", "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", (arrived, 0.0), (0.0, 1.0), arrowprops={**arrow, "color": VIRTUAL})
+    ax.annotate("", (x_back, 1.0), (x_made, 0.0), arrowprops={**arrow, "color": REAL})
+    late = came - issued
+    verdict = "in time" if late <= NANOSECONDS else f"{late:.2f} s late"
+    age = back - shows
+    how: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
+    ax.annotate("command for t = 0", (0.0, 1.0), (0, 5), color=VIRTUAL, **how)
+    ax.annotate(
+        f"clock reads {abs(late):.2f}:\n{verdict}",
+        (arrived, 0.0),
+        (0, -24),
+        color=VIRTUAL if late <= NANOSECONDS else BAD,
+        **how,
+    )
+    ax.annotate(
+        f"frame for t = {shows - issued:.2f}\nmade at {made - issued:.2f}",
+        (x_made, 0.0),
+        (18, -24),
+        color=REAL,
+        **how,
+    )
+    ax.annotate(f"clock reads {back - issued:.2f}: {abs(age):.2f} s old", (x_back, 1.0), (0, 5), color=REAL, **how)
+    ax.set_title(f"{setting.source}: {setting.title}")
+    ax.set_ylim(-0.75, 1.45)
+    ax.set_xlim(-0.25, 1.0)
+    ax.set_yticks([])
+    ax.grid(visible=False, axis="y")
+    ax.spines["left"].set_visible(False)

@@ -1,0 +1,283 @@
+"""Open problem (d): interactivity. What a user can do while the robot moves, and how soon it shows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from interfaces import Designer, Viewer
+from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.doulgeri.agreement import AGREE, apart
+from interfaces.lab.doulgeri.script import HOME, Joined, target
+from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.messages import Form
+from interfaces.playhead import FASTEST, QUICKEST, Mode
+from interfaces.site import Part
+from vrs import JointTarget, MotionCommand, Timeline
+from vrs.commands import Cancel, Command, InsertVia, Resume, Retime, ScaleTime, Stop
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+D_F: Final = 0.15
+"""Forward delay [s]."""
+D_B: Final = 0.1
+"""Backward delay [s]."""
+RATE: Final = 50.0
+"""Of the viewers [1/s]."""
+STEP: Final = 0.005
+"""How often it's looked whether something shows [s]."""
+SOURCE: Final = "Section VII, (d)"
+OVER: Final = 1e-6
+EDITS: Final = ("retime", "cancel", "via", "pace", "stop", "resume", "undo")
+
+
+class Session:
+    """A designer, viewers of both forms, and one who looks at the past, all far from the engine."""
+
+    def __init__(self) -> None:
+        self.joined = Joined(-D_F)
+        self.joined.site.broadcast(RATE, lead=D_F + D_B)
+        port = self.joined.connect(D_F, D_B)
+        self.designer = Designer(port)
+        self.viewers = {
+            Form.SEGMENTS: Viewer(port, rate=RATE, lead=D_F + D_B),
+            Form.FRAMES: Viewer(self.joined.connect(D_F, D_B), rate=RATE, form=Form.FRAMES),
+        }
+        self.other = Viewer(self.joined.connect(D_F, D_B), rate=RATE)
+        clients: tuple[Part, ...] = (self.designer, *self.viewers.values(), self.other)
+        for client in clients:
+            self.joined.add(client)
+        self.joined.run(1.0)
+
+    @property
+    def now(self) -> float:
+        """The user's time [s]."""
+        return self.joined.now
+
+    @property
+    def known(self) -> Timeline:
+        """The committed path, as the viewer of segments has it."""
+        timeline = self.viewers[Form.SEGMENTS].timeline
+        assert timeline is not None
+        return timeline
+
+    def issue(self, command: Command | None) -> float:
+        """Give a command, or take back the newest; how long it takes until the viewer has the path it makes [s]."""
+        before, begin = self.joined.engine.timeline, self.now
+        if command is None:
+            self.designer.undo(now=begin)
+        else:
+            self.designer.issue(command, now=begin)
+        while self.now < begin + 5.0:
+            self.joined.run(self.now + STEP)
+            engine = self.joined.engine.timeline
+            if engine is not before and apart(self.known, engine, self.now) <= AGREE:
+                return self.now - begin
+        return np.inf
+
+    def move(self, rng: np.random.Generator, wait: float) -> float:
+        """A move that begins after a while."""
+        return self.issue(MotionCommand(target(rng), execute_at=self.now + wait, speed=0.3))
+
+
+def edits(rng: np.random.Generator) -> dict[str, float]:
+    """Each kind of edit under way, a session each: how long until the committed path shows it [s]."""
+    shown: dict[str, float] = {}
+    for kind in EDITS:
+        session = Session()
+        session.move(rng, 0.0)
+        session.issue(MotionCommand(target(rng), execute_at=session.joined.engine.timeline.end + 0.5, speed=0.3))
+        if kind == "resume":
+            session.issue(Stop())
+            session.joined.run(session.now + 1.0)
+        commands: dict[str, Command | None] = {
+            "retime": Retime(2, session.joined.engine.receipt(2).execute_at or 0.0)
+            if kind != "retime"
+            else Retime(2, (session.joined.engine.receipt(2).execute_at or 0.0) + 1.0),
+            "cancel": Cancel(2),
+            "via": InsertVia(2, JointTarget(HOME)),
+            "pace": ScaleTime(0.7),
+            "stop": Stop(),
+            "resume": Resume(),
+            "undo": None,
+        }
+        shown[kind] = session.issue(commands[kind])
+    return shown
+
+
+class Scrubbed(NamedTuple):
+    """One who goes through time while the robot moves."""
+
+    seek: dict[Form, float]
+    """From a jump to the first frame of that time [s]."""
+    dragged: float
+    """How far the place of one who paused in the past moved while commands came [s]."""
+    live: tuple[float, float, float]
+    """The gap; how long going live took; how long is promised [s]."""
+    others: float
+    """Largest change of another viewer's age [s]."""
+    t: tuple[float, ...]
+    place: tuple[float, ...]
+    """Of the viewer of segments [s]."""
+
+
+def scrub(rng: np.random.Generator) -> Scrubbed:
+    """Seek, pause and go live, while commands come."""
+    session = Session()
+    for _ in range(8):
+        session.move(rng, 0.0)
+        session.joined.run(session.now + 1.0)
+    seek = {}
+    begin = session.now
+    back = begin - 6.0
+    for form, viewer in session.viewers.items():
+        viewer.pause(now=session.now)
+        viewer.seek(back, now=session.now)
+        asked, seek[form] = session.now, np.inf
+        while session.now < asked + 3.0:
+            session.joined.run(session.now + STEP)
+            if viewer.history and abs(viewer.history[-1].t - back) <= 0.5 / RATE:
+                seek[form] = viewer.history[-1].shown_at - asked
+                break
+    viewer = session.viewers[Form.SEGMENTS]
+    for _ in range(3):
+        session.move(rng, 0.0)
+        session.joined.run(session.now + 0.5)
+    dragged = abs(viewer.history[-1].t - back)
+    gap = session.now - back
+    asked = session.now
+    promised = viewer.go_live(now=asked) - asked
+    while viewer.mode is not Mode.LIVE and session.now < asked + 30.0:
+        session.joined.run(session.now + STEP)
+    took = session.now - asked
+    session.joined.run(session.now + 1.0)
+    ages = [shown.age for shown in session.other.history if shown.shown_at > 2.0]
+    seen = [shown for shown in viewer.history if shown.shown_at >= begin - 1.0]
+    return Scrubbed(
+        seek,
+        dragged,
+        (gap, took, promised),
+        float(np.ptp(ages)),
+        tuple(s.shown_at - begin for s in seen),
+        tuple(s.t - begin for s in seen),
+    )
+
+
+def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
+    """Measure what our interfaces do."""
+    rng = np.random.default_rng((study.seed, 12))
+    session = Session()
+    shown = []
+    for _ in range(study.runs):
+        shown.append(session.move(rng, 0.0))
+        session.joined.run(session.now + 0.6)
+    path = D_F + D_B
+    slowest, quickest = max(shown), min(shown)
+    edited, seen = edits(rng), scrub(rng)
+    done = sum(np.isfinite(seconds) for seconds in edited.values())
+    gap, took, promised = seen.live
+    law = max(QUICKEST, 1.5 * gap / (FASTEST - 2.0))
+    period = 1.0 / RATE
+    claims = (
+        Claim(
+            "from a command to the committed path that it makes, at a viewer of segments, at most [s]",
+            SOURCE,
+            f"≤ D_f + D_b + {STEP:g} = {path + STEP:g}",
+            slowest,
+            path - OVER <= quickest and slowest <= path + STEP + OVER,
+        ),
+        Claim(
+            f"edits of a motion under way that are carried out and shown: {', '.join(EDITS)}",
+            SOURCE,
+            f"{len(EDITS)} of {len(EDITS)}",
+            f"{done} of {len(EDITS)}",
+            done == len(EDITS),
+        ),
+        Claim(
+            "an edit shows after [s], at most",
+            SOURCE,
+            f"≤ {path + STEP:g}",
+            max(edited.values()),
+            max(edited.values()) <= path + STEP + OVER,
+        ),
+        Claim(
+            "undo while live shows after [s]",
+            SOURCE,
+            f"≤ {path + STEP:g}",
+            edited["undo"],
+            edited["undo"] <= path + STEP + OVER,
+        ),
+        Claim(
+            "a jump to another time, segments: first frame of it after [s]",
+            SOURCE,
+            f"≤ {period:g}, a frame",
+            seen.seek[Form.SEGMENTS],
+            seen.seek[Form.SEGMENTS] <= period + OVER,
+        ),
+        Claim(
+            "a jump to another time, frames: first frame of it after [s]",
+            SOURCE,
+            f"≤ {path + 2 * period:g}, a round trip and two frames",
+            seen.seek[Form.FRAMES],
+            seen.seek[Form.FRAMES] <= path + 2 * period + OVER,
+        ),
+        Claim(
+            "who paused in the past isn't dragged to live by commands: moved by [s]",
+            SOURCE,
+            0.0,
+            seen.dragged,
+            seen.dragged <= OVER,
+        ),
+        Claim(
+            f"going live from {gap:.2f} s back takes [s]",
+            "docs/interfaces.md",
+            law,
+            took,
+            abs(promised - law) <= 0.1 * law and abs(took - promised) <= period + STEP + OVER,
+        ),
+        Claim(
+            "meanwhile another viewer's frames keep their age, to [s]",
+            SOURCE,
+            f"≤ {period:g}",
+            seen.others,
+            seen.others <= period + OVER,
+        ),
+    )
+    rows = tuple((name, seconds) for name, seconds in (("a move", slowest), *edited.items()))
+    table = Table(
+        "interactivity",
+        f"(d) until the committed path shows it: D_f = {D_F} s, D_b = {D_B} s",
+        ("what", "shows after s"),
+        rows,
+    )
+    picture = draw(
+        "d-interactivity",
+        "(d) what a user does while the robot moves",
+        lambda canvas: _paint(canvas, rows, seen),
+        height=3.2,
+    )
+    return Findings(claims, (table,), (picture,))
+
+
+def _paint(canvas: Canvas, rows: tuple[tuple[str, float], ...], seen: Scrubbed) -> None:
+    left, right = canvas.subplots(1, 2, width_ratios=(1.0, 1.4))
+    y = np.arange(len(rows))[::-1]
+    left.barh(y, [1e3 * row[1] for row in rows], 0.6, color=VIRTUAL)
+    left.axvline(1e3 * (D_F + D_B), color=BAD, linewidth=1.0)
+    left.annotate(
+        "D_f + D_b", (1e3 * (D_F + D_B), y[0] + 0.5), (-3, 0), textcoords="offset points", color=BAD, ha="right"
+    )
+    left.set_yticks(y, [row[0] for row in rows])
+    left.set_ylim(-0.6, y[0] + 1.1)
+    left.grid(visible=False, axis="y")
+    left.set_xlabel("ms")
+    left.set_title("until the committed path shows it")
+    t = np.array(seen.t)
+    right.plot(t, t, color=MUTED, linestyle=(0, (4, 3)), linewidth=1.0, label="live")
+    right.plot(t, seen.place, ".", color=REAL, markersize=2.5, label="the viewer's frames")
+    right.set_xlabel("user's time, s")
+    right.set_ylabel("time shown, s")
+    right.set_title("seek back while paused, then go live")
+    legend(right, place="upper left")

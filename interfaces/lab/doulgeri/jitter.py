@@ -1,0 +1,367 @@
+"""Open problem (a): delay jitter. An adaptive offset beside a fixed one at the 95 % quantile."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script, tool
+from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.statistics import bootstrap
+from interfaces.link import Conditions, LinkConditions, Service, delay_profile
+from interfaces.runtime.laboratory import Laboratory
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from vrs import MotionCommand
+from vrs.comparison import compare_paths
+from vrs.model import Array
+from vrs.receipt import Receipt
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+CASES: Final = tuple(f"{day}@{tau}" for day in ("mon", "wed", "thu") for tau in ("0.2", "2", "20"))
+"""Delay profiles."""
+SHARE: Final = 0.95
+"""Of the packets come in time for the fixed offset."""
+LONGEST: Final = 900.0
+"""How long after the last command is waited for the robot [s]."""
+TOGETHER: Final = 0.5
+"""Moves given at least so far apart [s] that begin at the robot within half their distance are a burst."""
+BEAT: Final = 0.1
+"""Between the robot's reports [s]."""
+OVER: Final = 1e-9
+"""How far a limit may be passed, by rounding."""
+SOURCE: Final = "Section VII, (a)"
+
+
+class Seen(NamedTuple):
+    """One run with one way of choosing the offset."""
+
+    mean: float
+    """Path error of the tool over time [m], METRICS."""
+    p95: float
+    largest: float
+    time_difference: float
+    """Mean, over the path that both robots took [s]."""
+    time_difference_max: float
+    progress: float
+    """Share of the path reached."""
+    aside: float
+    """Largest distance of the real tool from the virtual one at the same time on the timeline [m]."""
+    bursts: int
+    limits: float
+    """Largest speed or acceleration, as a share of its limit."""
+    pace: float
+    """Fastest that the timeline was played."""
+    postponed: int
+    """Moves that began later at the robot than on the virtual robot."""
+    moves: int
+    corrections: int
+    """Of the virtual robot, by the real one."""
+
+
+class Trace(NamedTuple):
+    """Of one run, for the picture."""
+
+    t: Array
+    """[s]."""
+    behind: Array
+    """How far behind the robot plays [s]."""
+    sent: Array
+    """When packets were sent [s]."""
+    delay: Array
+    """How long they took [s]."""
+
+
+def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Seen, Trace]:
+    """Both sites over datagrams with that delay each way.
+
+    Args:
+        profile: Of the delay.
+        seed: Of the commands and the link; commands don't depend on D.
+        length: For how long commands are given [s].
+        D: Fixed offset of the robot's clock [s]; None adapts.
+    """
+    acts = script(np.random.default_rng((seed, 1)), length)
+    operator = OperatorSite(MODEL, HOME, now=0.0)
+    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D, beat=BEAT))
+    way = Conditions(delay=delay_profile(profile), service=Service.DATAGRAM)
+    lab = Laboratory(operator, robot, LinkConditions.symmetric(way), np.random.default_rng((seed, 2)))
+    begun: dict[int, float] = {}
+    sent: list[int] = []
+
+    def give(act: Act, now: float) -> None:
+        receipt = operator.execute(act.command, now=now)
+        if not isinstance(receipt, Receipt) or receipt.execute_at is None:
+            return
+        sent.append(receipt.command_id)
+        if isinstance(act.command, MotionCommand):
+            begun[receipt.command_id] = receipt.execute_at
+
+    for act in acts:
+        lab.schedule(act.t, partial(give, act))
+    lab.run(length + 5.0)
+    while lab.now < length + LONGEST and not _done(lab, len(sent)):
+        lab.run(lab.now + 5.0)
+    return _seen(lab, acts, begun), _trace(lab)
+
+
+def _done(lab: Laboratory, sent: int) -> bool:
+    """Whether the operator knows that all commands were carried out, and the robot has come to its end."""
+    report, timelines = lab.operator.report, (lab.operator.engine.timeline, lab.robot.engine.timeline)
+    return report is not None and report.executed >= sent and report.play > max(t.end for t in timelines)
+
+
+def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Seen:
+    limits = MODEL.limits
+    play, reference = played(lab)
+    leader, follower = tool(replay(acts).timeline.sample(lab.t)), tool(reference.q)
+    v_max = float(np.linalg.norm(np.diff(leader, axis=0), axis=1).max()) / float(lab.t[1] - lab.t[0])
+    path = compare_paths(lab.t, leader, follower, v_max=max(v_max, 0.5))
+    aside = np.linalg.norm(tool(lab.operator.engine.timeline.sample(play.p)) - follower, axis=1).max()
+    used = (np.abs(reference.qd) / limits.qd_max).max(), (np.abs(reference.qdd) / limits.qdd_max).max()
+    timeline = lab.robot.engine.timeline
+    moved = set(timeline.owners(0, len(timeline)))
+    theirs = {i: r for i, r in lab.operator.receipts.items() if r.execute_at is not None}
+    both = sorted(
+        (begun[i], theirs[i].execute_at or 0.0, theirs[i].command_id in moved) for i in begun if i in theirs
+    )
+    # What was dropped before it began is no move of the robot's.
+    made = [(asked, at) for asked, at, moves in both if moves and at <= play.p[-1]]
+    given = np.array([pair[0] for pair in made])
+    # When the robot's play first came to where the move begins: until then it may have waited.
+    there = np.interp([pair[1] for pair in made], *_first(play.p, lab.t))
+    gaps, passed = np.diff(given), np.diff(there)
+    assert path.time_difference_mean is not None
+    assert path.time_difference_max is not None
+    assert path.progress is not None
+    assert path.path_error_mean is not None
+    assert path.path_error_p95 is not None
+    assert path.path_error_max is not None
+    return Seen(
+        path.path_error_mean,
+        path.path_error_p95,
+        path.path_error_max,
+        path.time_difference_mean,
+        path.time_difference_max,
+        path.progress,
+        float(aside),
+        int(np.count_nonzero((gaps >= TOGETHER) & (passed < 0.5 * gaps))),
+        float(max(used)),
+        float(play.pace.max()),
+        sum(at > asked + OVER for asked, at, _ in both),
+        len(both),
+        len(lab.operator.corrections),
+    )
+
+
+def _first(p: Array, t: Array) -> tuple[Array, Array]:
+    """Play times that grow, and when each was first reached."""
+    new = np.concatenate(([True], np.diff(np.maximum.accumulate(p)) > 0))
+    return p[new], t[new]
+
+
+def _trace(lab: Laboratory) -> Trace:
+    records = [r for r in lab.link.forward.log.take() if r.arrived is not None]
+    sent = np.array([r.sent for r in records])
+    delay = np.array([r.arrived - r.sent for r in records if r.arrived is not None])
+    t, p = lab.t[::10], played(lab)[0].p[::10]
+    return Trace(t, t - p, sent, delay)
+
+
+class Result(NamedTuple):
+    """Of a profile."""
+
+    D: float
+    """The fixed offset [s]."""
+    adaptive: tuple[Seen, ...]
+    fixed: tuple[Seen, ...]
+    traces: tuple[Trace, Trace]
+    """Of the first run."""
+
+
+def work(study: Study, case: str) -> Result:
+    """Every seed with both offsets."""
+    D = -delay_profile(case).quantile(SHARE)
+    pairs = [[run(case, study.seed + k, study.length, d) for d in (None, D)] for k in range(study.runs)]
+    return Result(
+        D,
+        tuple(pair[0][0] for pair in pairs),
+        tuple(pair[1][0] for pair in pairs),
+        (pairs[0][0][1], pairs[0][1][1]),
+    )
+
+
+def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
+    """Claims for all profiles together, a table with a row a profile and offset."""
+    results = dict(zip(CASES, found, strict=True))
+    adaptive = [seen for result in results.values() for seen in result.adaptive]
+    fixed = [seen for result in results.values() for seen in result.fixed]
+    runs = f"{len(adaptive)} runs"
+    aside, limits = max(s.aside for s in adaptive), max(s.limits for s in adaptive)
+    pace, bursts = max(s.pace for s in adaptive), sum(s.bursts for s in adaptive)
+    postponed, moves = sum(s.postponed for s in adaptive), sum(s.moves for s in adaptive)
+    progress = min(s.progress for s in adaptive)
+    claims = [
+        Claim(
+            f"adaptive D, ideal servo: the real tool is off the virtual one's path by at most [m], {runs}",
+            SOURCE,
+            "≤ 0.001",
+            aside,
+            aside <= 1e-3,
+        ),
+        Claim(
+            f"adaptive D: bursts (moves that begin at the robot within half of the time between them), {runs}",
+            SOURCE,
+            0,
+            bursts,
+            bursts == 0,
+        ),
+        Claim("adaptive D: fastest pace of play", SOURCE, "≤ 1.05", pace, pace <= 1.05 + OVER),
+        Claim(
+            "adaptive D: largest speed or acceleration at the real robot, as a share of its limit",
+            SOURCE,
+            "≤ 1",
+            limits,
+            limits <= 1 + OVER,
+        ),
+        Claim(f"adaptive D: moves postponed at the robot, of {moves}", SOURCE, 0, postponed, postponed == 0),
+        Claim(
+            "adaptive D: the real robot takes the whole path, least share",
+            SOURCE,
+            "≥ 0.97",
+            progress,
+            progress >= 0.97,
+        ),
+    ]
+    errors = [
+        bootstrap([a.mean - f.mean for a, f in zip(r.adaptive, r.fixed, strict=True)], study.seed)
+        for r in results.values()
+    ]
+    together = bootstrap([a.mean - f.mean for a, f in zip(adaptive, fixed, strict=True)], study.seed)
+    smaller = sum(e.is_below_zero for e in errors)
+    claims.append(
+        Claim(
+            "mean path error, adaptive less fixed D at the 95 % quantile [m], all profiles",
+            SOURCE,
+            "< 0",
+            together.value,
+            together.is_below_zero,
+            together.interval,
+        )
+    )
+    late, all_moves = sum(s.postponed for s in fixed), sum(s.moves for s in fixed)
+    claims.append(
+        Claim(
+            f"a fixed D postpones moves, and the paths part: postponed, of {all_moves}",
+            SOURCE,
+            "> 0",
+            late,
+            late > 0,
+        )
+    )
+    gain = bootstrap(
+        [a.time_difference - f.time_difference for a, f in zip(adaptive, fixed, strict=True)], study.seed
+    )
+    claims.append(
+        Claim(
+            "mean time difference, adaptive less fixed D at the 95 % quantile [s], all profiles",
+            SOURCE,
+            "< 0",
+            gain.value,
+            gain.is_below_zero,
+            gain.interval,
+        )
+    )
+    columns = (
+        "delay",
+        "offset",
+        "D fixed s",
+        "path error mm, mean",
+        "95 %",
+        "max",
+        "time difference s",
+        "95 % over seeds",
+        "max",
+        "bursts",
+        "limit used",
+        "postponed",
+        "corrections",
+    )
+    rows = [
+        _row(study, case, how, result.D, seen)
+        for case, result in results.items()
+        for how, seen in (("adaptive", result.adaptive), ("fixed", result.fixed))
+    ]
+    title = f"(a) jitter: {study.runs} runs of {study.length:g} s; mean path error smaller if adaptive in {smaller}"
+    pictures = (
+        draw(
+            "a-jitter",
+            "(a) path error and time difference of the real robot",
+            lambda canvas: _paint(canvas, study, results),
+            height=5.6,
+        ),
+        draw(
+            "a-jitter-run",
+            "(a) one run: how far behind the robot plays, and what packets took",
+            lambda canvas: _paint_run(canvas, results["thu@2"].traces),
+            height=3.0,
+        ),
+    )
+    return Findings(tuple(claims), (Table("jitter", title, columns, tuple(rows)),), pictures)
+
+
+def _row(study: Study, case: str, how: str, D: float, seen: tuple[Seen, ...]) -> tuple[Any, ...]:
+    late = bootstrap([s.time_difference for s in seen], study.seed)
+    return (
+        case,
+        how,
+        D if how == "fixed" else None,
+        1e3 * float(np.mean([s.mean for s in seen])),
+        1e3 * float(np.mean([s.p95 for s in seen])),
+        1e3 * max(s.largest for s in seen),
+        late.value,
+        f"{late.low:.2f} to {late.high:.2f}",
+        max(s.time_difference_max for s in seen),
+        sum(s.bursts for s in seen),
+        max(s.limits for s in seen),
+        sum(s.postponed for s in seen),
+        sum(s.corrections for s in seen),
+    )
+
+
+def _paint(canvas: Canvas, study: Study, results: dict[str, Result]) -> None:
+    above, below = canvas.subplots(2, 1, sharex=True)
+    x = np.arange(len(results))
+    for shift, name, colour in ((-0.18, "adaptive", VIRTUAL), (0.18, "fixed", REAL)):
+        for ax, scale, field in ((above, 1e3, "mean"), (below, 1.0, "time_difference")):
+            points = [
+                bootstrap([scale * getattr(s, field) for s in getattr(r, name)], study.seed)
+                for r in results.values()
+            ]
+            y = np.array([p.value for p in points])
+            error = np.array([[p.value - p.low for p in points], [p.high - p.value for p in points]])
+            ax.bar(x + shift, y, 0.34, color=colour, label=f"{name} D")
+            ax.errorbar(x + shift, y, error, fmt="none", ecolor=MUTED, elinewidth=1.0, capsize=2)
+    above.set_title("mean path error, mm (95 % over seeds)")
+    below.set_title("mean time difference, s")
+    below.set_xticks(x, list(results))
+    below.set_xlabel("delay each way, @ correlation time in s")
+    for ax in (above, below):
+        ax.grid(visible=False, axis="x")
+        ax.set_ylim(bottom=0.0)
+    legend(above, columns=2, place="upper right")
+
+
+def _paint_run(canvas: Canvas, traces: tuple[Trace, Trace]) -> None:
+    ax = canvas.add_subplot()
+    for trace, colour, name in zip(traces, (VIRTUAL, REAL), ("adaptive D", "fixed D"), strict=True):
+        ax.plot(trace.t, trace.behind, color=colour, label=f"the robot is behind, {name}")
+    ax.plot(traces[0].sent, traces[0].delay, ".", color=MUTED, markersize=2, label="packet, by when it was sent")
+    ax.set_ylim(0.0, 1.15 * max(float(trace.behind.max()) for trace in traces))
+    ax.set_xlabel("time, s")
+    ax.set_ylabel("s")
+    legend(ax, columns=3, place="upper center")

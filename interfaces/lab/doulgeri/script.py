@@ -1,0 +1,123 @@
+"""What the operator does in the runs: the same kind of commands everywhere, random from a seed."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from interfaces.link import Channel, ConstantDelay
+from interfaces.ports import MemoryTransport, RemotePort
+from interfaces.runtime.laboratory import Laboratory
+from interfaces.site import Part, Site, drive
+from interfaces.teleop import Reference
+from robots import puma560
+from robots.onboard.playout import PlayState
+from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
+from vrs.commands import Command
+from vrs.model import Array
+
+MODEL: Final = puma560.model()
+HOME: Final = MODEL.poses["nominal"]
+REACH: Final = 0.8
+"""How far from home targets lie, at most [rad]."""
+
+
+class Act(NamedTuple):
+    """Something that the operator does."""
+
+    t: float
+    """When, by the user's clock [s]."""
+    command: Command
+
+
+def target(rng: np.random.Generator, reach: float = REACH) -> JointTarget:
+    """A place near home."""
+    limits = MODEL.limits
+    return JointTarget(np.clip(HOME + rng.uniform(-reach, reach, 6), limits.q_min, limits.q_max))
+
+
+def script(rng: np.random.Generator, length: float) -> tuple[Act, ...]:
+    """Moves that splice, replace and append, now and for later, steering, and stops, up to `length` [s]."""
+    acts, t = [], 0.5
+    while t < length:
+        choice = rng.random()
+        if choice < 0.15:
+            rates = rng.uniform(-0.4, 0.4, 6) * MODEL.limits.qd_max
+            acts += [
+                Act(t + 0.05 * k, SteerCommand(rates=rates * np.sin(0.3 * k), issued_at=t + 0.05 * k))
+                for k in range(20)
+            ]
+            t += 1.2
+        elif choice < 0.2:
+            acts.append(Act(t, Stop(issued_at=t)))
+        else:
+            how = list(Insertion)[rng.integers(3)]
+            wait, speed = float(rng.choice([0.0, 0.0, 0.5, 2.0])), float(rng.choice([0.3, 0.6, 1.0]))
+            acts.append(Act(t, MotionCommand(target(rng), t, t + wait, speed, insertion=how)))
+        t += float(rng.exponential(0.8))
+    return tuple(acts)
+
+
+def replay(acts: tuple[Act, ...], D: float = 0.0) -> Engine:
+    """An engine that does it all by itself, its clock ahead of the user's by D [s]."""
+    clock = ManualClock(D)
+    engine = Engine(MODEL, q=HOME, clock=clock)
+    for act in acts:
+        clock.set(max(act.t + D, clock.now()))
+        engine.execute(act.command)  # type: ignore[arg-type]
+    return engine
+
+
+def arrivals(rng: np.random.Generator, rate: float, begin: float, end: float) -> Array:
+    """Moments of a Poisson process [s], (k,), ascending."""
+    count = rng.poisson(rate * (end - begin))
+    times: Array = np.sort(rng.uniform(begin, end, count))
+    return times
+
+
+def tool(q: Array) -> Array:
+    """Positions of the tool [m], (k, 3), for joints (k, 6)."""
+    points: Array = np.asarray(MODEL.forward(q))[:, :3, 3]
+    return points
+
+
+class Joined:
+    """A site and its clients, in virtual time; `now` is the users' [s]."""
+
+    def __init__(self, D: float, q: Array = HOME) -> None:
+        self.site = Site(Engine(MODEL, q=q, clock=ManualClock(D)), D=D)
+        self.engine = self.site.engine
+        self.now = 0.0
+        self._parts: list[Part] = [self.site]
+
+    def connect(self, there: float, back: float) -> RemotePort:
+        """A port to the site over a link with constant delays [s]."""
+        rng = np.random.default_rng(0).spawn(2)
+        ways = [ConstantDelay(f"constant:{delay}", delay) for delay in (there, back)]
+        transport = MemoryTransport(self.site, Channel(ways[0], rng[0]), Channel(ways[1], rng[1]))
+        self._parts.append(transport)
+        return transport.port
+
+    def add(self, client: Part) -> None:
+        """Drive a client too."""
+        self._parts.append(client)
+
+    def run(self, until: float) -> None:
+        """Let time pass until `until` [s]."""
+        self.now = drive(self._parts, now=self.now, until=until)
+
+
+def played(lab: Laboratory) -> tuple[PlayState, Reference]:
+    """Where the robot's play was at each tick of a run without a body, and what the body was asked to do, (k, ...).
+
+    Before the first message the robot rests where its play begins; whatever time its play shows then isn't the
+    operator's.
+    """
+    _, p, pace, rate = lab.play.T.copy()
+    back = np.flatnonzero(np.diff(p) < 0)
+    if len(back):
+        begun = int(back[-1]) + 1
+        p[:begun], pace[:begun], rate[:begun] = p[begun], 0.0, 0.0
+    play = PlayState(p, pace, rate)
+    return play, lab.robot.reference(play)

@@ -1,0 +1,127 @@
+"""A reproduction as JSON and pictures in a directory, and as tables for a reader."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from interfaces.lab.claims import Cell, Claim, Reproduction
+from vrs.errors import FormatError
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+SCHEMA = "vrs-reproduction/1"
+DIGITS = 6
+"""Significant digits of what was measured."""
+
+
+def to_json(reproduction: Reproduction) -> str:
+    """The whole of it but for the pictures; the same study gives the same bytes, but for `timings`."""
+    found, study = reproduction.findings, reproduction.study
+    document = {
+        "schema": SCHEMA,
+        "paper": reproduction.paper.name,
+        "citation": reproduction.paper.citation,
+        "seed": study.seed,
+        "runs": study.runs,
+        "length_s": study.length,
+        "claims": [_claim(claim) for claim in found.claims],
+        "tables": [
+            {
+                "name": table.name,
+                "title": table.title,
+                "columns": list(table.columns),
+                "rows": [[_value(cell) for cell in row] for row in table.rows],
+            }
+            for table in found.tables
+        ],
+        "figures": [{"file": f"{figure.name}.svg", "title": figure.title} for figure in found.figures],
+        "timings": [_claim(claim) for claim in found.timings],
+        "timings_note": "measured by the clock of the machine that ran this: never the same twice",
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _claim(claim: Claim) -> dict[str, Any]:
+    return {
+        "claim": claim.claim,
+        "source": claim.source,
+        "expected": _value(claim.expected),
+        "measured": _value(claim.measured),
+        "interval": None if claim.interval is None else [_value(end) for end in claim.interval],
+        "holds": bool(claim.holds),
+    }
+
+
+def _value(cell: Cell) -> Cell:
+    """A number with as many digits as mean something; no infinity or NaN, which JSON hasn't got."""
+    if not isinstance(cell, float):
+        return cell
+    return float(f"{cell:.{DIGITS}g}") if math.isfinite(cell) else str(cell)
+
+
+def write(reproduction: Reproduction, out: Path) -> Path:
+    """Write PAPER.json and the pictures beside it.
+
+    Args:
+        reproduction: What to write.
+        out: An existing directory.
+
+    Returns:
+        The JSON file.
+
+    Raises:
+        FormatError: If the directory can't hold them.
+    """
+    path = out / f"{reproduction.paper.name}.json"
+    try:
+        for figure in reproduction.findings.figures:
+            (out / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
+        path.write_text(to_json(reproduction), encoding="utf-8")
+    except OSError as error:
+        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
+    return path
+
+
+def rich_tables(reproduction: Reproduction) -> list[RichTable]:
+    """The claims, a row a claim, then the other tables."""
+    from rich.table import Table
+
+    found = reproduction.findings
+    made = []
+    for title, claims in (("claims", found.claims), ("speed of this machine", found.timings)):
+        if not claims:
+            continue
+        table = Table(title=f"{reproduction.paper.name}: {title}", title_justify="left", show_lines=True)
+        for name, share in (
+            ("claim", 4),
+            ("source", 2),
+            ("expected", 2),
+            ("measured", 2),
+            ("95 %", 2),
+            ("holds", 1),
+        ):
+            table.add_column(name, ratio=share, overflow="fold")
+        for claim in claims:
+            ends = "" if claim.interval is None else " to ".join(_said(end) for end in claim.interval)
+            holds = "yes" if claim.holds else "[bold red]NO[/]"
+            cells = claim.claim, claim.source, _said(claim.expected), _said(claim.measured), ends
+            table.add_row(*(cell.replace("[", r"\[") for cell in cells), holds)
+        made.append(table)
+    for plain in found.tables:
+        table = Table(title=plain.title, title_justify="left")
+        for k, name in enumerate(plain.columns):
+            table.add_column(name, justify="left" if k == 0 else "right")
+        for row in plain.rows:
+            table.add_row(*(_said(cell).replace("[", r"\[") for cell in row))
+        made.append(table)
+    return made
+
+
+def _said(cell: Cell) -> str:
+    if cell is None:
+        return ""
+    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)

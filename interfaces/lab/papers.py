@@ -1,0 +1,26 @@
+"""The papers that can be reproduced, by name."""
+
+from __future__ import annotations
+
+from interfaces.lab.claims import Paper
+from interfaces.lab.doulgeri import PAPER as DOULGERI
+from vrs.errors import InvalidValueError
+
+PAPERS: dict[str, Paper] = {paper.name: paper for paper in (DOULGERI,)}
+"""By the name that the command line uses."""
+
+ALL = "all"
+"""Stands for every paper there is."""
+
+
+def papers(name: str) -> tuple[Paper, ...]:
+    """The paper of a name, or all of them.
+
+    Raises:
+        InvalidValueError: If no paper has that name.
+    """
+    if name == ALL:
+        return tuple(PAPERS.values())
+    if name not in PAPERS:
+        raise InvalidValueError("paper", name, f"one of {', '.join((*PAPERS, ALL))}")
+    return (PAPERS[name],)

@@ -1,0 +1,196 @@
+"""The laboratory driver: both sites and the link in virtual time, as fast as the processor goes."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable
+from itertools import count
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from interfaces.link import Link, LinkConditions
+from interfaces.teleop.messages import Orders, Report
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.robot import Reference, RobotSite
+from robots.onboard.playout import PlayState
+from vrs.commands import finite
+from vrs.errors import InvalidValueError
+from vrs.model import Array
+from vrs.receipt import Receipt
+
+_BLOCK = 100
+"""Ticks that are passed together while nothing needs to know where the body is."""
+_SAME = 1e-9
+"""Times nearer than this [s] are one."""
+
+Action: TypeAlias = Callable[[float], None]
+"""What is done at a time, which it's told [s]."""
+
+
+class Body(Protocol):
+    """What follows references, a row a tick."""
+
+    def follow(self, reference: Reference) -> Array:
+        """Follow references for a tick each; return measured joints after each, (m, n) [rad]."""
+
+
+class Laboratory:
+    """An operator's site, a robot's site and the link between them under one virtual clock.
+
+    Everything happens in the order of its time; what happens at the same time, in the order: link, agenda, sites.
+    """
+
+    def __init__(
+        self,
+        operator: OperatorSite,
+        robot: RobotSite,
+        conditions: LinkConditions,
+        rng: np.random.Generator,
+        *,
+        now: float = 0.0,
+        tick: float = 0.02,
+        every: int = 1,
+        body: Body | None = None,
+    ) -> None:
+        """Put everything in its place.
+
+        Args:
+            operator: The operator's site.
+            robot: The robot's site.
+            conditions: What the link does.
+            rng: Source of everything random in it.
+            now: Time to begin with [s].
+            tick: Period of the body [s].
+            every: Ticks from one row of the record to the next, ≥ 1.
+            body: What follows the robot's references; without one the robot is where its reference is.
+        """
+        self.operator, self.robot = operator, robot
+        self.link: Link[Orders, Report] = Link(conditions, rng)
+        self.now = finite("now", now, "finite seconds")
+        if not finite("tick", tick, "seconds > 0") > 0:
+            raise InvalidValueError("tick", tick, "seconds > 0")
+        if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+            raise InvalidValueError("every", every, "a whole number ≥ 1")
+        self._tick, self._every, self._body = tick, every, body
+        self._start, self._ticks = now, 0
+        self.arrivals: dict[tuple[int, int], float] = {}
+        """When each entry of the operator's log first reached the robot [s], by epoch and number."""
+        self.answers: dict[tuple[int, int], Receipt] = {}
+        """What the robot's engine answered when it carried out an entry, by epoch and number."""
+        self.halts: dict[int, tuple[float, str]] = {}
+        """When and why the robot stopped by itself [s], by epoch."""
+        self._agenda: list[tuple[float, int, Action]] = []
+        self._cues: list[tuple[float, int, Action]] = []
+        self._order = count()
+        self._play: list[Array] = []
+        self._followed: list[Reference] = []
+        self._measured: list[Array] = []
+
+    def schedule(self, t: float, action: Action) -> None:
+        """Let something be done at a time [s]."""
+        heapq.heappush(self._agenda, (t, next(self._order), action))
+
+    def cue(self, p: float, action: Action) -> None:
+        """Let something be done to the body when the robot's play time passes p [s]; the action is told when."""
+        heapq.heappush(self._cues, (p, next(self._order), action))
+
+    def run(self, until: float) -> None:
+        """Let time pass until `until` [s]."""
+        while True:
+            at_robot = self.robot.next_deadline()
+            times = [self.operator.next_deadline(), at_robot]
+            arrival = self.link.next_deadline()
+            times += [arrival] if arrival is not None else []
+            times += [self._agenda[0][0]] if self._agenda else []
+            now = max(min(times), self.now)
+            if now > until:
+                break
+            on_agenda = bool(self._agenda) and self._agenda[0][0] <= now
+            self._pass(now, at_once=self._body is not None and (at_robot <= now or on_agenda))
+            for delivery in self.link.forward.receive(now):
+                for entry in delivery.payload.entries:
+                    self.arrivals.setdefault((delivery.payload.epoch, entry.number), now)
+                self.robot.receive(delivery.payload, now=now)
+            for back in self.link.backward.receive(now):
+                self.operator.receive(back.payload, now=now)
+            while self._agenda and self._agenda[0][0] <= now:
+                heapq.heappop(self._agenda)[2](now)
+            for orders in self.operator.advance(now=now):
+                self.link.forward.send(orders, now)
+            for report in self.robot.advance(now=now):
+                for number, receipt in report.receipts:
+                    self.answers.setdefault((report.epoch, number), receipt)
+                if report.halted:
+                    self.halts.setdefault(report.epoch, (now, report.halted))
+                self.link.backward.send(report, now)
+        self._pass(until, at_once=True)
+
+    def _pass(self, now: float, *, at_once: bool = False) -> None:
+        """Let time pass in which nothing happens.
+
+        What is over never changes: ticks may wait until there are many, or until somebody asks where the body is.
+        """
+        self.now = now
+        last = math.floor((now - self._start) / self._tick + _SAME)
+        if last - self._ticks < (1 if at_once else _BLOCK):
+            return
+        while self._ticks < last:
+            t: Array = self._start + self._tick * np.arange(self._ticks + 1, last + 1, dtype=np.float64)
+            play = self.robot.play_at(t)
+            cue = self._next_cue(play)
+            self._follow(t[:cue], PlayState(*(column[:cue] for column in play)))
+            if cue is not None:
+                p, _, action = heapq.heappop(self._cues)
+                early = (play.p[cue] - p) / play.pace[cue] if play.pace[cue] > 0 else self._tick
+                action(float(t[cue]) - min(max(early, 0.0), self._tick))
+
+    def _next_cue(self, play: PlayState) -> int | None:
+        """The first of the ticks at which the next cue has passed; None if there's none."""
+        waits_for_first_message = self.robot.epoch == 0 and self.robot.config.fixed_offset is None
+        if not self._cues or waits_for_first_message:
+            return None
+        # An adaptive play time is set back when the first message comes.
+        p = np.minimum.accumulate(play.p[::-1])[::-1]
+        index = int(np.searchsorted(p, self._cues[0][0] + _SAME, side="right"))
+        return index if index < len(p) else None
+
+    def _follow(self, t: Array, play: PlayState) -> None:
+        """Write down the next ticks, at times (m,) [s]; a body follows its references."""
+        if not len(t):
+            return
+        first, self._ticks = self._ticks + 1, self._ticks + len(t)
+        rows = slice(-first % self._every, None, self._every)
+        self._play.append(np.column_stack((t[rows], *(column[rows] for column in play))))
+        if self._body is not None:
+            reference = self.robot.reference(play)
+            measured = self._body.follow(reference)
+            self._followed.append(Reference(*(column[rows].copy() for column in reference)))
+            self._measured.append(measured[rows].copy())
+            self.robot.measured(measured[-1], now=float(t[-1]))
+
+    @property
+    def t(self) -> Array:
+        """Times of the record [s], (k,)."""
+        rows = np.arange(self._every, self._ticks + 1, self._every, dtype=np.float64)
+        t: Array = self._start + self._tick * rows
+        return t
+
+    @property
+    def play(self) -> Array:
+        """Time [s], play time p [s], pace and rate [1/s] in each row of the record, (k, 4)."""
+        return np.concatenate(self._play) if self._play else np.empty((0, 4))
+
+    @property
+    def reference(self) -> Reference:
+        """What the robot's site asked of its body, (k, n) each."""
+        if self._body is None:
+            _, p, pace, rate = self.play.T
+            return self.robot.reference(PlayState(p, pace, rate))
+        return Reference(*(np.concatenate([r[i] for r in self._followed]) for i in range(3)))
+
+    @property
+    def measured(self) -> Array:
+        """Measured joints [rad], (k, n)."""
+        return self.reference.q if self._body is None else np.concatenate(self._measured)

@@ -1,0 +1,11 @@
+"""Both sites of a teleoperated robot: messages, the operator's, the robot's."""
+
+from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
+from interfaces.teleop.operator import Correction, OperatorSite, OperatorSiteConfig
+from interfaces.teleop.robot import Reference, RobotSite, RobotSiteConfig
+
+__all__ = [
+    "AdaptiveOffset", "Correction", "Entry", "OffsetConfig", "OperatorSite", "OperatorSiteConfig", "Orders",
+    "PlanPart", "Reference", "Report", "RobotSite", "RobotSiteConfig",
+]  # fmt: skip

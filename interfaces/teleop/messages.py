@@ -1,0 +1,88 @@
+"""What crosses the link between the operator's site and the robot's, as frozen values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vrs.commands import Command
+from vrs.model import Array
+from vrs.receipt import Receipt
+from vrs.segment import PolynomialSegment
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """One command of the operator's log."""
+
+    number: int
+    """From 1, without gaps, within an epoch."""
+    at: float
+    """When it was given, by the operator's clock [s]; entries are in this order."""
+    command: Command | None
+    """What was commanded, poses and times resolved as they were accepted; None takes back the newest."""
+    command_id: int
+    """Id that the operator's engine gave it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Orders:
+    """From the operator's site: entries of the log, or a heartbeat without any."""
+
+    epoch: int
+    """Of the control lease."""
+    number: int
+    """Of the packet, from 1."""
+    sent_at: float
+    """By the operator's clock [s]."""
+    newest: int
+    """Number of the newest entry."""
+    complete_until: float
+    """With all entries up to the newest, nothing will change before this time on the timeline [s]."""
+    epoch_began: float
+    """When the epoch began [s]: no entry of it changes anything before."""
+    heard: int = 0
+    """Number of the newest report that came."""
+    entries: tuple[Entry, ...] = ()
+    """New ones, and older ones that may have been lost."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanPart:
+    """The robot's plan from a time on."""
+
+    version: int
+    """Of the robot's timeline."""
+    since: float
+    """Before it nothing changed since the version that the operator knew [s]."""
+    initial: Array
+    """Where the arm stands before the first segment [rad], (n,)."""
+    segments: tuple[PolynomialSegment, ...]
+    """All of them from there on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """From the robot's site: where it is, and what became of the entries."""
+
+    epoch: int
+    """Epoch that it follows."""
+    number: int
+    """Of the packet, from 1."""
+    sent_at: float
+    """By the robot's clock [s]."""
+    echo: tuple[int, float, float] | None
+    """The newest Orders heard: its number, its sent_at, and when it arrived by the robot's clock [s]."""
+    executed: int
+    """Entries up to this number were carried out."""
+    play: float
+    """Time on the robot's timeline that it plays now [s]."""
+    pace: float
+    """How fast it plays; 1 is as planned."""
+    q: Array
+    """Measured joints [rad], (n,)."""
+    halted: str = ""
+    """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
+    receipts: tuple[tuple[int, Receipt], ...] = ()
+    """Receipts by entry number, of entries not known to have been reported."""
+    plan: PlanPart | None = None
+    """Where the robot's plan may be another than the operator thinks."""

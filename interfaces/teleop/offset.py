@@ -1,0 +1,58 @@
+"""Adaptive clock offset: how far behind the robot plays, from how late messages come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from interfaces.link.quantiles import SlidingQuantiles
+from vrs.commands import finite
+from vrs.errors import InvalidValueError
+
+
+@dataclass(frozen=True, slots=True)
+class OffsetConfig:
+    """How much delay is hidden."""
+
+    share: float = 0.95
+    """Share of the messages that come early enough, in (0, 1)."""
+    margin: float = 0.05
+    """Added to the quantile [s], in [0, 60]: for what the window hasn't seen."""
+    window: int = 2000
+    """Messages that count, in [10, 100000]."""
+    horizon: float = 120.0
+    """Age at which a message counts no more [s], in [1, 86400]."""
+
+    def __post_init__(self) -> None:
+        ranges = {"share": (0.0, 1.0), "margin": (0.0, 60.0), "window": (10, 100_000), "horizon": (1.0, 86_400.0)}
+        for name, (low, high) in ranges.items():
+            allowed = f"a number in [{low:g}, {high:g}]"
+            value = finite(name, getattr(self, name), allowed)
+            if not low <= value <= high or (name == "share" and value in (0.0, 1.0)):
+                raise InvalidValueError(name, value, allowed)
+
+
+class AdaptiveOffset:
+    """D = −(quantile of the age of completeness + margin), by the robot's own clock.
+
+    The age is how far the newest complete time lay behind the robot's clock just before a message came: delay,
+    heartbeat period, losses and an unknown difference of the clocks are all in it, so that none need be known.
+    """
+
+    def __init__(self, config: OffsetConfig | None = None) -> None:
+        self._config = OffsetConfig() if config is None else config
+        self._ages = SlidingQuantiles(self._config.window, self._config.horizon)
+
+    def heard(self, complete_until: float, *, now: float) -> None:
+        """A message came.
+
+        Args:
+            complete_until: Up to where the timeline was known to be complete before it [s].
+            now: By the robot's clock [s].
+        """
+        self._ages.add(now - complete_until, now=now)
+
+    @property
+    def D(self) -> float | None:
+        """Timeline time less the robot's clock [s]; None before the first message."""
+        age = self._ages.quantile(self._config.share)
+        return None if age is None else -(age + self._config.margin)

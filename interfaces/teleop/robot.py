@@ -1,0 +1,384 @@
+"""The robot's site: an engine of its own, played out under jitter, and reports to the operator.
+
+With an adaptive offset the engine is a replica: it carries out the operator's log in its order, each entry as of
+the time at which it was given, and so has the operator's timeline to the bit; how late messages come is a matter
+of the playout alone. With a fixed offset D, as in the paper, entries are carried out as they come, at the time that
+the robot's own clock then reads; late ones are postponed, and the timelines part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+
+from interfaces.site import engine_time
+from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
+from robots.onboard.playout import Playout, PlayoutConfig, PlayState
+from robots.onboard.stamps import Stamp
+from robots.onboard.stops import from_commanded
+from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState
+from vrs.chunk import HOLD, State
+from vrs.clock import ManualClock
+from vrs.commands import Profile, finite
+from vrs.engine import Engine
+from vrs.errors import InvalidValueError, VrsError
+from vrs.insertion import hold, piece
+from vrs.model import Array, RobotModel
+from vrs.planning.stopping import stop
+from vrs.receipt import Receipt, Status
+
+WAITING_MOST = 4096
+"""Most entries that wait for earlier ones, and most receipts that wait to be reported."""
+SEGMENTS_MOST = 2000
+"""Most segments of a plan in one report."""
+_SETTLE = 0.05
+"""How long the arm is held at least where it was measured [s]."""
+_REPEAT = 4
+"""Reports that a receipt is told in."""
+_AGAIN = 10
+"""Every so many reports tell the oldest receipts again that the operator isn't known to have."""
+_OLDEST = 64
+"""So many of them."""
+_PLAYS = 16
+"""Epochs and stops of which the play time is kept."""
+_SAME = 1e-9
+"""Times nearer than this [s] are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSiteConfig:
+    """How the robot's site behaves."""
+
+    fixed_offset: float | None = None
+    """D = −D_f, as in the paper: timeline time less the robot's clock [s]; None adapts."""
+    offset: OffsetConfig = field(default_factory=OffsetConfig)
+    """How much delay an adaptive offset hides."""
+    playout: PlayoutConfig = field(default_factory=PlayoutConfig)
+    """How play follows it."""
+    beat: float = 0.05
+    """Time between two reports [s], in [0.001, 10]."""
+    tolerance: float = 0.1
+    """Following error of a joint above which the robot stops [rad], in [1e-6, 10]."""
+    watchdog: WatchdogConfig | None = None
+    """When the link counts as lost, and the robot halts; None holds: it goes on when messages come again."""
+
+    def __post_init__(self) -> None:
+        if self.fixed_offset is not None:
+            finite("fixed_offset", self.fixed_offset, "None or finite seconds")
+        for name, low, high in (("beat", 1e-3, 10.0), ("tolerance", 1e-6, 10.0)):
+            allowed = f"a number in [{low:g}, {high:g}]"
+            if not low <= finite(name, getattr(self, name), allowed) <= high:
+                raise InvalidValueError(name, getattr(self, name), allowed)
+
+
+class Reference(NamedTuple):
+    """What the body is to follow, (k, n) each."""
+
+    q: Array
+    """[rad]."""
+    qd: Array
+    """[rad/s]."""
+    qdd: Array
+    """[rad/s²]."""
+
+
+class _Fixed:
+    """Play at an even pace, 1 or none: p = pace · t + D."""
+
+    def __init__(self, D: float, pace: float = 1.0) -> None:
+        self.D, self.pace = D, pace
+
+    def at(self, t: Array) -> PlayState:
+        t = np.asarray(t, float)
+        return PlayState(self.pace * t + self.D, np.full_like(t, self.pace), np.zeros_like(t))
+
+
+class _Log:
+    """Which entries came, and up to when the timeline is complete with those that were carried out."""
+
+    def __init__(self, complete_until: float) -> None:
+        self.executed = 0
+        self.complete_until = complete_until
+        self._waiting: dict[int, Entry] = {}
+        self._early: set[int] = set()
+        self._claims: deque[tuple[int, float]] = deque(maxlen=WAITING_MOST)
+
+    def due(self, entries: tuple[Entry, ...], *, as_they_come: bool) -> list[Entry]:
+        """Entries to be carried out now, each once."""
+        new = [e for e in entries if e.number > self.executed and e.number not in self._early]
+        if as_they_come:
+            due = list({e.number: e for e in new}.values())
+            self._early.update(e.number for e in due)
+            while self.executed + 1 in self._early:
+                self._early.remove(self.executed + 1)
+                self.executed += 1
+            return due
+        for entry in new:
+            if len(self._waiting) < WAITING_MOST:
+                self._waiting.setdefault(entry.number, entry)
+        due = []
+        while self.executed + 1 in self._waiting:
+            self.executed += 1
+            due.append(self._waiting.pop(self.executed))
+        return due
+
+    def claim(self, newest: int, complete_until: float) -> None:
+        """A message said that with all entries up to the newest nothing changes before a time."""
+        self._claims.append((newest, complete_until))
+        held = [c for c in self._claims if c[0] > self.executed]
+        if len(held) < len(self._claims):
+            kept = max(c[1] for c in self._claims if c[0] <= self.executed)
+            self.complete_until = max(self.complete_until, kept)
+            self._claims = deque(held, maxlen=WAITING_MOST)
+
+
+class RobotSite:
+    """What runs beside the real robot, all but its body."""
+
+    def __init__(self, model: RobotModel, q: Array, *, now: float, config: RobotSiteConfig | None = None) -> None:
+        """Stand at rest until the first message comes.
+
+        Args:
+            model: The robot.
+            q: Joints [rad], (n,).
+            now: By the robot's clock [s].
+            config: How to behave.
+        """
+        self.config = RobotSiteConfig() if config is None else config
+        self._model = model
+        self._clock = ManualClock(now)
+        self.engine = Engine(model, q=q)
+        self.epoch = 0
+        self.halted = ""
+        """Why it stopped by itself; empty while it follows the operator."""
+        self.parted = False
+        """Whether its timeline is another than the operator's."""
+        fixed = self.config.fixed_offset
+        self._play: Playout | _Fixed = _Fixed(now, 0.0) if fixed is None else _Fixed(fixed)
+        self._plays: deque[tuple[float, Playout | _Fixed]] = deque([(now, self._play)], maxlen=_PLAYS)
+        self._offset = AdaptiveOffset(self.config.offset)
+        self._log = _Log(-math.inf)
+        self._newest: tuple[int, float, float] | None = None
+        self._receipts: deque[tuple[int, int, Receipt]] = deque(maxlen=WAITING_MOST)
+        self._reports = 0
+        self._due = now
+        self._measured = np.array(q, float)
+        self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
+
+    @property
+    def playout(self) -> Playout | None:
+        """How an adaptive offset is played; None with a fixed one."""
+        return self._play if isinstance(self._play, Playout) else None
+
+    @property
+    def complete_until(self) -> float:
+        """Up to where its timeline is known to be complete [s]."""
+        return self._log.complete_until
+
+    def receive(self, orders: Orders, *, now: float) -> None:
+        """Take in a message of the operator; what is of an old epoch is ignored, as all is once it has stopped."""
+        self.advance_play(now=now)
+        if orders.epoch > self.epoch and self._play_at(now) >= self.engine.timeline.end:
+            self._begin(orders, now)
+        if orders.epoch != self.epoch or not self._counts(orders, now):
+            return
+        if self._newest is None or orders.number > self._newest[0]:
+            self._newest = orders.number, orders.sent_at, now
+        while self._receipts and self._receipts[0][0] <= orders.heard:
+            self._receipts.popleft()
+        if self.halted:
+            return
+        self._offset.heard(self._log.complete_until, now=now)
+        fixed = not isinstance(self._play, Playout)
+        for entry in self._log.due(orders.entries, as_they_come=fixed):
+            self._carry_out(entry, now)
+        self._log.claim(orders.newest, orders.complete_until)
+        if isinstance(self._play, Playout):
+            D = self._offset.D
+            assert D is not None
+            self._play.aim(D - self._play.reserve, now=now)
+            self._play.hear(self._log.complete_until, self.engine.timeline, now=now)
+
+    def _counts(self, orders: Orders, now: float) -> bool:
+        """Whether the watchdog lets a message count."""
+        if self._watchdog is None:
+            return True
+        stamp = Stamp(orders.epoch, orders.number, orders.sent_at)
+        return self._watchdog.heard(stamp, now=now, authentic=True).counts
+
+    def _watch(self, now: float) -> None:
+        """Let the watchdog do what is due by now."""
+        if self._watchdog is None:
+            return
+        for action in self._watchdog.advance(now=now):
+            if isinstance(action, BeginStop):
+                self.halt(f"nothing fresh came from the operator: {action.reason.value}", now=now)
+        if self.halted and self._play_at(now) >= self.engine.timeline.end:
+            self._watchdog.stopped(self._watchdog.number, now=now)
+
+    def _begin(self, orders: Orders, now: float) -> None:
+        """Follow a new epoch, from where the arm rests."""
+        if self._watchdog is not None:
+            self._watch(now)
+            if not self._watchdog.arm(orders.epoch, now=now).counts:
+                return
+        fixed, stood = self.config.fixed_offset, self.engine.timeline
+        began = orders.epoch_began if fixed is None else engine_time(now, fixed)
+        self._clock = ManualClock(max(began, stood.end) if len(stood) else began)
+        if len(stood):
+            self.engine = Engine(self._model, timeline=stood, clock=self._clock)
+        else:
+            self.engine = Engine(self._model, q=stood.initial, clock=self._clock)
+        self.epoch, self.halted, self.parted = orders.epoch, "", False
+        self._log, self._newest = _Log(began), None
+        self._offset = AdaptiveOffset(self.config.offset)
+        self._receipts.clear()
+        timeline, limits = self.engine.timeline, self.engine.limits
+        adaptive = Playout(timeline, limits, now=now, p=began, config=self.config.playout)
+        self._play = adaptive if fixed is None else _Fixed(fixed)
+        self._plays.append((now, self._play))
+
+    def _carry_out(self, entry: Entry, now: float) -> None:
+        at = entry.at if isinstance(self._play, Playout) else engine_time(self._play_at(now), 0.0)
+        self._clock.set(max(at, self._clock.now()))
+        newest = self.engine.newest
+        try:
+            self.engine.count_from(entry.command_id)
+            command = entry.command
+            answer = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
+        except VrsError:
+            self.parted = True
+            return
+        finally:
+            self.engine.count_from(max(newest, self.engine.newest))
+        if not isinstance(answer, Receipt):
+            return
+        asked = getattr(entry.command, "execute_at", None)
+        late = asked is not None and answer.execute_at is not None and answer.execute_at > asked + _SAME
+        self.parted = self.parted or late or answer.status is Status.REJECTED
+        self._receipts.append((self._reports + 1, entry.number, answer))
+
+    def advance_play(self, *, now: float) -> None:
+        """Let play do what is due by now."""
+        if isinstance(self._play, Playout):
+            self._play.advance(now=now)
+
+    def advance(self, *, now: float) -> tuple[Report, ...]:
+        """Do what is due by now [s], and say what is to be sent."""
+        self.advance_play(now=now)
+        self._watch(now)
+        if now < self._due:
+            return ()
+        self._due = now + self.config.beat
+        return (self._report(now),)
+
+    def next_deadline(self) -> float:
+        """When there's something to do, by the robot's clock [s]."""
+        times = [self._due]
+        for part in (self._play, self._watchdog):
+            due = None if part is None or isinstance(part, _Fixed) else part.next_deadline()
+            times += [] if due is None else [due]
+        return min(times)
+
+    def play_at(self, t: Array) -> PlayState:
+        """Where play is at ascending times up to the next deadline, by the robot's clock [s], (k,)."""
+        if not len(t) or t[0] >= self._plays[-1][0]:
+            return self._play.at(t)
+        bounds = np.searchsorted(t, [since for since, _ in self._plays])
+        bounds[0] = 0
+        parts = [
+            play.at(t[low:high])
+            for (_, play), low, high in zip(self._plays, bounds, [*bounds[1:], len(t)], strict=True)
+            if high > low
+        ]
+        return PlayState(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+
+    def reference(self, play: PlayState) -> Reference:
+        """What the body follows where play is, (k, n) each."""
+        p, pace, rate = play.p, play.pace[:, None], play.rate[:, None]
+        q, qd, qdd = (self.engine.timeline.sample(p, derivative=k) for k in range(3))
+        return Reference(q, qd * pace, qdd * pace * pace + qd * rate)
+
+    def measured(self, q: Array, *, now: float) -> None:
+        """Take in measured joints [rad], (n,); where one is too far from its reference, the robot stops."""
+        self._measured = np.array(q, float)
+        if self.halted or self.epoch == 0:
+            return
+        away = np.abs(q - self.engine.timeline.sample(float(self.play_at(np.array([now])).p[0])))
+        joint = int(away.argmax())
+        if away[joint] > self.config.tolerance:
+            limit = self.config.tolerance
+            self.halt(
+                f"joint {joint + 1} is {away[joint]:.3g} rad from where it should be, more than {limit:g} rad",
+                now=now,
+                measured=q,
+            )
+
+    def halt(self, reason: str, *, now: float, measured: Array | None = None) -> None:
+        """Stop at once, and wait for a new epoch.
+
+        Args:
+            reason: What to report.
+            now: By the robot's clock [s].
+            measured: Where to hold the arm [rad], (n,), when it's not where it should be; without it the arm brakes
+                from its reference, within the limits.
+        """
+        if self.halted:
+            return
+        play = self.play_at(np.array([now]))
+        p, limits, timeline = float(play.p[0]), self.engine.limits, self.engine.timeline
+        if measured is not None:
+            timeline = timeline.edited(p, [hold(_SETTLE, np.clip(measured, limits.q_min, limits.q_max))])
+        elif play.pace[0] == 1.0 and play.rate[0] == 0.0:
+            timeline = from_commanded(timeline, p, limits).timeline
+        else:
+            # At another pace the arm moves at other speeds than the plan says.
+            state = State(*(row[0] for row in self.reference(play)))
+            timeline = timeline.edited(p, [piece(stop(state, Profile.PARABOLIC, limits)[0], HOLD)])
+        self._clock = ManualClock(p)
+        self.engine = Engine(self._model, timeline=timeline, clock=self._clock)
+        self._play = _Fixed(p - now)
+        self._plays.append((now, self._play))
+        self.halted, self.parted = reason, True
+        self._due = now
+        if self._watchdog is not None and self._watchdog.state is WatchdogState.RUNNING:
+            self._watchdog.stop(StopReason.FAULT, now=now)
+
+    def _play_at(self, now: float) -> float:
+        return float(self._play.at(np.array([now])).p[0])
+
+    def _report(self, now: float) -> Report:
+        self._reports += 1
+        p, pace, _ = self._play.at(np.array([now]))
+        plan = self._plan_from(float(p[0])) if self.parted else None
+        q = self._measured.copy()
+        q.flags.writeable = False
+        return Report(
+            self.epoch, self._reports, now, self._newest, self._log.executed, float(p[0]), float(pace[0]), q,
+            self.halted, self._told(), plan,
+        )  # fmt: skip
+
+    def _told(self) -> tuple[tuple[int, Receipt], ...]:
+        """Receipts for a report: new ones, those of the reports just before, and now and then the oldest."""
+        told = []
+        for since, number, receipt in reversed(self._receipts):
+            if since <= self._reports - _REPEAT:
+                break
+            told.append((number, receipt))
+        if self._reports % _AGAIN == 0:
+            told += [(number, receipt) for _, number, receipt in islice(self._receipts, _OLDEST)]
+        return tuple(told)
+
+    def _plan_from(self, p: float) -> PlanPart:
+        timeline = self.engine.timeline
+        low = max(timeline.index_at(p), 0)
+        high = min(low + SEGMENTS_MOST, len(timeline))
+        since = timeline.start_of(low) if low < len(timeline) else timeline.end
+        segments = tuple(timeline.segment(i) for i in range(low, high))
+        return PlanPart(timeline.version, since, timeline.sample(since), segments)
