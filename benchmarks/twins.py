@@ -43,8 +43,8 @@ def part() -> Part:
     return Part(
         "Twins",
         "Operator's and robot's site with an engine each, joined by an in-order link, with adaptive D, messages "
-        "every 50 ms both ways, in virtual time: a move every 3 s on average (spliced, replacing or appended, at "
-        "once or later), and three seconds of steering at 20 Hz every 23 s. Processor time.",
+        "every 50 ms there and 100 ms back, in virtual time: a move every 3 s on average (spliced, replacing or "
+        "appended, at once or later), and three seconds of steering at 20 Hz every 23 s. Processor time.",
         tuple(results),
     )
 

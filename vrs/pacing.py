@@ -29,8 +29,8 @@ _NO_SPEED = 1e-13
 """A speed [rad/s] that's only rounding."""
 _NEARLY = 1e-6
 """A speed [rad/s] that's worth a closer look."""
-_KNOTS = 64
-"""Knots that are looked at together."""
+_KNOTS = 8
+"""Knots that are looked at together, at first; then twice as many, and so on."""
 _NO_JUMP = 1e-9
 """An acceleration, or a jump of one [rad/s²], that counts as none."""
 _ASIDE = 1e-9
@@ -292,9 +292,10 @@ def _waits(timeline: Timeline, s: float, rest: float) -> Iterator[float]:
 
 def rest_after(timeline: Timeline, s: float, until: float = np.inf) -> float:
     """When the motion next rests, at a knot [s]; infinity where it doesn't until a time."""
-    first = max(timeline.index_at(s), 0) + 1
-    for low in range(first, len(timeline) + 1, _KNOTS):
-        knots = np.array([timeline.start_of(i) for i in range(low, min(low + _KNOTS, len(timeline) + 1))])
+    low, size = max(timeline.index_at(s), 0) + 1, _KNOTS
+    last = min(timeline.index_at(until) + 1, len(timeline)) if until < np.inf else len(timeline)
+    while low <= last:
+        knots = np.array([timeline.start_of(i) for i in range(low, min(low + size, last + 1))])
         slow = np.abs(timeline.sample(knots, derivative=1)).max(1) < _NEARLY
         for i in np.flatnonzero(slow & (knots > s)).tolist():
             knot = float(knots[i])
@@ -302,8 +303,7 @@ def rest_after(timeline: Timeline, s: float, until: float = np.inf) -> float:
                 return np.inf
             if _rests(timeline, knot, low + i):
                 return knot
-        if knots[-1] > until:
-            return np.inf
+        low, size = low + size, 2 * size
     end = max(timeline.end, s)
     return end if end <= until else np.inf
 

@@ -59,6 +59,10 @@ def _run(paper: Paper, study: Study, workers: int) -> Reproduction:
         return measure(paper, study, workers=workers, progress=lambda title: bar.advance(tasks[title]))
 
 
+NARROWEST = 8
+"""Characters that a column of a table needs to be read."""
+
+
 def _show(reproduction: Reproduction, path: Path) -> None:
     from rich.console import Console
 
@@ -66,7 +70,10 @@ def _show(reproduction: Reproduction, path: Path) -> None:
 
     console = Console()
     for table in rich_tables(reproduction):
-        console.print(table)
+        if len(table.columns) * NARROWEST <= console.width:
+            console.print(table)
+        else:
+            typer.echo(f"{table.title}: {table.row_count} rows, too wide for this console; see {path.name}")
     failed, found = reproduction.failed, reproduction.findings
     total = len(found.claims) + len(found.timings)
     typer.echo(f"{total - len(failed)} of {total} claims hold.")

@@ -61,7 +61,7 @@ class RobotSiteConfig:
     """How much delay an adaptive offset hides."""
     playout: PlayoutConfig = field(default_factory=PlayoutConfig)
     """How play follows it."""
-    beat: float = 0.05
+    beat: float = 0.1
     """Time between two reports [s], in [0.001, 10]."""
     tolerance: float = 0.1
     """Following error of a joint above which the robot stops [rad], in [1e-6, 10]."""

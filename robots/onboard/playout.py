@@ -34,6 +34,8 @@ _SLEW_RAMPS = (0.4, 0.2, 0.1)
 """Durations of a small change of pace to try [s]."""
 _LOOK = 0.25
 """Longest time between two looks at the aim [s]."""
+_REST_LOOK = 1.0
+"""The same where it's known when the motion rests [s]."""
 _SOON = 0.05
 """When to look again if the pace couldn't be changed [s]."""
 _STEP = 1e-3
@@ -150,8 +152,8 @@ class Playout:
         # To begin with: braking from full speed takes half of this way, and seldom more than three times that.
         self._needs = deque([1.5 * float((limits.qd_max / limits.qdd_max).max())], maxlen=_NEEDS)
         self._slowed: tuple[float, float] | None = None
-        self._refused = math.nan, 0
-        """When a motion rests that can't be played faster, and in which version of the timeline."""
+        self._refused = math.nan
+        """When a motion rests that can't be played faster: it's complete, and so won't change."""
         self.stretches: list[Stretch] = []
         """When play slowed down in mid-motion; the driver may empty it."""
 
@@ -292,7 +294,7 @@ class Playout:
         if escape is None:
             self._brake(t, p)
             return
-        longest = _LOOK
+        longest = _LOOK if escape.law is not None else _REST_LOOK
         if wanted != pace and (wanted <= 1.0 or self._allows(p, wanted)):
             until = self._complete if wanted <= 1.0 else rest_after(self._timeline, p)
             for ramp in _SLEW_RAMPS:
@@ -301,7 +303,7 @@ class Playout:
                 if after is not None and self._keeps(law):
                     self._change(t, law, wanted, after)
                     return
-            longest = _SOON
+            longest = _SOON if escape.law is not None else _LOOK
         self._steady(t, p, pace, escape, longest)
 
     def _brake(self, t: float, p: float) -> None:
@@ -344,7 +346,7 @@ class Playout:
         """Whether the motion from p on is known until it rests, and can be played at a pace up to there."""
         timeline = self._timeline
         rest = rest_after(timeline, p, self._complete)
-        if rest == math.inf or (rest, timeline.version) == self._refused:
+        if rest in (math.inf, self._refused):
             return False
         low, high = max(timeline.index_at(p), 0), timeline.index_at(rest)
         segments = [timeline.segment(i) for i in range(low, high)]
@@ -352,7 +354,7 @@ class Playout:
         jerk = self._smooth_on(p, rest)
         allowed = violation(plan, _at_pace(self._limits, pace), jerk=jerk) is None
         if not allowed:
-            self._refused = rest, timeline.version
+            self._refused = rest
         return allowed
 
 
