@@ -6,11 +6,11 @@ import heapq
 import math
 from collections.abc import Callable
 from itertools import count
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link import Link, LinkConditions
+from interfaces.link import Direction, Link, LinkConditions
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import Reference, RobotSite
@@ -100,21 +100,18 @@ class Laboratory:
         """Let time pass until `until` [s]."""
         while True:
             at_robot = self.robot.next_deadline()
-            times = [self.operator.next_deadline(), at_robot]
-            arrival = self.link.next_deadline()
-            times += [arrival] if arrival is not None else []
-            times += [self._agenda[0][0]] if self._agenda else []
-            now = max(min(times), self.now)
+            there, back = _time(self.link.forward), _time(self.link.backward)
+            planned = self._agenda[0][0] if self._agenda else math.inf
+            now = max(min(self.operator.next_deadline(), at_robot, there, back, planned), self.now)
             if now > until:
                 break
-            on_agenda = bool(self._agenda) and self._agenda[0][0] <= now
-            self._pass(now, at_once=self._body is not None and (at_robot <= now or on_agenda))
-            for delivery in self.link.forward.receive(now):
+            self._pass(now, at_once=self._body is not None and (at_robot <= now or planned <= now))
+            for delivery in self.link.forward.receive(now) if there <= now else ():
                 for entry in delivery.payload.entries:
                     self.arrivals.setdefault((delivery.payload.epoch, entry.number), now)
                 self.robot.receive(delivery.payload, now=now)
-            for back in self.link.backward.receive(now):
-                self.operator.receive(back.payload, now=now)
+            for answer in self.link.backward.receive(now) if back <= now else ():
+                self.operator.receive(answer.payload, now=now)
             while self._agenda and self._agenda[0][0] <= now:
                 heapq.heappop(self._agenda)[2](now)
             for orders in self.operator.advance(now=now):
@@ -194,3 +191,9 @@ class Laboratory:
     def measured(self) -> Array:
         """Measured joints [rad], (k, n)."""
         return self.reference.q if self._body is None else np.concatenate(self._measured)
+
+
+def _time(way: Direction[Any]) -> float:
+    """When something happens on one direction of the link [s]; infinity for never."""
+    t = way.next_deadline()
+    return math.inf if t is None else t

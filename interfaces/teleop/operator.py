@@ -168,6 +168,8 @@ class OperatorSite:
         self._unsent = False
         self._due = now
         self._round_trips = SlidingQuantiles(1000, 120.0)
+        self._patience = 2.0 * self.config.beat + 1.0
+        """After how long without an answer an entry counts as lost [s]."""
         self._compared: tuple[int, ...] = ()
         """Versions of the plans, and entries under way, that were found to lead the same way."""
 
@@ -220,7 +222,7 @@ class OperatorSite:
         self._recent.extend(self._new)
         self._new = []
         # In the order of their sending: what seems to be lost stands in front.
-        patience, under_way = self._patience(), self._under_way
+        patience, under_way = self._patience, self._under_way
         lost: list[int] = []
         for number, (_, sent) in under_way.items():
             if now - sent <= patience or len(lost) == self.config.resent:
@@ -236,11 +238,6 @@ class OperatorSite:
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
         return self._clock.now() if self._unsent else self._due
-
-    def _patience(self) -> float:
-        """After how long without an answer an entry counts as lost [s]."""
-        usual = self._round_trips.quantile(0.95)
-        return 2.0 * self.config.beat + (1.0 if usual is None else 1.2 * usual)
 
     def receive(self, report: Report, *, now: float) -> None:
         """Take in a report of the robot."""
@@ -260,6 +257,9 @@ class OperatorSite:
         if report.echo is not None:
             _, sent, arrived = report.echo
             self._round_trips.add(now - sent - (report.sent_at - arrived), now=now)
+            usual = self._round_trips.quantile(0.95)
+            assert usual is not None
+            self._patience = 2.0 * self.config.beat + 1.2 * usual
         new = bool(report.halted) and not self.halted
         if new:
             self.halted = report.halted

@@ -39,6 +39,8 @@ SEGMENTS_MOST = 2000
 """Most segments of a plan in one report."""
 _SETTLE = 0.05
 """How long the arm is held at least where it was measured [s]."""
+_AIM = 5
+"""Messages after which the aim of play is worked out again."""
 _REPEAT = 4
 """Reports that a receipt is told in."""
 _AGAIN = 10
@@ -165,6 +167,7 @@ class RobotSite:
         self._offset = AdaptiveOffset(self.config.offset)
         self._log = _Log(-math.inf)
         self._newest: tuple[int, float, float] | None = None
+        self._messages = 0
         self._receipts: deque[tuple[int, int, Receipt]] = deque(maxlen=WAITING_MOST)
         self._reports = 0
         self._due = now
@@ -200,9 +203,11 @@ class RobotSite:
             self._carry_out(entry, now)
         self._log.claim(orders.newest, orders.complete_until)
         if isinstance(self._play, Playout):
-            D = self._offset.D
-            assert D is not None
-            self._play.aim(D - self._play.reserve, now=now)
+            if self._messages % _AIM == 0:
+                D = self._offset.D
+                assert D is not None
+                self._play.aim(D - self._play.reserve, now=now)
+            self._messages += 1
             self._play.hear(self._log.complete_until, self.engine.timeline, now=now)
 
     def _counts(self, orders: Orders, now: float) -> bool:
@@ -236,7 +241,7 @@ class RobotSite:
         else:
             self.engine = Engine(self._model, q=stood.initial, clock=self._clock)
         self.epoch, self.halted, self.parted = orders.epoch, "", False
-        self._log, self._newest = _Log(began), None
+        self._log, self._newest, self._messages = _Log(began), None, 0
         self._offset = AdaptiveOffset(self.config.offset)
         self._receipts.clear()
         timeline, limits = self.engine.timeline, self.engine.limits
@@ -280,11 +285,9 @@ class RobotSite:
 
     def next_deadline(self) -> float:
         """When there's something to do, by the robot's clock [s]."""
-        times = [self._due]
-        for part in (self._play, self._watchdog):
-            due = None if part is None or isinstance(part, _Fixed) else part.next_deadline()
-            times += [] if due is None else [due]
-        return min(times)
+        play = None if isinstance(self._play, _Fixed) else self._play.next_deadline()
+        watch = None if self._watchdog is None else self._watchdog.next_deadline()
+        return min(self._due, math.inf if play is None else play, math.inf if watch is None else watch)
 
     def play_at(self, t: Array) -> PlayState:
         """Where play is at ascending times up to the next deadline, by the robot's clock [s], (k,)."""
