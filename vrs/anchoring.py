@@ -23,8 +23,6 @@ from vrs.timeline import Timeline
 
 _SPANS = tuple(np.geomspace(0.1, 20.0, 24).tolist())
 """Durations of a correction to try [s]."""
-
-
 _ROUNDING = 1e-10
 """Difference of positions [rad], rates and accelerations that counts as none."""
 
@@ -88,7 +86,7 @@ def anchored(timeline: Timeline, truth: Timeline, t: float, limits: Limits) -> A
         return Anchored(timeline.edited(t, remainder(truth, t, 1.0)), t, t, error)
     for span in _SPANS:
         pieces = list(_superposed(truth, t, span, _vanishing(error, *rates, span)))
-        if violation(as_plan(iter(pieces), timeline.dof), limits, jerk=False) is None:
+        if violation(as_plan(pieces, timeline.dof), limits, jerk=False) is None:
             after = timeline.edited(t, [*pieces, *remainder(truth, t + span, 1.0)])
             return Anchored(after, t, t + span, error)
     pieces, end = _by_a_rest(truth, t, now, limits)

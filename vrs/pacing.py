@@ -7,7 +7,7 @@ that velocities and accelerations stay as continuous as they were.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import comb
@@ -157,7 +157,7 @@ def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bo
         low, high = -1, len(_RAMPS)
         while high - low > 1:
             middle = (low + high) // 2
-            if keeps(timeline, change(s, wait, goal, float(_RAMPS[middle])), limits, jerk=jerk):
+            if _keeps(timeline, change(s, wait, goal, float(_RAMPS[middle])), limits, jerk=jerk):
                 high = middle
             else:
                 low = middle
@@ -213,7 +213,7 @@ def certified(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> st
     return violation(as_plan(composed(timeline, law), timeline.dof), limits, jerk=jerk)
 
 
-def as_plan(pieces: Iterator[Piece], n: int) -> Plan:
+def as_plan(pieces: Iterable[Piece], n: int) -> Plan:
     """Pieces as one plan."""
     parts = list(pieces)
     durations = [h for part in parts for h in part.durations]
@@ -262,7 +262,7 @@ def _lowest_rate(timeline: Timeline, s: Array, pace: Array, limits: Limits) -> f
     return min(float(lowest.max()), 0.0)
 
 
-def keeps(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
+def _keeps(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
     """Whether samples of the motion along a law keep the limits."""
     s, *derivatives = law(np.linspace(0.0, law.duration, _LOOKS))
     p, r, third = (value[:, None] for value in derivatives)

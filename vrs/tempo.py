@@ -23,9 +23,6 @@ from vrs.timeline import Timeline
 _ROOM = 1e-3
 """Least room [s] to be filled before what follows a stop."""
 
-_PATIENCE = 2.0
-"""Stopping on the way may take this many times as long as each joint's braking, and 50 ms more."""
-
 
 def scale(plan: Scheduler, command: ScaleTime, now: float | None) -> Receipt:
     """Let what is scheduled run at another pace.
@@ -82,8 +79,9 @@ def stop(plan: Scheduler, command: Stop, now: float | None) -> Receipt:
             way = list(composed(timeline, halting(timeline, t, plan.limits, jerk=jerky)))
         smooth = not jerky or all(plan.smooth(i) for i in {part.command_id for part in way})
         # A plan made under other limits may have no way to stop on that keeps these.
-        keeps = violation(as_plan(iter(way), timeline.dof), plan.limits, jerk=jerky) is None
-        if smooth and keeps and sum(sum(part.durations) for part in way) <= _PATIENCE * braking.duration + 0.05:
+        keeps = violation(as_plan(way, timeline.dof), plan.limits, jerk=jerky) is None
+        on_way = sum(sum(part.durations) for part in way)
+        if smooth and keeps and stopping.is_prompt(on_way, braking.duration):
             reason = "stopped on its way"
             pieces = [part._replace(command_id=number) for part in way]
         else:
@@ -193,8 +191,8 @@ def _check_faster(plan: Scheduler, t: float, factor: float) -> None:
     def problem(pace: float) -> str | None:
         pieces = list(remainder(timeline, t, pace))
         smooth = [part for part in pieces if plan.profile(part.command_id) is Profile.JERK_LIMITED]
-        found = violation(as_plan(iter(pieces), timeline.dof), plan.limits, jerk=False)
-        return found or violation(as_plan(iter(smooth), timeline.dof), plan.limits, jerk=True)
+        found = violation(as_plan(pieces, timeline.dof), plan.limits, jerk=False)
+        return found or violation(as_plan(smooth, timeline.dof), plan.limits, jerk=True)
 
     found = problem(factor)
     if found is None:

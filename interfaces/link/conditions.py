@@ -6,8 +6,9 @@ import enum
 import math
 from dataclasses import dataclass, field
 
-from interfaces.link.delay import MAX_DELAY, ConstantDelay, DelayProfile, number_in
+from interfaces.link.delay import MAX_DELAY, ConstantDelay, DelayProfile
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel
+from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
 MAX_COUNT = 10_000_000

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from interfaces.link.delay import MAX_DELAY, number_in
+from interfaces.link.delay import MAX_DELAY
+from vrs.checks import number_in
 
 LONGEST = MAX_DELAY
 """Longest correlation time [s]."""

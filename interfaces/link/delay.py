@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from vrs.checks import number_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
@@ -35,19 +36,6 @@ class DelayProfile(Protocol):
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of arriving packets does not exceed [s]."""
-
-
-def number_in(name: str, value: object, low: float, high: float, unit: str = "") -> float:
-    """Return value as a float in [low, high].
-
-    Raises:
-        InvalidValueError: If it is anything else.
-    """
-    allowed = f"{unit or 'a number'} in [{low:g}, {high:g}]"
-    number = finite(name, value, allowed)
-    if not low <= number <= high:
-        raise InvalidValueError(name, value, allowed)
-    return number
 
 
 def share_of(share: float) -> float:

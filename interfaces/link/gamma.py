@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from interfaces.link.congestion import Congestion, correlation_time
-from interfaces.link.delay import CORRELATION_TIME, MAX_DELAY, DelaySource, number_in, share_of
+from interfaces.link.delay import CORRELATION_TIME, MAX_DELAY, DelaySource, share_of
+from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
 

@@ -7,7 +7,7 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link.delay import number_in
+from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
 

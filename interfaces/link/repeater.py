@@ -9,7 +9,8 @@ from typing import Generic, TypeVar
 
 from interfaces.link.channel import moment
 from interfaces.link.conditions import Service, whole
-from interfaces.link.delay import MAX_DELAY, number_in
+from interfaces.link.delay import MAX_DELAY
+from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
 T = TypeVar("T")

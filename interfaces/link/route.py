@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from interfaces.link.congestion import correlation_time
-from interfaces.link.delay import CORRELATION_TIME, MAX_DELAY, DelaySource, number_in, share_of
+from interfaces.link.delay import CORRELATION_TIME, MAX_DELAY, DelaySource, share_of
+from vrs.checks import number_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 

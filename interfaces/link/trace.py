@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from interfaces.link.delay import MAX_DELAY, DelaySource, number_in, share_of
+from interfaces.link.delay import MAX_DELAY, DelaySource, share_of
+from vrs.checks import number_in
 from vrs.errors import FormatError, InvalidValueError
 
 COLUMN = "delay_s"

@@ -14,7 +14,7 @@ from interfaces.link import Direction, Link, LinkConditions
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import Reference, RobotSite
-from robots.onboard.playout import PlayState
+from robots.onboard.play import PlayState
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -145,13 +145,10 @@ class Laboratory:
 
     def _next_cue(self, play: PlayState) -> int | None:
         """The first of the ticks at which the next cue has passed; None if there's none."""
-        waits_for_first_message = self.robot.epoch == 0 and self.robot.config.fixed_offset is None
-        if not self._cues or waits_for_first_message:
+        if not self._cues:
             return None
-        # An adaptive play time is set back when the first message comes.
-        p = np.minimum.accumulate(play.p[::-1])[::-1]
-        index = int(np.searchsorted(p, self._cues[0][0] + _SAME, side="right"))
-        return index if index < len(p) else None
+        index = int(np.searchsorted(play.p, self._cues[0][0] + _SAME, side="right"))
+        return index if index < len(play.p) else None
 
     def _follow(self, t: Array, play: PlayState) -> None:
         """Write down the next ticks, at times (m,) [s]; a body follows its references."""

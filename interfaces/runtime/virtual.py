@@ -164,10 +164,7 @@ class _Session:
 
     def _play(self) -> Array:
         """Play time in each row of the record, the first moment included [s]."""
-        p = np.concatenate([self._robot.play_at(np.zeros(1)).p, self._lab.play[:, 1]])
-        # An adaptive play time is set back when the first message comes.
-        ascending: Array = np.minimum.accumulate(p[::-1])[::-1]
-        return ascending
+        return np.concatenate([self._robot.play_at(np.zeros(1)).p, self._lab.play[:, 1]])
 
     def _register(self, item: PlannedMotion, now: float) -> None:
         receipt = self._operator.execute(item.command, now=now)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from interfaces.link.quantiles import SlidingQuantiles
-from vrs.commands import finite
-from vrs.errors import InvalidValueError
+from interfaces.link.delay import share_of
+from interfaces.link.round_trip import RelativeDelays, WindowConfig
+from vrs.checks import number_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +23,9 @@ class OffsetConfig:
     """Age at which a message counts no more [s], in [1, 86400]."""
 
     def __post_init__(self) -> None:
-        ranges = {"share": (0.0, 1.0), "margin": (0.0, 60.0), "window": (10, 100_000), "horizon": (1.0, 86_400.0)}
-        for name, (low, high) in ranges.items():
-            allowed = f"a number in [{low:g}, {high:g}]"
-            value = finite(name, getattr(self, name), allowed)
-            if not low <= value <= high or (name == "share" and value in (0.0, 1.0)):
-                raise InvalidValueError(name, value, allowed)
+        share_of(self.share)
+        for name, low, high in (("margin", 0.0, 60.0), ("window", 10, 100_000), ("horizon", 1.0, 86_400.0)):
+            number_in(name, getattr(self, name), low, high)
 
 
 class AdaptiveOffset:
@@ -40,7 +37,7 @@ class AdaptiveOffset:
 
     def __init__(self, config: OffsetConfig | None = None) -> None:
         self._config = OffsetConfig() if config is None else config
-        self._ages = SlidingQuantiles(self._config.window, self._config.horizon)
+        self._ages = RelativeDelays(WindowConfig(self._config.window, self._config.horizon))
 
     def heard(self, complete_until: float, *, now: float) -> None:
         """A message came.
@@ -49,7 +46,7 @@ class AdaptiveOffset:
             complete_until: Up to where the timeline was known to be complete before it [s].
             now: By the robot's clock [s].
         """
-        self._ages.add(now - complete_until, now=now)
+        self._ages.receive(complete_until, now=now)
 
     @property
     def D(self) -> float | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from vrs.checks import number_in
 from vrs.clock import ManualClock
 from vrs.commands import (
     Cancel,
@@ -27,10 +28,9 @@ from vrs.commands import (
     ScaleTime,
     SteerCommand,
     Stop,
-    finite,
 )
 from vrs.engine import Engine
-from vrs.errors import InvalidValueError, PlanningError, VrsError
+from vrs.errors import PlanningError, VrsError
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
@@ -54,9 +54,7 @@ class OperatorSiteConfig:
 
     def __post_init__(self) -> None:
         for name, low, high in (("beat", 1e-3, 10.0), ("repeat", 0, 64), ("resent", 1, 1000)):
-            allowed = f"a number in [{low:g}, {high:g}]"
-            if not low <= finite(name, getattr(self, name), allowed) <= high:
-                raise InvalidValueError(name, getattr(self, name), allowed)
+            number_in(name, getattr(self, name), low, high)
 
 
 class Correction(NamedTuple):
@@ -165,7 +163,6 @@ class OperatorSite:
         self._recent: deque[int] = deque(maxlen=self.config.repeat)
         self._ids: dict[int, int] = {}
         self._packets = 0
-        self._unsent = False
         self._due = now
         self._round_trips = SlidingQuantiles(1000, 120.0)
         self._patience = 2.0 * self.config.beat + 1.0
@@ -198,25 +195,20 @@ class OperatorSite:
         return ""
 
     def _told(self, command: Command | None, answer: Receipt | None, newest: int) -> None:
-        """Send on what the engine carried out."""
-        if command is not None and answer is not None:
-            command = _resolved(command, answer, self._clock.now())
-        self._log(command, newest)
-        if command is not None and answer is not None:
-            self._ids[self._entries] = answer.command_id
-
-    def _log(self, command: Command | None, newest: int) -> None:
-        self._entries += 1
+        """Write what the engine carried out into the log, to be sent."""
         now = self._clock.now()
+        self._entries += 1
+        if command is not None and answer is not None:
+            command = _resolved(command, answer, now)
+            self._ids[self._entries] = answer.command_id
         self._under_way[self._entries] = Entry(self._entries, now, command, newest), now
         self._new.append(self._entries)
-        self._unsent = True
 
     def advance(self, *, now: float) -> tuple[Orders, ...]:
         """Do what is due by now [s], and say what is to be sent."""
-        if now < self._due and not self._unsent:
+        if now < self._due and not self._new:
             return ()
-        self._due, self._unsent = now + self.config.beat, False
+        self._due = now + self.config.beat
         self._packets += 1
         chosen = self._new + [n for n in self._recent if n in self._under_way]
         self._recent.extend(self._new)
@@ -237,7 +229,7 @@ class OperatorSite:
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
-        return self._clock.now() if self._unsent else self._due
+        return self._clock.now() if self._new else self._due
 
     def receive(self, report: Report, *, now: float) -> None:
         """Take in a report of the robot."""
@@ -308,7 +300,7 @@ class OperatorSite:
             left = self.engine.timeline.end - now
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"
         self.epoch, self._began, self.halted = self.epoch + 1, now, ""
-        self._entries, self._acknowledged, self._unsent = 0, 0, True
+        self._entries, self._acknowledged, self._due = 0, 0, now
         self._new = []
         self._recent.clear()
         self._under_way.clear()
@@ -319,8 +311,10 @@ class OperatorSite:
 def _differs(mine: Timeline, other: Timeline, t: float) -> bool:
     """Whether two timelines lead the arm differently from t on."""
     ends = [mine.end, other.end, t + 1.0]
-    knots = [s.start for timeline in (mine, other) for s in timeline.segments[max(timeline.index_at(t), 0) :]]
-    moments = np.unique([t, *(k for k in knots if k > t), *(e for e in ends if e >= t)])
+    knots = [
+        timeline.start_of(i) for timeline in (mine, other) for i in range(timeline.index_at(t) + 1, len(timeline))
+    ]
+    moments = np.unique([t, *knots, *(e for e in ends if e >= t)])
     middle = 0.5 * (moments[1:] + moments[:-1])
     moments = np.concatenate([moments, middle])
     return bool(np.abs(mine.sample(moments) - other.sample(moments)).max() > _SAME)

@@ -19,15 +19,17 @@ import numpy as np
 from interfaces.site import engine_time
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
-from robots.onboard.playout import Playout, PlayoutConfig, PlayState
+from robots.onboard.play import PlayState, play_of
+from robots.onboard.playout import Playout, PlayoutConfig
 from robots.onboard.stamps import Stamp
 from robots.onboard.stops import from_commanded
 from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState
+from vrs.checks import number_in
 from vrs.chunk import HOLD, State
 from vrs.clock import ManualClock
 from vrs.commands import Profile, finite
 from vrs.engine import Engine
-from vrs.errors import InvalidValueError, VrsError
+from vrs.errors import VrsError
 from vrs.insertion import hold, piece
 from vrs.model import Array, RobotModel
 from vrs.planning.stopping import stop
@@ -74,9 +76,7 @@ class RobotSiteConfig:
         if self.fixed_offset is not None:
             finite("fixed_offset", self.fixed_offset, "None or finite seconds")
         for name, low, high in (("beat", 1e-3, 10.0), ("tolerance", 1e-6, 10.0)):
-            allowed = f"a number in [{low:g}, {high:g}]"
-            if not low <= finite(name, getattr(self, name), allowed) <= high:
-                raise InvalidValueError(name, getattr(self, name), allowed)
+            number_in(name, getattr(self, name), low, high)
 
 
 class Reference(NamedTuple):
@@ -244,9 +244,11 @@ class RobotSite:
         self._log, self._newest, self._messages = _Log(began), None, 0
         self._offset = AdaptiveOffset(self.config.offset)
         self._receipts.clear()
-        timeline, limits = self.engine.timeline, self.engine.limits
-        adaptive = Playout(timeline, limits, now=now, p=began, config=self.config.playout)
-        self._play = adaptive if fixed is None else _Fixed(fixed)
+        self._play = (
+            Playout(self.engine.timeline, self.engine.limits, now=now, p=began, config=self.config.playout)
+            if fixed is None
+            else _Fixed(fixed)
+        )
         self._plays.append((now, self._play))
 
     def _carry_out(self, entry: Entry, now: float) -> None:
@@ -293,14 +295,7 @@ class RobotSite:
         """Where play is at ascending times up to the next deadline, by the robot's clock [s], (k,)."""
         if not len(t) or t[0] >= self._plays[-1][0]:
             return self._play.at(t)
-        bounds = np.searchsorted(t, [since for since, _ in self._plays])
-        bounds[0] = 0
-        parts = [
-            play.at(t[low:high])
-            for (_, play), low, high in zip(self._plays, bounds, [*bounds[1:], len(t)], strict=True)
-            if high > low
-        ]
-        return PlayState(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+        return play_of(((since, play.at) for since, play in reversed(self._plays)), t)
 
     def reference(self, play: PlayState) -> Reference:
         """What the body follows where play is, (k, n) each."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vrs.checks import number_in
 from vrs.commands import finite, finite_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -47,11 +48,7 @@ class Reality:
             raise InvalidValueError("encoder_counts", counts, "None or an integer in [1, 10000000]")
 
     def _range(self, name: str, low: float, high: float) -> None:
-        allowed = f"a number in [{low:g}, {high:g}]"
-        value = finite(name, getattr(self, name), allowed)
-        if not low <= value <= high:
-            raise InvalidValueError(name, value, allowed)
-        object.__setattr__(self, name, value)
+        object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
 
     @property
     def friction_scale(self) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from robots.onboard.stamps import LARGEST, whole
+from vrs.checks import number_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
@@ -95,11 +96,7 @@ class LeaseConfig:
     """It expires so long after its last heartbeat or command [s], 0.1 to 60."""
 
     def __post_init__(self) -> None:
-        allowed = "a number in [0.1, 60] s"
-        value = finite("timeout", self.timeout, allowed)
-        if not 0.1 <= value <= 60:
-            raise InvalidValueError("timeout", value, allowed)
-        object.__setattr__(self, "timeout", value)
+        object.__setattr__(self, "timeout", number_in("timeout", self.timeout, 0.1, 60.0, unit=" s"))
 
 
 class Lease:

@@ -16,12 +16,13 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from vrs.commands import finite
-from vrs.errors import InvalidValueError
+from robots.onboard.play import PlayState, play_of
+from vrs.checks import number_in
 from vrs.model import Array, Limits
 from vrs.pacing import Law, certified, change, rest_after
 from vrs.planning import violation
@@ -61,22 +62,7 @@ class PlayoutConfig:
 
     def __post_init__(self) -> None:
         for item, high in zip(fields(self), (0.2, 1.0, 10.0), strict=True):
-            allowed = f"a number in [0, {high:g}]"
-            value = finite(item.name, getattr(self, item.name), allowed)
-            if not 0 <= value <= high:
-                raise InvalidValueError(item.name, value, allowed)
-            object.__setattr__(self, item.name, value)
-
-
-class PlayState(NamedTuple):
-    """Where play is, at times (k,)."""
-
-    p: Array
-    """Play time, on the timeline [s]."""
-    pace: Array
-    """dp/dt."""
-    rate: Array
-    """d²p/dt² [1/s]."""
+            object.__setattr__(self, item.name, number_in(item.name, getattr(self, item.name), 0.0, high))
 
 
 class Stretch(NamedTuple):
@@ -202,20 +188,7 @@ class Playout:
         t = np.asarray(t, float)
         if not len(t) or t[0] >= self._leg.begin:
             return _along(self._leg, t)
-        legs = []
-        for leg in reversed(self._legs):
-            legs.append(leg)
-            if leg.begin <= t[0]:
-                break
-        legs.reverse()
-        bounds = np.searchsorted(t, [leg.begin for leg in legs])
-        bounds[0] = 0
-        parts = [
-            _along(leg, t[low:high])
-            for leg, low, high in zip(legs, bounds, [*bounds[1:], len(t)], strict=True)
-            if high > low
-        ]
-        return PlayState(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+        return play_of(((leg.begin, partial(_along, leg)) for leg in reversed(self._legs)), t)
 
     def _decide(self, t: float) -> None:
         """Choose how to go on from where play is at a time; no law is under way then."""

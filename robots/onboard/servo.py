@@ -13,8 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import TypeAlias
 
-from vrs.commands import finite
-from vrs.errors import InvalidValueError
+from vrs.checks import number_in
 from vrs.model import Array
 
 FeedForward: TypeAlias = Callable[[Array, Array, Array], Array]
@@ -38,11 +37,7 @@ class ServoGains:
         ranges = {"bandwidth_hz": (0.1, 30.0), "damping": (0.1, 3.0), "derivative_hz": (1.0, 500.0)}
         for item in fields(self):
             low, high = ranges.get(item.name, (0.0, 1.0))
-            allowed = f"a number in [{low:g}, {high:g}]"
-            value = finite(item.name, getattr(self, item.name), allowed)
-            if not low <= value <= high:
-                raise InvalidValueError(item.name, value, allowed)
-            object.__setattr__(self, item.name, value)
+            object.__setattr__(self, item.name, number_in(item.name, getattr(self, item.name), low, high))
 
 
 class Servo:

@@ -17,9 +17,6 @@ from vrs.planning.plan import Plan, end_state
 from vrs.segment import PolynomialSegment
 from vrs.timeline import Timeline
 
-_PATIENCE = 2.0
-"""Stopping on the way may take this many times as long as each joint's braking, and 50 ms more."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StopMotion:
@@ -62,7 +59,7 @@ def from_commanded(
     on_path = False
     if keep_path:
         law = halting(timeline, t, limits, jerk=profile is Profile.JERK_LIMITED)
-        if law.duration <= _PATIENCE * braking.duration + 0.05:
+        if stopping.is_prompt(law.duration, braking.duration):
             pieces, on_path = list(composed(timeline, law)), True
     after = timeline.edited(t, pieces)
     return _stop(after, t, after.end, limits, on_path=on_path)

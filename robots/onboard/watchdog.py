@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from robots.onboard.stamps import LARGEST, Kind, SequenceWindow, Stamp, Verdict, whole
+from vrs.checks import number_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
@@ -122,11 +123,7 @@ class WatchdogConfig:
 
     def __post_init__(self) -> None:
         for name, low, high in (("timeout", 0.1, 2.0), ("max_age", 0.01, 2.0), ("max_uncertainty", 0.0, 1.0)):
-            allowed = f"a number in [{low:g}, {high:g}] s"
-            value = finite(name, getattr(self, name), allowed)
-            if not low <= value <= high:
-                raise InvalidValueError(name, value, allowed)
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high, unit=" s"))
         for name, words in (("policy", LossPolicy), ("future", AcceptedFuture)):
             try:
                 object.__setattr__(self, name, words(getattr(self, name)))

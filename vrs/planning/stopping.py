@@ -15,6 +15,15 @@ BRAKED = "braked with parabolas: no jerk-limited stop from this state keeps the 
 
 _PARALLEL = 1e-9
 """Share of an acceleration that may point aside from the motion on a straight line: rounding."""
+_PATIENCE = 2.0
+"""Stopping on the way may take this many times as long as each joint's braking, and `_GRACE` more."""
+_GRACE = 0.05
+"""[s]."""
+
+
+def is_prompt(on_way: float, braking: float) -> bool:
+    """Whether a stop that keeps to the way takes little enough longer [s] than braking each joint [s]."""
+    return on_way <= _PATIENCE * braking + _GRACE
 
 
 def stop(state: State, profile: Profile, limits: Limits) -> tuple[Plan, str]:

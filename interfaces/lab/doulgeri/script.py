@@ -12,7 +12,7 @@ from interfaces.runtime.laboratory import Laboratory
 from interfaces.site import Part, Site, drive
 from interfaces.teleop import Reference
 from robots import puma560
-from robots.onboard.playout import PlayState
+from robots.onboard.play import PlayState
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
 from vrs.commands import Command
 from vrs.model import Array
@@ -109,15 +109,6 @@ class Joined:
 
 
 def played(lab: Laboratory) -> tuple[PlayState, Reference]:
-    """Where the robot's play was at each tick of a run without a body, and what the body was asked to do, (k, ...).
-
-    Before the first message the robot rests where its play begins; whatever time its play shows then isn't the
-    operator's.
-    """
-    _, p, pace, rate = lab.play.T.copy()
-    back = np.flatnonzero(np.diff(p) < 0)
-    if len(back):
-        begun = int(back[-1]) + 1
-        p[:begun], pace[:begun], rate[:begun] = p[begun], 0.0, 0.0
-    play = PlayState(p, pace, rate)
-    return play, lab.robot.reference(play)
+    """Where the robot's play was at each tick of a run, and what a body was asked to do, (k, ...)."""
+    _, p, pace, rate = lab.play.T
+    return PlayState(p, pace, rate), lab.reference

@@ -12,13 +12,13 @@ import numpy as np
 
 from interfaces.link.channel import Channel
 from interfaces.link.conditions import LinkConditions, Service, whole
-from interfaces.link.delay import number_in
 from interfaces.link.packets import Totals
 from interfaces.link.path import Path
 from interfaces.link.proxy.address import Address
 from interfaces.link.proxy.tcp import TcpProxy, Way
 from interfaces.link.proxy.timer import Lateness
 from interfaces.link.proxy.udp import Parcel, UdpProxy
+from vrs.checks import number_in
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError
 

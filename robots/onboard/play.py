@@ -1,0 +1,44 @@
+"""Where a robot's play time is, and was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from vrs.model import Array
+
+
+class PlayState(NamedTuple):
+    """Where play is, at times (k,)."""
+
+    p: Array
+    """Play time, on the timeline [s]."""
+    pace: Array
+    """dp/dt."""
+    rate: Array
+    """d²p/dt² [1/s]."""
+
+
+def play_of(newest_first: Iterable[tuple[float, Callable[[Array], PlayState]]], t: Array) -> PlayState:
+    """Where play is at ascending times [s], (k,), k ≥ 1.
+
+    Args:
+        newest_first: Since when each course counts [s], and what says where play is on it; the oldest counts before
+            that, too. No more are taken than are needed.
+        t: The times.
+    """
+    states: list[PlayState] = []
+    high = len(t)
+    for since, at in newest_first:
+        low = min(int(np.searchsorted(t, since)), high)
+        if high > low:
+            states.append(at(t[low:high]))
+        high = low
+        if high == 0:
+            break
+    if high > 0:
+        states.append(at(t[:high]))
+    states.reverse()
+    return PlayState(*(np.concatenate([state[i] for state in states]) for i in range(3)))
