@@ -155,7 +155,9 @@ def move_before(timeline: Timeline, t: float, earliest: float) -> tuple[Plan, fl
     while low > 0 and timeline.owner_of(low - 1) == owner and last - low < _ROUNDED_MOST:
         low -= 1
     segments = [timeline.segment(i) for i in range(low, index) if timeline.start_of(i) >= earliest]
-    if not segments or timeline.state_before(t).qd.any():
+    state = timeline.state_before(t)
+    # A smooth move that was cut a moment after its start has no speed yet, but an acceleration.
+    if not segments or state.qd.any() or state.qdd.any():
         return None
     plan = stacked([s.duration for s in segments], [s.coefficients for s in segments], timeline.dof)
     return plan, segments[0].start, owner

@@ -460,3 +460,22 @@ class TestForms:
         with pytest.raises(InvalidValueError, match="shape"):
             engine.execute(InsertVia(1, JointTarget([0.0] * 5)))
         assert engine.timeline is before
+
+
+def test_a_move_cut_a_moment_after_its_start_is_not_rounded():
+    smooth = Profile.JERK_LIMITED
+    engine = Engine(MODEL, q=A)
+    engine.execute(to(B, 0.5, profile=smooth))
+    cut = 0.5 + 1e-9
+    later = engine.execute(to(C, cut, profile=smooth))
+    engine.cancel(later.command_id)
+    sliver = engine.timeline.state_before(engine.timeline.end)
+    assert not sliver.qd.any()
+    assert sliver.qdd.any()
+    answer = engine.execute(to(D, insertion=Insertion.APPEND, profile=smooth, deviation=0.05))
+    assert answer.status is not Status.REJECTED
+    assert "nothing to round" in answer.reason
+    mine = [s for s in engine.timeline.segments if s.command_id == answer.command_id]
+    for a, b in pairwise(mine):
+        jump = a.value(a.end, derivative=2) - b.value(b.start, derivative=2)
+        assert np.abs(jump).max() <= 1e-9
