@@ -11,9 +11,11 @@ from pathlib import Path
 from benchmarks import machine, page
 from benchmarks.running import run
 
-PARTS = ("sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "twins", "physics")
+PARTS = (
+    "sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "twins", "physics", "wire",
+)  # fmt: skip
 """Benchmarks that give results."""
-DETAILS = ("timeline", "planning", "lines", "steering")
+DETAILS = ("timeline", "planning", "lines", "steering", "viewers")
 """Benchmarks that print more about one thing."""
 
 

@@ -1,8 +1,9 @@
 """Everything that joins a person or a machine to a robot."""
 
+from interfaces.connecting import connect
 from interfaces.designer import Designer
 from interfaces.observer import Observer
 from interfaces.supervisor import Supervisor
 from interfaces.viewer import Viewer
 
-__all__ = ["Designer", "Observer", "Supervisor", "Viewer"]
+__all__ = ["Designer", "Observer", "Supervisor", "Viewer", "connect"]

@@ -10,8 +10,11 @@ from vrs.errors import InvalidValueError
 from vrs.timeline import Timeline
 from vrs.tree import Leaf
 
-PART = 256
-"""Segments of one message of a history."""
+PART = 64
+"""Segments of one message of a history: of six joints and a usual degree some 10 kB."""
+
+MOST_CHANGED = 128
+"""Segments of an edit that is sent as one; beyond that a history in parts is."""
 
 AHEAD = 4
 """Parts of a history that are sent for one request."""

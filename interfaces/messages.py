@@ -77,9 +77,13 @@ class Order:
     """Orders are carried out in the order of their numbers; a stop doesn't wait."""
     command: Command | None
     """None takes back the newest accepted command."""
+    epoch: int = 0
+    """Of the control lease, below 2⁶⁴; 0 where none is needed, as on an engine in this process."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
+        if isinstance(self.epoch, bool) or not isinstance(self.epoch, int) or not 0 <= self.epoch < 2**64:
+            raise InvalidValueError("epoch", self.epoch, "an integer from 0 to 2**64 - 1")
 
 
 @dataclass(frozen=True, slots=True)

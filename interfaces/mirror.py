@@ -13,7 +13,7 @@ from vrs.segment import PolynomialSegment
 from vrs.timeline import Timeline
 
 HELD = 64
-"""Edits that came before the one that they build on, at most."""
+"""Edits that came before the one that they build on, and parts of a history before those in front, at most."""
 
 Edited = tuple[Timeline, int | None]
 """A timeline, and the command that made it."""
@@ -27,6 +27,7 @@ class Mirror:
         self._resend = interval_of(resend)
         self._follow = Follow(port.number(), Form.SEGMENTS)
         self._fetching: list[PolynomialSegment] | None = None
+        self._early: dict[int, History] = {}
         self._held: dict[int, Change] = {}
         self._due = -math.inf
         self._behind = False
@@ -59,17 +60,25 @@ class Mirror:
         if known is not None and scene.edit <= (known.edit if self.timeline is None else self.edit):
             return
         self.scene, self._fetching = scene, []
+        self._early.clear()
         self._ask(now) if scene.segments else self._complete(now)
 
     def _add(self, part: History, now: float) -> None:
         scene, fetching = self.scene, self._fetching
-        if scene is None or fetching is None or (part.edit, part.index) != (scene.edit, len(fetching)):
+        if scene is None or fetching is None or part.edit != scene.edit or part.index < len(fetching):
             return
-        fetching.extend(part.segments)
+        self._early[part.index] = part
+        if len(self._early) > HELD:
+            del self._early[max(self._early)]
+        before = len(fetching)
+        while (following := self._early.pop(len(fetching), None)) is not None:
+            fetching.extend(following.segments)
+        if len(fetching) == before:
+            return
         self._due = now + self._resend
         if len(fetching) >= scene.segments:
             self._complete(now)
-        elif len(fetching) % (AHEAD * PART) == 0:
+        elif len(fetching) // (AHEAD * PART) > before // (AHEAD * PART):
             self._ask(now)
 
     def _complete(self, now: float) -> None:

@@ -6,11 +6,11 @@ Source: Doulgeri, Zikos, Delopoulos, section III.
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from interfaces.broadcast import DUE, MOST_VIEWERS, Broadcaster, Slot
-from interfaces.changes import parts
+from interfaces.changes import MOST_CHANGED, parts
 from interfaces.forecasts import Forecasts
 from interfaces.journal import Journal, portable
 from interfaces.messages import (
@@ -68,6 +68,7 @@ class Servlet:
         *,
         lead: float = 0.0,
         broadcasters: Sequence[Broadcaster] = (),
+        admit: Callable[[Order], str] | None = None,
     ) -> None:
         """Serve one client.
 
@@ -75,7 +76,9 @@ class Servlet:
             source: The engine, or its journal where others serve it too.
             lead: How far ahead of the engine's time answers to `Ask(None)` are [s].
             broadcasters: Where followers of frames find them.
+            admit: Says why an order isn't carried out when its turn comes; empty where it is.
         """
+        self._admit = admit
         self.journal = source if isinstance(source, Journal) else Journal(source)
         self.lead = lead
         self._broadcasters = tuple(broadcasters)
@@ -165,6 +168,10 @@ class Servlet:
             self._carry_out(self._early.pop(self._next - 1), now)
 
     def _carry_out(self, order: Order, now: float) -> None:
+        refusal = "" if self._admit is None else self._admit(order)
+        if refusal:
+            self._settle(Outcome(order.number, None, refusal, 0, now))
+            return
         try:
             receipt = self.journal.execute(order.command)
         except VrsError as error:
@@ -232,7 +239,7 @@ class Servlet:
         changes = [edit.change for edit in edits]
         if edits and edits[0].number != since + 1:
             return False
-        known = [change for change in changes if change is not None]
+        known = [change for change in changes if change is not None and len(change.segments) <= MOST_CHANGED]
         if len(known) < len(changes):
             return False
         self._outbox.extend(known)

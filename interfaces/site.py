@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from interfaces.broadcast import Broadcaster
 from interfaces.journal import Journal
+from interfaces.messages import Order
 from interfaces.servlet import Servlet
 from vrs.clock import ManualClock
 from vrs.commands import finite
@@ -63,9 +64,9 @@ class Site:
         self._broadcasters.append(Broadcaster(self.journal, rate=rate, lead=lead))
         return self._broadcasters[-1]
 
-    def servlet(self, *, lead: float = 0.0) -> Servlet:
+    def servlet(self, *, lead: float = 0.0, admit: Callable[[Order], str] | None = None) -> Servlet:
         """Make the server submodule of one more client, which finds the broadcasters that are there now."""
-        return Servlet(self.journal, lead=lead, broadcasters=self._broadcasters)
+        return Servlet(self.journal, lead=lead, broadcasters=self._broadcasters, admit=admit)
 
     def time(self, now: float) -> float:
         """The engine's time [s] when the users' clock shows now [s]; moves a manual clock on to it.

@@ -57,9 +57,26 @@ class WallClock:
     def __init__(self, now: float = 0.0) -> None:
         self._origin = time.monotonic() - finite("now", now, "finite seconds")
 
+    @classmethod
+    def since(cls, origin: float) -> WallClock:
+        """Make the very clock of another process of this machine, given its origin."""
+        clock = cls()
+        clock._origin = finite("origin", origin, "finite seconds")
+        return clock
+
+    @property
+    def origin(self) -> float:
+        """The machine's monotonic counter [s] when this clock shows 0; it counts alike in all processes."""
+        return self._origin
+
     def now(self) -> float:
         """Present time [s]."""
         return time.monotonic() - self._origin
+
+
+def seconds_since_1970() -> float:
+    """The machine's calendar time [s], which may step: for names and files, never for motion."""
+    return time.time()
 
 
 class OffsetClock:

@@ -71,6 +71,8 @@ def finite(name: str, value: object, allowed: str = "a finite number") -> float:
     Raises:
         InvalidValueError: If value is not a real number, or NaN or infinite.
     """
+    if type(value) is float and math.isfinite(value):
+        return value
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidValueError(name, value, allowed)
     try:

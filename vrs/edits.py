@@ -26,7 +26,7 @@ from vrs.ledger import Entry
 from vrs.model import Array, Limits, frozen_array
 from vrs.planning import Plan, rounding
 from vrs.receipt import Receipt, Status
-from vrs.rescheduling import moved, removed, room, span
+from vrs.rescheduling import braked, moved, removed, room, span
 from vrs.scheduler import REFUSALS, Moment, Scheduler
 
 
@@ -103,11 +103,11 @@ def _retime(plan: Scheduler, command: Retime, receipt: Receipt, now: float | Non
     moment = plan.moment(command, now, command.execute_at)
     t = moment.t
     start, _ = _scheduled(receipt, -np.inf if now is None else now)
-    if now is not None and start < now:
+    segments = span(plan.timeline, receipt.command_id, start)
+    if now is not None and min(start, _first(plan, segments)) < now:
         raise PlanningError(f"command {receipt.command_id} began at {start:.6g} s")
     motion = _motion(plan, receipt)
     planner, joiner = plan.planner(motion), plan.joiner(motion)
-    segments = span(plan.timeline, receipt.command_id, start)
     reason = joined(moment.reason, f"retimed from {start:.6g} s")
     if segments is not None:
         earliest, latest = room(plan.timeline, *segments)
@@ -117,7 +117,7 @@ def _retime(plan: Scheduler, command: Retime, receipt: Receipt, now: float | Non
             return plan.accept(_as_planned(plan, receipt, made, moment, reason, at), motion, made, at)
     # It goes past another move: it's taken out, and commanded again at its new time.
     before = plan.timeline
-    taken = _take_out(plan, receipt, start)
+    taken = _take_out(plan, receipt, start, now)
     try:
         made = insert(plan.timeline, t, Insertion.SPLICE, receipt.command_id, planner, joiner)
     except REFUSALS:
@@ -163,14 +163,20 @@ def _as_planned(plan: Scheduler, receipt: Receipt, made: Edit, moment: Moment, r
 def _cancel(plan: Scheduler, command: Cancel, receipt: Receipt, now: float | None) -> Receipt:
     moment = plan.moment(command, now, -np.inf)
     start, _ = _scheduled(receipt, moment.t)
-    return _take_out(plan, receipt, max(start, moment.t))
+    return _take_out(plan, receipt, max(start, moment.t), now)
 
 
-def _take_out(plan: Scheduler, receipt: Receipt, t: float) -> Receipt:
+def _first(plan: Scheduler, segments: tuple[int, int] | None) -> float:
+    """The knot at which a move begins [s]: its receipt's time may lie a rounding later."""
+    return np.inf if segments is None else plan.timeline.start_of(segments[0])
+
+
+def _take_out(plan: Scheduler, receipt: Receipt, t: float, now: float | None) -> Receipt:
     """Take a move out of the plan from t on; the one after it goes from where the arm then stands."""
     timeline = plan.timeline
     segments = span(timeline, receipt.command_id, receipt.execute_at if receipt.execute_at is not None else t)
     started = receipt.execute_at is not None and receipt.execute_at < t
+    started = started or (now is not None and _first(plan, segments) < now)
     reason = f"cancelled from {t:.6g} s on" if started else "cancelled"
     others: tuple[Entry, ...] = ()
     if segments is None:
@@ -206,9 +212,10 @@ def _replanned(plan: Scheduler, gap: Gap, following: int, cancelled: int) -> tup
         made = fill(timeline, gap, other, plan.planner(motion), plan.joiner(motion))
     except (*REFUSALS, LookupError):
         # It can't be planned from there: the arm goes to where it begins.
-        join = plan.joiner(MotionCommand(JointTarget(gap.state.q), profile=plan.profile(cancelled)))
         note = f"the arm still goes to where command {other} begins"
-        return fill(timeline, gap._replace(tail=following), cancelled, stay(note), join), ()
+        gap = braked(timeline, gap, following, plan.stop_at)
+        join = plan.joiner(MotionCommand(JointTarget(gap.state.q), profile=plan.profile(cancelled)))
+        return fill(timeline, gap, cancelled, stay(note), join), ()
     text = f"goes from elsewhere, as command {cancelled} was cancelled"
     shifted = replace(
         receipt,

@@ -1,4 +1,4 @@
-"""Polynomials of a timeline at one time or at many: coefficients as bytes, power sums, stacks."""
+"""What a timeline makes of its polynomials to be sampled quickly: indexes for single times, stacks for many."""
 
 from __future__ import annotations
 
@@ -7,19 +7,16 @@ import weakref
 from array import array
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Sequence
-from struct import unpack
+from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vrs.model import Array
+from vrs.polynomials import QUICK_ORDER, filled_rows
 from vrs.segment import evaluate
 from vrs.tree import Node, first_start
-
-QUICK_ORDER = 4
-"""Rows of coefficients up to which a sample makes no array but its result; where there are fewer, zeros follow."""
 
 STACKS = 128
 """Stacks that are kept in all, the oldest dropped first: 0.1 GB of cubic segments of six joints."""
@@ -27,17 +24,14 @@ STACKS = 128
 INDEXES = 512
 """Indexes that are kept in all, the oldest dropped first: 0.3 GB of cubic segments of six joints."""
 
+_DENSE = 1024
+"""Times below one node of height 1 that are worth more than the shortest way."""
+
+_GATHERED = 2048
+"""Times whose coefficients are gathered at once from several nodes, _DENSE or more: 0.4 MB for six joints."""
+
 _CELLS = 4
 """Cells of an index a segment."""
-
-_DOUBLE = np.dtype(np.float64)
-
-Product: TypeAlias = Callable[[Array], Array]
-
-Cursor: TypeAlias = tuple[float, float, Product, Array, "array[float]", Product, Product]
-"""A segment to be sampled, for one caller at a time: its start; the start of the next; what makes the value from
-its coefficients, and these; the buffer of 1, u, u² and u³ that this reads; what does so for few coefficients, and
-for many."""
 
 Columns: TypeAlias = tuple[float, float, "array[float]", "array[int]", Any]
 """An index: start of the first segment [s]; cells of the grid a second; starts [s], then NaN; how many start before
@@ -46,82 +40,16 @@ each cell, or with it; the coefficients of each segment."""
 Places: TypeAlias = tuple["array[float]", list["Index"], list[Node]]
 """The nodes of height 1: when the first segment of each starts [s], their indexes, and themselves."""
 
-Floats: TypeAlias = Sequence[float]
-
 _Integers: TypeAlias = NDArray[np.int64]
 
 _stacked: deque[weakref.ref[Node]] = deque()
 _indexed: deque[weakref.ref[Index]] = deque()
 
 
-def idle_cursor(n: int) -> Cursor:
-    """A cursor for n joints, at no segment."""
-    powers = array("d", (1.0, 0.0, 0.0, 0.0))
-    few: Product = np.frombuffer(powers).dot
-
-    def many(coefficients: Array) -> Array:
-        return power_sum(coefficients, powers[1])
-
-    return math.inf, -math.inf, few, np.zeros((QUICK_ORDER, n)), powers, few, many
-
-
-def rows_of(row: bytes, n: int) -> Array:
-    """The coefficients in a leaf's row, (degree + 1, n), read-only."""
-    return np.ndarray((len(row) // (8 * n), n), _DOUBLE, row)
-
-
-def filled_rows(row: bytes, n: int) -> Array:
-    """The same with zeros for missing powers, QUICK_ORDER rows at least."""
-    return rows_of(row.ljust(8 * n * QUICK_ORDER, b"\0"), n)
-
-
-def power_sum(coefficients: Array, u: float) -> Array:
-    """Polynomials at u: the product of 1, u, u² and so on with coefficients (K, n)."""
-    power, powers = u, [1.0]
-    for _ in range(len(coefficients) - 1):
-        powers.append(power)
-        power *= u
-    value: Array = np.array(powers).dot(coefficients)
-    return value
-
-
-def state_of(row: bytes, n: int, u: float) -> tuple[Floats, Floats, Floats]:
-    """Position, velocity and acceleration, n values each, of the polynomials in a leaf's row at u [s]."""
-    values = unpack(f"{len(row) // 8}d", row)
-    last = len(values) - n
-    q: Floats = values[last:]
-    qd: Floats = (0.0,) * n
-    qdd: Floats = qd
-    # By Horner's rule; for few joints plain floats are quicker than arrays.
-    for k in range(last - n, -1, -n):
-        qdd = [x * u + y for x, y in zip(qdd, qd, strict=True)]
-        qd = [x * u + y for x, y in zip(qd, q, strict=True)]
-        q = [x * u + y for x, y in zip(q, values[k : k + n], strict=True)]
-    return q, qd, [2.0 * x for x in qdd]
-
-
-def first_state(row: bytes, n: int) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration, (n,) each, where the polynomials in a leaf's row begin."""
-    q, qd, half = np.frombuffer(row.ljust(24 * n, b"\0")[: 24 * n]).reshape(3, n)
-    return q, qd, 2.0 * half
-
-
-def settled(row: bytes, n: int, u: float) -> Array:
-    """Position, velocity and acceleration (3, n) of a leaf's row at u [s], without what rounding leaves of rest.
-
-    Polynomials of degree 2 at most leave no acceleration behind at rest.
-    """
-    q, qd, qdd = state_of(row, n, u)
-    qd = [0.0 if -1e-11 < x < 1e-11 else x for x in qd]
-    still = len(row) < 32 * n and not any(qd)
-    qdd = [0.0 if still or -1e-9 < x < 1e-9 else x for x in qdd]
-    return np.array((*q, *qd, *qdd)).reshape(3, -1)
-
-
 class Stack:
     """Polynomials of all segments below a node of height 1, in arrays, for many times at once."""
 
-    __slots__ = ("_absolute", "_blocks", "_class_of", "_offsets", "_place", "_sizes", "_starts")
+    __slots__ = ("_absolute", "_blocks", "_class_of", "_offsets", "_place", "_sizes", "_starts", "quick")
 
     def __init__(self, node: Node, n: int) -> None:
         leaves = node.children
@@ -131,20 +59,42 @@ class Stack:
         self._absolute: tuple[float, Array] = (math.nan, self._starts)
         rows = [row for leaf in leaves for row in leaf.rows]
         orders = np.fromiter(map(len, rows), np.int64, len(rows)) // (8 * n)
-        # Orders of one class are filled up to the highest of it: 1 to 4, 5 to 8, 9 to 16, and so on.
+        # Orders of one class are filled up to the highest of it: 4, 5 to 8, 9 to 16, and so on.
         classes = np.maximum(np.ceil(np.log2(orders)), 2).astype(np.int8)
         names, self._class_of = np.unique(classes, return_inverse=True)
         self._place: _Integers = np.empty(len(rows), np.int64)
         self._blocks: list[Array] = []
+        """Coefficients (K, m, n) of each class."""
         for name in range(len(names)):
             members = np.flatnonzero(self._class_of == name)
             self._place[members] = np.arange(len(members))
-            block = np.zeros((int(orders[members].max()), len(members), n))
-            for order in np.unique(orders[members]).tolist():
-                same = np.flatnonzero(orders[members] == order)
-                joined = np.frombuffer(b"".join([rows[i] for i in members[same].tolist()]))
-                block[:order, same] = joined.reshape(len(same), order, n).transpose(1, 0, 2)
-            self._blocks.append(block)
+            size = 8 * n * max(int(orders[members].max()), QUICK_ORDER)
+            joined = b"".join([rows[i].ljust(size, b"\0") for i in members.tolist()])
+            self._blocks.append(np.frombuffer(joined).reshape(len(members), -1, n).swapaxes(0, 1).copy())
+        self.quick = [len(block) for block in self._blocks] == [QUICK_ORDER]
+        """Whether all polynomials are of QUICK_ORDER, so that `gather` serves."""
+
+    def _segments(self, t: Array, offset: float) -> tuple[_Integers, Array]:
+        """Segments below the node at times, and the times since they began [s]."""
+        known, starts = self._absolute
+        if known != offset:
+            starts = _ascending(np.repeat(offset + self._offsets, self._sizes) + self._starts)
+            self._absolute = (offset, starts)
+        index = _sorted_into(starts, t)
+        return index, t - starts.take(index)
+
+    def gather(self, t: Array, offset: float, terms: Array, u: Array) -> None:
+        """Write the coefficients that count at times (k,), none before the first segment, into arrays.
+
+        Args:
+            t: Times [s], sorted.
+            offset: The node's summed offset [s].
+            terms: Where the coefficients go, (QUICK_ORDER, k, n).
+            u: Where the times since each segment's start go [s], (k,).
+        """
+        index, u[:] = self._segments(t, offset)
+        for block, term in zip(self._blocks[0], terms, strict=True):
+            block.take(index, 0, term, "clip")
 
     def fill(self, t: Array, offset: float, derivative: int, out: Array) -> None:
         """Write the values at times (k,), none before the first segment, into `out`, (k, n).
@@ -155,12 +105,7 @@ class Stack:
             derivative: Order of the time derivative.
             out: Where the values go.
         """
-        known, starts = self._absolute
-        if known != offset:
-            starts = np.repeat(offset + self._offsets, self._sizes) + self._starts
-            self._absolute = (offset, starts)
-        index = _sorted_into(starts, t)
-        u = t - starts.take(index)
+        index, u = self._segments(t, offset)
         if len(self._blocks) == 1:
             _horner(self._blocks[0], index, u, derivative, out)
             return
@@ -203,7 +148,7 @@ class Index:
 def _columns(node: Node, offset: float, n: int) -> Columns:
     leaves = node.children
     shifts = zip(node.offsets, leaves, strict=True)
-    starts = np.concatenate([(offset + shift) + np.frombuffer(leaf.starts) for shift, leaf in shifts])
+    starts = _ascending(np.concatenate([(offset + shift) + np.frombuffer(leaf.starts) for shift, leaf in shifts]))
     count, first = len(starts), float(starts[0])
     span = float(starts[-1]) - first + leaves[-1].durations[-1]
     scale = _CELLS * count / max(span, 1e-9)
@@ -290,7 +235,7 @@ def sample_many(
     values[:begin] = 0.0 if derivative else held[0]
     values[stop:] = 0.0 if derivative else held[1]
     if begin < stop:
-        _fill(root, height, 0.0, find, t[begin:stop], derivative, values[begin:stop])
+        _fill(root, height, find, t[begin:stop], derivative, values[begin:stop])
     if places is None:
         return values
     result = np.empty_like(values)
@@ -299,24 +244,54 @@ def sample_many(
 
 
 def _fill(
-    node: Any,
+    root: Node,
     height: int,
-    offset: float,
     find: Callable[[float], tuple[float, float, Array]],
     t: Array,
     derivative: int,
     out: Array,
 ) -> None:
-    """Write the values at sorted times that lie in a node, none before its first segment, into `out`."""
+    """Write the values at sorted times that lie in a tree into `out`."""
+    count, n = out.shape
+    room = min(count, _GATHERED)
+    terms, u = np.empty((QUICK_ORDER, room, n)), np.empty(room)
+    begin = end = 0
+
+    def finish() -> None:
+        _horner(terms[:, : end - begin], None, u[: end - begin], derivative, out[begin:end])
+
+    for node, offset, low, high in _nodes_at(root, height, 0.0, t, 0):
+        stack = stack_of(node, n, high - low)
+        if stack is None:
+            for row, x in zip(out[low:high], t[low:high].tolist(), strict=True):
+                start, _, coefficients = find(x)
+                row[:] = evaluate(coefficients, x - start, derivative)
+        elif stack.quick and high - low < _DENSE:
+            if low != end or high - begin > room:
+                finish()
+                begin = low
+            end = high
+            stack.gather(t[low:high], offset, terms[:, low - begin : high - begin], u[low - begin : high - begin])
+        else:
+            stack.fill(t[low:high], offset, derivative, out[low:high])
+    finish()
+
+
+def _nodes_at(node: Any, height: int, offset: float, t: Array, done: int) -> Iterator[tuple[Node, float, int, int]]:
+    """Nodes of height 1 in which sorted times lie, none before the first segment.
+
+    Args:
+        node: What they're below.
+        height: Its height.
+        offset: Its summed offset [s].
+        t: Times [s].
+        done: How many times come before these.
+
+    Yields:
+        A node, its summed offset [s], and the range of its times.
+    """
     if height == 1:
-        n = out.shape[1]
-        stack = stack_of(node, n, len(t))
-        if stack is not None:
-            stack.fill(t, offset, derivative, out)
-            return
-        for row, x in zip(out, t.tolist(), strict=True):
-            start, _, coefficients = find(x)
-            row[:] = evaluate(coefficients, x - start, derivative)
+        yield node, offset, done, done + len(t)
         return
 
     def first(child: int) -> float:
@@ -326,19 +301,28 @@ def _fill(
     child = min(bisect_right(node.firsts, float(t[0]) - offset), len(node.children) - 1)
     while first(child) > t[0]:
         child -= 1
-    done = 0
-    while done < len(t):
-        stop = int(t.searchsorted(first(child + 1))) if child + 1 < len(node.children) else len(t)
-        if done < stop:
-            part = slice(done, stop)
-            inner = offset + node.offsets[child]
-            _fill(node.children[child], height - 1, inner, find, t[part], derivative, out[part])
-            done = stop
+    low = 0
+    while low < len(t):
+        high = int(t.searchsorted(first(child + 1))) if child + 1 < len(node.children) else len(t)
+        if low < high:
+            yield from _nodes_at(
+                node.children[child], height - 1, offset + node.offsets[child], t[low:high], done + low
+            )
+            low = high
         child += 1
+
+
+def _ascending(starts: Array) -> Array:
+    """Starts, none after a later one: a leaf's last may be, by the rounding of its offset and the next one's."""
+    return np.ascontiguousarray(np.minimum.accumulate(starts[::-1])[::-1])
 
 
 def _sorted_into(starts: Array, t: Array) -> _Integers:
     """Index of the last start that isn't after each of the sorted times, none before the first start."""
+    if len(t) < _DENSE:
+        near: _Integers = starts.searchsorted(t, "right")
+        near -= 1
+        return near
     low, high = (starts.searchsorted((t[0], t[-1]), "right") - (1, 0)).tolist()
     if high - low > len(t):
         found: _Integers = starts.searchsorted(t, "right") - 1
@@ -348,19 +332,21 @@ def _sorted_into(starts: Array, t: Array) -> _Integers:
     return np.repeat(np.arange(low, high), np.diff([0, *edges, len(t)]))
 
 
-def _horner(block: Array, index: _Integers, u: Array, derivative: int, out: Array) -> None:
-    """Horner's rule, the operations of `evaluate` in their order, on rows of a block (K, m, n)."""
+def _horner(block: Array, index: _Integers | None, u: Array, derivative: int, out: Array) -> None:
+    """Horner's rule, the operations of `evaluate` in their order, on rows of a block (K, m, n); None for all."""
     order, _, n = block.shape
     if order <= derivative:
         out[...] = 0.0
         return
-    x, term = np.repeat(u, n).reshape(-1, n), np.empty_like(out)
-    block[order - 1].take(index, 0, out, "clip")
+    x = u.repeat(n).reshape(-1, n)
+    if index is None:
+        out[...] = block[order - 1]
+    else:
+        block[order - 1].take(index, 0, out, "clip")
+        room = np.empty_like(out)
     if derivative:
         out *= math.perm(order - 1, derivative)
     for power in range(order - 2, derivative - 1, -1):
         out *= x
-        block[power].take(index, 0, term, "clip")
-        if derivative:
-            term *= math.perm(power, derivative)
-        out += term
+        term = block[power] if index is None else block[power].take(index, 0, room, "clip")
+        out += term * math.perm(power, derivative) if derivative else term

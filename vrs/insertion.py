@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import comb
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vrs.chunk import HOLD, Piece, State
+from vrs.chunk import HOLD, Packed, Piece, State
 from vrs.commands import Insertion
 from vrs.model import Array
 from vrs.planning import Plan, empty
-from vrs.planning.plan import stacked
+from vrs.planning.plan import end_state, stacked
 from vrs.timeline import Timeline
 
 MovePlanner = Callable[[State], tuple[Plan, Array, str]]
@@ -20,11 +20,16 @@ MovePlanner = Callable[[State], tuple[Plan, Array, str]]
 JoinPlanner = Callable[[Array, State], tuple[Plan, str]]
 """Plans from rest at the new target to the state in which the tail begins."""
 
+_Row = TypeVar("_Row")
+
 _SLIVER = 1e-12
 """Duration [s] below which a segment is only rounding."""
 
 _SAME = 1e-12
 """Difference of coefficients [rad / s**power] that's only rounding."""
+
+_MET = 1e-9
+"""Difference of accelerations [rad/s²] that's only rounding."""
 
 _ROUNDED_MOST = 64
 """Segments of a move that the next one may overlap."""
@@ -188,19 +193,23 @@ def fill(
     """
     plan, target, note = plan_move(gap.state)
     arrival = gap.start + plan.duration
-    pieces = [*gap.lead, piece(plan, command_id)]
+    pieces: list[Piece | Packed] = [*gap.lead, packed(plan, command_id)]
     tail = gap.tail
     if tail is None:
         after = timeline.edited(gap.cut, pieces)
         return Edit(after, gap.start, arrival, target, dropped=dropped, notes=joined(gap.note, note))
     scheduled = timeline.start_of(tail)
     goal = timeline.state_after(tail)
+    moving = any(goal.qd.tolist())
+    if not moving and timeline.owner_of(tail) != command_id:
+        # Moves of different commands meet at rest with whatever acceleration; within one it mustn't jump.
+        goal = goal._replace(qdd=goal.qd)
     join, join_note = plan_join(target, goal)
-    joining = piece(join, command_id)
+    joining = packed(join, command_id)
     ready = arrival + join.duration
     slack = scheduled - ready
     if slack > 0:
-        moving = any(goal.qd.tolist())
+        moving = moving or _pushes_off(join, goal)
         rest = hold(slack, target if moving else goal.q)
         pieces += [rest, joining] if moving else [joining, rest]
     else:
@@ -210,6 +219,13 @@ def fill(
     return Edit(after, gap.start, arrival, target, max(-slack, 0.0), tail, dropped, notes)
 
 
+def _pushes_off(join: Plan, goal: State) -> bool:
+    """Whether a joining move ends with the acceleration of what follows, so that no rest fits between them."""
+    if not len(join) or not any(goal.qdd.tolist()):
+        return False
+    return bool(np.abs(end_state(join).qdd - goal.qdd).max() <= _MET)
+
+
 def stay(note: str) -> MovePlanner:
     """Plan to stay where the arm is."""
     return lambda state: (empty(len(state.q)), state.q, note)
@@ -217,11 +233,19 @@ def stay(note: str) -> MovePlanner:
 
 def piece(plan: Plan, command_id: int) -> Piece:
     """A plan as a piece for an edit, without segments too short to end later than they start."""
-    durations, rows = plan.durations.tolist(), plan.rows()
-    if durations and min(durations) < _SLIVER:
-        kept = [i for i, h in enumerate(durations) if h >= _SLIVER]
-        durations, rows = [durations[i] for i in kept], [rows[i] for i in kept]
-    return Piece(durations, rows, command_id)
+    return Piece(*_without_slivers(plan.durations.tolist(), plan.rows()), command_id)
+
+
+def packed(plan: Plan, command_id: int) -> Packed:
+    """The same, as a timeline keeps it."""
+    return Packed(*_without_slivers(plan.durations.tolist(), plan.packed_rows()), command_id)
+
+
+def _without_slivers(durations: list[float], rows: list[_Row]) -> tuple[list[float], list[_Row]]:
+    if not durations or min(durations) >= _SLIVER:
+        return durations, rows
+    kept = [i for i, h in enumerate(durations) if h >= _SLIVER]
+    return [durations[i] for i in kept], [rows[i] for i in kept]
 
 
 def lengthened(timeline: Timeline, t: float, new: Piece) -> Timeline:
@@ -230,13 +254,19 @@ def lengthened(timeline: Timeline, t: float, new: Piece) -> Timeline:
     if new.durations and 0 <= index < len(timeline) and timeline.owner_of(index) == new.command_id:
         present = timeline.segment(index)
         late = t - present.start
-        goes_on = shifted(present.coefficients, late)
-        first = new.coefficients[0]
-        if late > 0 and goes_on.shape == first.shape and np.abs(goes_on - first).max() <= _SAME:
+        if late > 0 and _goes_on(present.coefficients, late, new.coefficients[0]):
             durations = [late + new.durations[0], *new.durations[1:]]
             rows = [present.coefficients, *new.coefficients[1:]]
             return timeline.edited(present.start, [Piece(durations, rows, new.command_id)])
     return timeline.edited(t, [new])
+
+
+def _goes_on(coefficients: Array, late: float, other: Array) -> bool:
+    """Whether other coefficients are the same polynomials in powers of the time since `late` [s]."""
+    # The highest power stays what it is: most that differ differ there.
+    if coefficients.shape != other.shape or np.abs(coefficients[-1] - other[-1]).max() > _SAME:
+        return False
+    return bool(np.abs(shifted(coefficients, late) - other).max() <= _SAME)
 
 
 def shifted(coefficients: Array, u: float) -> Array:
@@ -257,4 +287,4 @@ def hold(duration: float, q: Array) -> Piece:
 
 def joined(*texts: str) -> str:
     """Texts that aren't empty, as one."""
-    return "; ".join(text for text in texts if text)
+    return "; ".join(filter(None, texts))

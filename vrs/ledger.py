@@ -111,6 +111,8 @@ class Ledger:
         start, end = entry[0].execute_at, entry[0].end
         if start is None or end is None:
             return True
+        if not self._versions or self._versions[-1] <= entry[0].version:
+            return end <= t + ARRIVED
         for change in self._changes[bisect_left(self._versions, entry[0].version + 1) :]:
             if change.version >= version:
                 break

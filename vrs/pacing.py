@@ -157,7 +157,7 @@ def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bo
         low, high = -1, len(_RAMPS)
         while high - low > 1:
             middle = (low + high) // 2
-            if _keeps(timeline, change(s, wait, goal, float(_RAMPS[middle])), limits, jerk=jerk):
+            if seems_kept(timeline, change(s, wait, goal, float(_RAMPS[middle])), limits, jerk=jerk):
                 high = middle
             else:
                 low = middle
@@ -262,8 +262,8 @@ def _lowest_rate(timeline: Timeline, s: Array, pace: Array, limits: Limits) -> f
     return min(float(lowest.max()), 0.0)
 
 
-def _keeps(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
-    """Whether samples of the motion along a law keep the limits."""
+def seems_kept(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
+    """Whether samples of the motion along a law keep the limits; where they don't, it has no certificate."""
     s, *derivatives = law(np.linspace(0.0, law.duration, _LOOKS))
     p, r, third = (value[:, None] for value in derivatives)
     qd, qdd = timeline.sample(s, derivative=1), timeline.sample(s, derivative=2)
@@ -293,10 +293,10 @@ def _waits(timeline: Timeline, s: float, rest: float) -> Iterator[float]:
 def rest_after(timeline: Timeline, s: float, until: float = np.inf) -> float:
     """When the motion next rests, at a knot [s]; infinity where it doesn't until a time."""
     low, size = max(timeline.index_at(s), 0) + 1, _KNOTS
-    last = min(timeline.index_at(until) + 1, len(timeline)) if until < np.inf else len(timeline)
-    while low <= last:
-        knots = np.array([timeline.start_of(i) for i in range(low, min(low + size, last + 1))])
-        slow = np.abs(timeline.sample(knots, derivative=1)).max(1) < _NEARLY
+    high = min(timeline.index_at(until) + 2, len(timeline)) if until < np.inf else len(timeline)
+    while low < high:
+        knots, qd = timeline.knots(low, min(low + size, high))
+        slow = np.abs(qd).max(1) < _NEARLY
         for i in np.flatnonzero(slow & (knots > s)).tolist():
             knot = float(knots[i])
             if knot > until:
@@ -309,12 +309,10 @@ def rest_after(timeline: Timeline, s: float, until: float = np.inf) -> float:
 
 
 def _rests(timeline: Timeline, knot: float, index: int) -> bool:
-    """Whether the arm rests at the knot where a segment begins, or the timeline ends."""
+    """Whether the arm rests at the knot where a segment begins."""
     before = timeline.state_before(knot)
     if before.qd.any():
         return False
-    if index == len(timeline):
-        return True
     # What is only nearly at rest goes on moving, with the acceleration that it had.
     after = timeline.state_after(index)
     accelerates = np.abs(after.qdd).max() > _NO_JUMP and np.abs(after.qdd - before.qdd).max() <= _NO_JUMP

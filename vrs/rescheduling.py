@@ -22,13 +22,22 @@ _ROUNDING = 1e-9
 
 
 def span(timeline: Timeline, command_id: int, start: float) -> tuple[int, int] | None:
-    """First segment of a command's move that begins at a time, and one past its last; None if it has none."""
-    near = max(timeline.index_at(start), 0)
-    if near + 1 < len(timeline) and timeline.start_of(near + 1) - start <= _ROUNDING:
-        near += 1
-    for index in (near, near + 1, near - 1):
-        if 0 <= index < len(timeline) and timeline.owner_of(index) == command_id:
-            return index, end_of_move(timeline, index)
+    """First segment of a command's move that begins at a time, and one past its last; None if it has none.
+
+    What the command moved before that, until a stop, isn't part of it.
+    """
+    low = high = max(timeline.index_at(start), 0)
+    while low > 0 and start - timeline.start_of(low - 1) <= _ROUNDING:
+        low -= 1
+    while high < len(timeline) and timeline.start_of(high + 1) - start <= _ROUNDING:
+        high += 1
+    near = sorted(range(low, high + 1), key=lambda i: abs(timeline.start_of(i) - start))
+    for index in (*near, high + 1):
+        if index >= len(timeline) or timeline.owner_of(index) != command_id:
+            continue
+        if index < high and start - timeline.start_of(index) > _ROUNDING:
+            continue
+        return index, end_of_move(timeline, index)
     return None
 
 
@@ -75,6 +84,13 @@ def removed(timeline: Timeline, low: int, high: int, t: float, stopper: Stopper)
         return _waiting(timeline, cut, -inf, None, stopper), None
     after = next_move(timeline, end_of_move(timeline, following))
     return _waiting(timeline, cut, timeline.start_of(following), after, stopper), following
+
+
+def braked(timeline: Timeline, gap: Gap, tail: int, stopper: Stopper) -> Gap:
+    """The same gap before another tail, with the arm at rest where it leaves it."""
+    if gap.lead or not gap.state.qd.any():
+        return gap._replace(tail=tail)
+    return _waiting(timeline, gap.cut, -inf, tail, stopper)
 
 
 def owner_before(timeline: Timeline, t: float) -> int:

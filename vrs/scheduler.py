@@ -41,7 +41,7 @@ from vrs.insertion import (
 from vrs.ledger import ARRIVED, Change, Entry, Ledger
 from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.planning import Plan
-from vrs.planning.plan import end_state
+from vrs.planning.plan import end_position
 from vrs.receipt import Names, Receipt, Status
 from vrs.rescheduling import owner_before
 from vrs.timeline import Timeline
@@ -275,11 +275,9 @@ class Scheduler:
     def named(self, timeline: Timeline, index: int, t: float) -> Names:
         """Commands that arrive after t and have segments from an index on."""
         # Joining moves may stand there first whose commands have arrived.
-        stop = min(index + _NAMED_AT_ONCE, len(timeline))
-        near = timeline.owners(index, stop)
-        if stop == len(timeline):
-            return tuple(i for i in near if not self.ledger.arrived(i, t))
-        return partial(_names, self.ledger, timeline, index, t)
+        if len(timeline) - index > _NAMED_AT_ONCE:
+            return partial(_names, self.ledger, timeline, index, t)
+        return tuple(i for i in timeline.owners(index, len(timeline)) if not self.ledger.arrived(i, t))
 
     def reject(self, issued: float | None, asked: float | None, reason: str) -> Receipt:
         """Answer a command that can't be."""
@@ -323,7 +321,7 @@ class Scheduler:
             after = lengthened(before, t, piece(plan, command_id))
         if after is before:
             return self.ledger.receipt(command_id)
-        target = end_state(plan).q if len(plan) else state.q
+        target = end_position(plan) if len(plan) else state.q
         self.profiles[command_id] = Profile.JERK_LIMITED
         self._session = _Session(command_id, after.version, start)
         receipt = Receipt(
@@ -366,7 +364,7 @@ def _move(command: MotionCommand, model: RobotModel, limits: Limits, state: Stat
             plan, note = line(state, X, speed, profile, model, limits, q_goal=target.q)
             return plan, target.q, note
         plan, note = line(state, target.X, speed, profile, model, limits, configuration=target.configuration)
-        return plan, end_state(plan).q if len(plan) else state.q, note
+        return plan, end_position(plan) if len(plan) else state.q, note
     # The arm solution is chosen from where the arm will be at the final execution time.
     q = solve(target, model, state.q)
     plan, note = planning.move(state, q, speed, profile, limits)

@@ -147,6 +147,17 @@ class ArcSegment:
 Segment: TypeAlias = PolynomialSegment | ArcSegment
 
 
+def known_segment(start: float, duration: float, coefficients: Array, owner: int | None) -> PolynomialSegment:
+    """A segment of what was checked before: it shares the coefficients, which are read-only."""
+    segment = PolynomialSegment.__new__(PolynomialSegment)
+    put = object.__setattr__
+    put(segment, "start", start)
+    put(segment, "duration", duration)
+    put(segment, "coefficients", coefficients)
+    put(segment, "command_id", owner)
+    return segment
+
+
 def check_derivative(derivative: int) -> int:
     """Return an order of derivative, 0 to 3.
 

@@ -9,7 +9,7 @@ import numpy as np
 from vrs.chunk import HOLD, Piece, State
 from vrs.commands import JointTarget, MotionCommand, Profile, Resume, ScaleTime, Stop
 from vrs.errors import PlanningError
-from vrs.insertion import Gap, fill, hold, joined, next_move, piece, stay
+from vrs.insertion import Gap, end_of_move, fill, hold, joined, next_move, piece, stay
 from vrs.ledger import Change, Entry
 from vrs.model import frozen_array
 from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
@@ -121,7 +121,12 @@ def resume(plan: Scheduler, command: Resume, now: float | None) -> Receipt:
     segments = None
     if interrupted is not None and interrupted.execute_at is not None:
         segments = span(old, owner, interrupted.execute_at)
-    tail = next_move(old, segments[1] if segments is not None else max(index, 0))
+    after_it = max(index, 0)
+    if segments is not None:
+        after_it = segments[1]
+    elif owner != HOLD:
+        after_it = end_of_move(old, index)
+    tail = next_move(old, after_it)
     unfinished = interrupted is not None and interrupted.end is not None and interrupted.end > paused.at
     goes_on = unfinished and motion is not None
     if unfinished and not goes_on and tail is None:
@@ -137,8 +142,11 @@ def resume(plan: Scheduler, command: Resume, now: float | None) -> Receipt:
         # What followed is put behind the present, so that the gap before it can be filled.
         begin = old.start_of(tail)
         placed = max(begin, t + _ROOM)
-        waiting = timeline.edited(t, [hold(placed - t, state.q), *remainder(old, begin, 1.0)])
-        following = waiting.index_at(0.5 * (t + placed)) + 1
+        followers = [old.segment(i) for i in range(tail, len(old))]
+        pieces = [Piece([s.duration], [s.coefficients], s.command_id or HOLD) for s in followers]
+        waiting = timeline.edited(t, [hold(placed - t, state.q), *pieces])
+        # Counted, not looked up by time: the first of them may be too short to last at its time.
+        following = len(waiting) - len(pieces)
     made = fill(waiting, Gap(t, t, state, following), owner or number, planner, joiner)
     after = made.timeline.with_version(timeline.version + 1)
     shift = made.shift + placed - begin if tail is not None else 0.0

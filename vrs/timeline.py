@@ -8,37 +8,32 @@ from __future__ import annotations
 
 import math
 import sys
-from array import array
 from bisect import bisect_right
 from collections.abc import Iterable
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.chunk import HOLD, Piece, State
+from vrs.chunk import HOLD, Packed, Piece, State, checked_run, run_of
 from vrs.commands import finite, finite_array
 from vrs.errors import InvalidValueError, NonFiniteTimeError
-from vrs.evaluation import (
+from vrs.evaluation import Places, places_of, sample_many
+from vrs.model import Array
+from vrs.polynomials import (
     QUICK_ORDER,
     Cursor,
-    Places,
     filled_rows,
     first_state,
     idle_cursor,
-    places_of,
     power_sum,
     rows_of,
-    sample_many,
     settled,
 )
-from vrs.model import Array
-from vrs.segment import PolynomialSegment, check_derivative, evaluate, times
+from vrs.segment import PolynomialSegment, check_derivative, evaluate, known_segment, times
 from vrs.segment_view import SegmentView
-from vrs.tree import Leaf, Node, Run, first_start, index_at, last_end, locate, path_at, splice
+from vrs.tree import Leaf, Node, Path, first_start, knots_of, last_end, leaves, path_at, path_to, splice
 
-_JOINT_TOLERANCE = 1e-6
 _LARGEST = sys.float_info.max
 _POSITION = 0
 _VISITS = 4096
@@ -53,8 +48,8 @@ class Timeline:
     """
 
     __slots__ = (
-        "_count", "_end", "_final", "_first", "_free", "_initial", "_levels", "_missed", "_places", "_root",
-        "_start", "version",
+        "_asked", "_count", "_end", "_final", "_first", "_free", "_initial", "_levels", "_missed", "_near",
+        "_places", "_root", "_start", "version",
     )  # fmt: skip
 
     version: int
@@ -78,23 +73,7 @@ class Timeline:
         if initial.ndim != 1 or len(initial) == 0:
             raise InvalidValueError("q", q, "finite joint values [rad], shape (n,)")
         origin = finite("start", start, "finite seconds")
-        starts, durations, owners, rows = array("d"), array("d"), array("q"), list[bytes]()
-        end, position = origin, initial
-        for index, segment in enumerate(segments):
-            if segment.coefficients.shape[1] != len(initial):
-                raise InvalidValueError(f"segment {index}", segment.coefficients.shape, f"of width {len(initial)}")
-            if abs(segment.start - end) > 1e-9 * max(1.0, abs(end)):
-                raise InvalidValueError(f"segment {index} start", segment.start, f"contiguous, at {end}")
-            if np.abs(segment.coefficients[0] - position).max() > _JOINT_TOLERANCE:
-                raise InvalidValueError(f"segment {index} position", segment.coefficients[0], f"at {position}")
-            starts.append(segment.start)
-            durations.append(segment.duration)
-            owners.append(segment.command_id or HOLD)
-            rows.append(segment.coefficients.tobytes())
-            end = segment.end
-            position = power_sum(segment.coefficients, segment.duration)
-        run = Run(starts, durations, owners, tuple(rows))
-        self._set(initial, origin, *splice(None, 0, 0, None, run), version)
+        self._set(initial, origin, *splice(0, None, None, checked_run(segments, origin, initial)), version)
 
     def _set(self, initial: Array, start: float, root: Node | None, height: int, version: int) -> None:
         self._initial = initial
@@ -108,6 +87,8 @@ class Timeline:
         self._places: Places | None = None
         self._missed = 0
         self._final: Array | None = None
+        self._asked: tuple[float, int, Path] | None = None
+        self._near: tuple[int, Path] | None = None
         self.version = version
 
     @property
@@ -157,11 +138,37 @@ class Timeline:
     def __repr__(self) -> str:
         return f"Timeline({len(self)} segments, [{self._start:g}, {self._end:g}) s, version {self.version})"
 
+    def _way_at(self, t: float) -> tuple[int, Path]:
+        """Index of the segment at a time from the first start to before the end, and the way to it.
+
+        An edit asks for its own time again and again, so the newest is remembered.
+        """
+        newest = self._asked
+        if newest is None or newest[0] != t:
+            assert self._root is not None
+            index, path = path_at(self._root, len(self._levels), t)
+            self._asked = newest = t, index, path
+            self._near = index - path.place, path
+        return newest[1], newest[2]
+
+    def _way_to(self, index: int) -> Path:
+        """The way to a segment; one more step from its neighbours in the leaf that was asked for last."""
+        near = self._near
+        if near is None or not 0 <= index - near[0] < near[1].leaf.count:
+            if self._root is None or not 0 <= index < self._count:
+                raise IndexError(index)
+            path = path_to(self._root, len(self._levels), index)
+            self._near = near = index - path.place, path
+        first, path = near
+        return Path(path.steps, path.leaf, index - first, path.offset)
+
     def _locate(self, index: int) -> tuple[Leaf, int, float]:
         """A segment's leaf, its index there, and the leaf's offset."""
-        if self._root is None or not 0 <= index < self._count:
-            raise IndexError(index)
-        return locate(self._root, len(self._levels), index)
+        near = self._near
+        if near is None or not 0 <= index - near[0] < near[1].leaf.count:
+            return self._way_to(index)[1:]
+        first, (_, leaf, _, offset) = near
+        return leaf, index - first, offset
 
     def index_at(self, t: float) -> int:
         """Index of the segment with start ≤ t < end; −1 before the first, len(self) after the last."""
@@ -169,7 +176,7 @@ class Timeline:
             return self._count
         if self._root is None or t < self._first:
             return -1
-        return index_at(self._root, len(self._levels), t)
+        return self._way_at(t)[0]
 
     def start_of(self, index: int) -> float:
         """Start of a segment [s]; of index len(self), the end."""
@@ -187,19 +194,18 @@ class Timeline:
         """The segment at an index, 0 to len(self) − 1."""
         leaf, i, offset = self._locate(index)
         a = rows_of(leaf.rows[i], self.dof)
-        return PolynomialSegment(offset + leaf.starts[i], leaf.durations[i], a, leaf.owners[i] or None)
+        return known_segment(offset + leaf.starts[i], leaf.durations[i], a, leaf.owners[i] or None)
 
     def owners(self, low: int, high: int) -> tuple[int, ...]:
         """Distinct command ids of the segments low to high − 1, in order, without holds."""
-        found: dict[int, None] = {}
-        high = min(high, self._count)
-        while low < high:
-            leaf, i, _ = self._locate(low)
-            ids = leaf.owners[i : i + high - low]
-            found.update(dict.fromkeys(ids))
-            low += len(ids)
+        parts = leaves(self._root, len(self._levels), low, high)
+        found = dict.fromkeys(owner for leaf, part, _ in parts for owner in leaf.owners[part])
         found.pop(HOLD, None)
         return tuple(found)
+
+    def knots(self, low: int, high: int) -> tuple[Array, Array]:
+        """Starts of the segments low to high − 1 [s], (m,), and their velocities there [rad/s], (m, n)."""
+        return knots_of(leaves(self._root, len(self._levels), low, high), self.dof)
 
     def end_of_run(self, index: int) -> int:
         """One past the last segment, in a row from an index on, that the same command owns."""
@@ -333,11 +339,11 @@ class Timeline:
             rest = np.zeros(self.dof)
             return State(self._initial.copy() if t <= self._first else self.final(), rest, rest)
         if t < self._end:
-            index, (_, leaf, i, offset) = path_at(self._root, len(self._levels), t)
+            index, (_, leaf, i, offset) = self._way_at(t)
+            if offset + leaf.starts[i] >= t:
+                leaf, i, offset = self._locate(index - 1)
         else:
-            index, leaf, i, offset = self._count, None, 0, 0.0
-        if leaf is None or offset + leaf.starts[i] >= t:
-            leaf, i, offset = self._locate(index - 1)
+            leaf, i, offset = self._locate(self._count - 1)
         u = min(t - (offset + leaf.starts[i]), leaf.durations[i])
         return State(*settled(leaf.rows[i], self.dof, u))
 
@@ -347,7 +353,7 @@ class Timeline:
         return State(*first_state(leaf.rows[i], self.dof))
 
     def edited(
-        self, cut: float, pieces: Iterable[Piece], tail: int | None = None, tail_start: float | None = None
+        self, cut: float, pieces: Iterable[Piece | Packed], tail: int | None = None, tail_start: float | None = None
     ) -> Timeline:
         """Keep what lies before `cut`, put pieces there, and let the segments from `tail` on follow.
 
@@ -358,29 +364,22 @@ class Timeline:
             tail: Index, in this timeline, of the first segment that stays after the pieces; None for none.
             tail_start: Time at which the tail starts [s].
         """
-        path = None
-        if self._root is not None and self._first <= cut < self._end:
-            index, path = path_at(self._root, len(self._levels), cut)
+        start, left, last, right = self._start, None, None, None
+        if self._root is None or not self._first <= cut < self._end:
+            start = min(start, cut)
+            if cut > self._end:
+                pieces = (Piece([cut - self._end], [self._last()[None]], HOLD), *pieces)
+                cut = self._end
+            if self._count and cut == self._end:
+                left = self._way_to(self._count - 1)
         else:
-            index = self.index_at(cut)
-        kept = min(index + 1, self._count)
-        start = self._start if 0 <= index < self._count else min(self._start, cut)
-        end = cut if index < self._count else None
-        if cut > self._end:
-            pieces = (Piece([cut - self._end], [self._last()[None]], HOLD), *pieces)
-            cut = self._end
-        durations, owners, rows = array("d"), array("q"), list[bytes]()
-        for piece in pieces:
-            durations.extend(piece.durations)
-            rows += [a.tobytes() for a in piece.coefficients]
-            owners += array("q", [piece.command_id]) * (len(rows) - len(owners))
-        assert len(rows) == len(durations)
-        starts = array("d", accumulate(durations, initial=cut))
-        starts.pop()
-        run = Run(starts, durations, owners, tuple(rows))
-        if tail_start is None or (tail is not None and tail >= self._count):
-            tail = None
-        tree = splice(self._root, len(self._levels), kept, end, run, tail, tail_start or 0.0, path)
+            index, left = self._way_at(cut)
+            last = cut - (left.offset + left.leaf.starts[left.place])
+            if last <= 0:
+                left, last = self._way_to(index - 1) if index else None, None
+        if tail is not None and tail_start is not None and tail < self._count:
+            right = self._way_to(tail)
+        tree = splice(len(self._levels), left, last, run_of(pieces, cut), right, tail_start or 0.0)
         result = _remade(self._initial, start, *tree, self.version + 1)
         try:
             cursor = self._free.pop()

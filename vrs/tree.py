@@ -11,10 +11,13 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_right
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+
+from vrs.model import Array
 
 LEAF = 48
 """Segments of a leaf, at most: more cost more to copy, fewer make more leaves."""
@@ -24,6 +27,9 @@ CAPACITY = 96
 
 FILLED = 0.75
 """How full a sequence that grows at its end leaves what lies behind: edits that follow there need no split."""
+
+_FEW = 16
+"""Numbers up to which a list is quicker than NumPy."""
 
 
 class Leaf:
@@ -109,18 +115,6 @@ Step: TypeAlias = tuple[Node, int, float]
 """A node on the way, the child that was taken, and the node's summed offset."""
 
 
-def locate(root: Node, height: int, index: int) -> tuple[Leaf, int, float]:
-    """The leaf of a segment, the segment's index there, and the leaf's summed offset."""
-    node: Any = root
-    offset = 0.0
-    for _ in range(height):
-        child = bisect_right(node.counts, index) - 1
-        index -= node.counts[child]
-        offset += node.offsets[child]
-        node = node.children[child]
-    return node, index, offset
-
-
 def index_at(root: Node, height: int, t: float) -> int:
     """Index of the last segment that doesn't start after t, which isn't before the first."""
     node: Any = root
@@ -162,12 +156,12 @@ def path_at(root: Node, height: int, t: float) -> tuple[int, Path]:
         if i >= 0 and offset + starts[i] <= t and i + 1 < len(starts) and t < offset + starts[i + 1]:
             return index + i, Path(steps, node, i, offset)
     index = index_at(root, height, t)
-    return index, _path(root, height, index)
+    return index, path_to(root, height, index)
 
 
 def start_of(root: Node, height: int, index: int) -> float:
     """Start of a segment [s]."""
-    leaf, i, offset = locate(root, height, index)
+    _, leaf, i, offset = path_to(root, height, index)
     return offset + leaf.starts[i]
 
 
@@ -194,7 +188,8 @@ def last_end(root: Node, height: int) -> float:
     return end
 
 
-def _path(root: Node, height: int, index: int) -> Path:
+def path_to(root: Node, height: int, index: int) -> Path:
+    """The way to a segment."""
     steps = []
     node: Any = root
     offset = 0.0
@@ -207,6 +202,23 @@ def _path(root: Node, height: int, index: int) -> Path:
     return Path(steps, node, index, offset)
 
 
+def leaves(root: Node | None, height: int, low: int, high: int) -> Iterator[tuple[Leaf, slice, float]]:
+    """The leaves of the segments low to high − 1, where these are in each, and its summed offset."""
+    while root is not None and low < min(high, root.count):
+        _, leaf, i, offset = path_to(root, height, low)
+        low += leaf.count - i
+        yield leaf, slice(i, leaf.count - max(low - high, 0)), offset
+
+
+def knots_of(parts: Iterable[tuple[Leaf, slice, float]], n: int) -> tuple[Array, Array]:
+    """Starts [s], (m,), and velocities there, (m, n), of segments in leaves, each with its summed offset."""
+    starts, rates = [np.empty(0)], bytearray()
+    for leaf, part, offset in parts:
+        starts.append(offset + np.frombuffer(leaf.starts)[part])
+        rates += b"".join([row[8 * n : 16 * n].ljust(8 * n, b"\0") for row in leaf.rows[part]])
+    return np.concatenate(starts), np.frombuffer(rates).reshape(-1, n)
+
+
 def _bounds(count: int, most: int, even: bool) -> list[int]:
     """Where to cut a sequence into groups of at most so many; uneven ones are filled one after the other."""
     if even:
@@ -216,44 +228,30 @@ def _bounds(count: int, most: int, even: bool) -> list[int]:
 
 
 def splice(
-    root: Node | None,
     height: int,
-    kept: int,
-    cut: float | None,
+    left: Path | None,
+    last: float | None,
     new: Run,
-    tail: int | None = None,
+    right: Path | None = None,
     tail_start: float = 0.0,
-    left: Path | None = None,
 ) -> tuple[Node | None, int]:
-    """Keep segments 0 to kept − 1, put new ones there, and let those from `tail` on follow, shifted as a whole.
+    """Keep the segments up to one, put new ones there, and let those from another on follow, shifted as a whole.
 
     Args:
-        root: The tree, None for an empty one.
-        height: Levels of nodes above its leaves.
-        kept: How many segments stay before the new ones.
-        cut: Where the last of them ends [s]: it's shortened, or left out if it starts there; None keeps it whole.
+        height: Levels of nodes above the tree's leaves; 0 where there's none.
+        left: The way to the last segment that stays before the new ones; None for none.
+        last: What that one lasts then [s]; None leaves it as it is.
         new: The new segments.
-        tail: First segment that stays after them; None for none.
-        tail_start: When it starts [s].
-        left: The way to segment kept − 1, if it's known.
+        right: The way to the first segment that stays after them; None for none.
+        tail_start: When that one starts then [s].
 
     Returns:
         The new tree and its height.
     """
-    last, right = None, None
-    if root is not None and kept:
-        left = left or _path(root, height, kept - 1)
-        if cut is not None:
-            last = cut - (left.offset + left.leaf.starts[left.place])
-            if last <= 0:
-                left, last = _path(root, height, kept - 2) if kept > 1 else None, None
-    if root is not None and tail is not None:
-        place = -1 if left is None else left.place + tail + 1 - kept
-        if left is not None and last is not None and 0 <= place < left.leaf.count:
-            right = left._replace(place=place)
-        else:
-            right = _path(root, height, tail)
     starts, durations, owners, rows = new
+    if right is not None and starts and starts[-1] > tail_start:
+        # Sums of durations are rounded: what lasts no longer than that mustn't start after what follows it.
+        starts = array("d", [min(start, tail_start) for start in starts])
     if left is not None:
         leaf, stop, offset = left.leaf, left.place + 1, left.offset
         starts = _moved(leaf.starts[:stop], offset) + starts
@@ -348,9 +346,13 @@ def _moved(times: array[float], by: float, further: float = 0.0) -> array[float]
     """Times later by one span, then by another [s]."""
     if not (by or further):
         return times
+    if len(times) <= _FEW:
+        return array("d", [(time + by) + further for time in times])
     moved = np.frombuffer(times) + by if by else np.frombuffer(times)
     return array("d", (moved + further if further else moved).tobytes())
 
 
 def _added(counts: array[int], more: int) -> array[int]:
-    return array("q", (np.frombuffer(counts, np.int64) + more).tobytes()) if more else counts
+    if not more or len(counts) <= _FEW:
+        return array("q", [count + more for count in counts]) if more else counts
+    return array("q", (np.frombuffer(counts, np.int64) + more).tobytes())

@@ -13,6 +13,8 @@ from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
 from interfaces.cli.link import link
 from interfaces.cli.reproduce import reproduce
+from interfaces.cli.robot import robot
+from interfaces.cli.serve import serve
 from vrs.errors import VrsError
 
 # Typer exports only one of its usage errors; the class above it is the root of all of them.
@@ -29,6 +31,8 @@ app.command()(demo)
 app.command()(doctor)
 app.command()(link)
 app.command()(reproduce)
+app.command()(robot)
+app.command()(serve)
 
 
 def _version(value: bool) -> None:

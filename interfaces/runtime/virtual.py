@@ -150,10 +150,10 @@ class _Session:
 
     def _robot_rests(self) -> float | None:
         """When the robot had done everything that it was told [s]; None if it hasn't."""
-        everything = self._robot.halted or len(self._lab.answers) == len(self._sent)
+        everything = self._robot.halted or (len(self._lab.answers) == len(self._sent) and not self._cues)
         began = self._robot.epoch > 0 or self._offset is not None
         end = self._robot.engine.timeline.end - 1e-9
-        if not (everything and began) or self._cues or self._play_at(self._lab.now) < end:
+        if not (everything and began) or self._play_at(self._lab.now) < end:
             return None
         return STEP * float(np.searchsorted(self._play(), end))
 

@@ -1,5 +1,7 @@
 """Both sites of a teleoperated robot: messages, the operator's, the robot's."""
 
+from interfaces.teleop.host import RobotHost, RobotHostConfig
+from interfaces.teleop.line import RobotLine
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.operator import Correction, OperatorSite, OperatorSiteConfig
@@ -7,5 +9,5 @@ from interfaces.teleop.robot import Reference, RobotSite, RobotSiteConfig
 
 __all__ = [
     "AdaptiveOffset", "Correction", "Entry", "OffsetConfig", "OperatorSite", "OperatorSiteConfig", "Orders",
-    "PlanPart", "Reference", "Report", "RobotSite", "RobotSiteConfig",
+    "PlanPart", "Reference", "Report", "RobotHost", "RobotHostConfig", "RobotLine", "RobotSite", "RobotSiteConfig",
 ]  # fmt: skip

@@ -80,6 +80,10 @@ class Report:
     """How fast it plays; 1 is as planned."""
     q: Array
     """Measured joints [rad], (n,)."""
+    measured_at: float
+    """When they were measured, by the robot's clock [s]."""
+    q_at: float
+    """Time on the robot's timeline that it played then [s]."""
     halted: str = ""
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
     receipts: tuple[tuple[int, Receipt], ...] = ()

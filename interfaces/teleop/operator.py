@@ -132,6 +132,7 @@ class OperatorSite:
         now: float,
         config: OperatorSiteConfig | None = None,
         lateness: Lateness = Lateness.POSTPONE,
+        halted: str = "",
     ) -> None:
         """Start with both robots at rest at q.
 
@@ -141,6 +142,7 @@ class OperatorSite:
             now: By the operator's clock [s].
             config: How to send.
             lateness: What happens to commands whose execution time has passed.
+            halted: Why the robot can't be commanded yet, where it's yet to be met; its report says where it is.
         """
         self.config = OperatorSiteConfig() if config is None else config
         self._model, self._lateness = model, lateness
@@ -148,7 +150,7 @@ class OperatorSite:
         self.engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self._clock, lateness=lateness)
         """The virtual robot; what it's told goes to the real one, whoever tells it."""
         self.epoch, self._began = 1, now
-        self.halted = ""
+        self.halted = halted
         """Why the robot stopped by itself; empty while it follows."""
         self.corrections: list[Correction] = []
         self.report: Report | None = None
@@ -189,7 +191,7 @@ class OperatorSite:
     def _refusal(self) -> str:
         """Why the robot can't be commanded; empty if it can."""
         if self.halted:
-            return f"the robot stopped by itself: {self.halted}; resume first"
+            return f"the robot doesn't follow: {self.halted}; resume first"
         if len(self._under_way) >= _UNDER_WAY_MOST:
             return f"{_UNDER_WAY_MOST} commands wait to be acknowledged"
         return ""
@@ -296,6 +298,8 @@ class OperatorSite:
         self._clock.set(now)
         if not self.halted:
             return "the robot follows: there's nothing to resume"
+        if self.report is None or not self.report.halted:
+            return "the robot hasn't said yet where it stands"
         if now < self.engine.timeline.end:
             left = self.engine.timeline.end - now
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"

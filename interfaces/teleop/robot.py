@@ -19,9 +19,10 @@ import numpy as np
 from interfaces.site import engine_time
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
-from robots.onboard.play import PlayState, play_of
+from interfaces.teleop.received import ReceivedLog
+from robots.onboard.play import EvenPlay, PlayState, play_of
 from robots.onboard.playout import Playout, PlayoutConfig
-from robots.onboard.stamps import Stamp
+from robots.onboard.stamps import Stamp, Verdict
 from robots.onboard.stops import from_commanded
 from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import number_in
@@ -34,9 +35,10 @@ from vrs.insertion import hold, piece
 from vrs.model import Array, RobotModel
 from vrs.planning.stopping import stop
 from vrs.receipt import Receipt, Status
+from vrs.timeline import Timeline
 
-WAITING_MOST = 4096
-"""Most entries that wait for earlier ones, and most receipts that wait to be reported."""
+_TELL_MOST = 4096
+"""Most receipts that wait to be reported."""
 SEGMENTS_MOST = 2000
 """Most segments of a plan in one report."""
 _SETTLE = 0.05
@@ -90,60 +92,18 @@ class Reference(NamedTuple):
     """[rad/s²]."""
 
 
-class _Fixed:
-    """Play at an even pace, 1 or none: p = pace · t + D."""
-
-    def __init__(self, D: float, pace: float = 1.0) -> None:
-        self.D, self.pace = D, pace
-
-    def at(self, t: Array) -> PlayState:
-        t = np.asarray(t, float)
-        return PlayState(self.pace * t + self.D, np.full_like(t, self.pace), np.zeros_like(t))
-
-
-class _Log:
-    """Which entries came, and up to when the timeline is complete with those that were carried out."""
-
-    def __init__(self, complete_until: float) -> None:
-        self.executed = 0
-        self.complete_until = complete_until
-        self._waiting: dict[int, Entry] = {}
-        self._early: set[int] = set()
-        self._claims: deque[tuple[int, float]] = deque(maxlen=WAITING_MOST)
-
-    def due(self, entries: tuple[Entry, ...], *, as_they_come: bool) -> list[Entry]:
-        """Entries to be carried out now, each once."""
-        new = [e for e in entries if e.number > self.executed and e.number not in self._early]
-        if as_they_come:
-            due = list({e.number: e for e in new}.values())
-            self._early.update(e.number for e in due)
-            while self.executed + 1 in self._early:
-                self._early.remove(self.executed + 1)
-                self.executed += 1
-            return due
-        for entry in new:
-            if len(self._waiting) < WAITING_MOST:
-                self._waiting.setdefault(entry.number, entry)
-        due = []
-        while self.executed + 1 in self._waiting:
-            self.executed += 1
-            due.append(self._waiting.pop(self.executed))
-        return due
-
-    def claim(self, newest: int, complete_until: float) -> None:
-        """A message said that with all entries up to the newest nothing changes before a time."""
-        self._claims.append((newest, complete_until))
-        held = [c for c in self._claims if c[0] > self.executed]
-        if len(held) < len(self._claims):
-            kept = max(c[1] for c in self._claims if c[0] <= self.executed)
-            self.complete_until = max(self.complete_until, kept)
-            self._claims = deque(held, maxlen=WAITING_MOST)
-
-
 class RobotSite:
     """What runs beside the real robot, all but its body."""
 
-    def __init__(self, model: RobotModel, q: Array, *, now: float, config: RobotSiteConfig | None = None) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        q: Array,
+        *,
+        now: float,
+        config: RobotSiteConfig | None = None,
+        reported: int = 0,
+    ) -> None:
         """Stand at rest until the first message comes.
 
         Args:
@@ -151,6 +111,7 @@ class RobotSite:
             q: Joints [rad], (n,).
             now: By the robot's clock [s].
             config: How to behave.
+            reported: Number of the last report of an earlier life, which the operator may know.
         """
         self.config = RobotSiteConfig() if config is None else config
         self._model = model
@@ -162,17 +123,18 @@ class RobotSite:
         self.parted = False
         """Whether its timeline is another than the operator's."""
         fixed = self.config.fixed_offset
-        self._play: Playout | _Fixed = _Fixed(now, 0.0) if fixed is None else _Fixed(fixed)
-        self._plays: deque[tuple[float, Playout | _Fixed]] = deque([(now, self._play)], maxlen=_PLAYS)
+        self._play: Playout | EvenPlay = EvenPlay(now, 0.0) if fixed is None else EvenPlay(fixed)
+        self._plays: deque[tuple[float, Playout | EvenPlay]] = deque([(now, self._play)], maxlen=_PLAYS)
         self._offset = AdaptiveOffset(self.config.offset)
-        self._log = _Log(-math.inf)
+        self._log = ReceivedLog(-math.inf)
         self._newest: tuple[int, float, float] | None = None
         self._messages = 0
-        self._receipts: deque[tuple[int, int, Receipt]] = deque(maxlen=WAITING_MOST)
-        self._reports = 0
+        self._receipts: deque[tuple[int, int, Receipt]] = deque(maxlen=_TELL_MOST)
+        self._reports = reported
         self._due = now
-        self._measured = np.array(q, float)
+        self._measured, self._measured_at = np.array(q, float), (now, self._play_at(now))
         self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
+        self._verdict = Verdict.FRESH
 
     @property
     def playout(self) -> Playout | None:
@@ -184,12 +146,34 @@ class RobotSite:
         """Up to where its timeline is known to be complete [s]."""
         return self._log.complete_until
 
-    def receive(self, orders: Orders, *, now: float) -> None:
-        """Take in a message of the operator; what is of an old epoch is ignored, as all is once it has stopped."""
+    def join(self, epoch: int, reason: str, *, now: float) -> None:
+        """Meet an operator whose timeline isn't known here: as after a stop by itself, in the operator's epoch.
+
+        Args:
+            epoch: The operator's.
+            reason: What to report.
+            now: By the robot's clock [s].
+        """
+        timeline = Timeline(self.engine.timeline.initial, now).edited(now, [hold(_SETTLE, self._measured)])
+        self.engine = Engine(self._model, timeline=timeline)
+        self._play = EvenPlay(0.0, end=timeline.end)
+        self._plays.append((now, self._play))
+        self.epoch, self.halted, self.parted = epoch, reason, True
+        self._due = now
+
+    def receive(self, orders: Orders, *, now: float, correction: float = 0.0, uncertainty: float = 0.0) -> None:
+        """Take in a message of the operator; what is of an old epoch is ignored, as all is once it has stopped.
+
+        Args:
+            orders: The message.
+            now: By the robot's clock [s].
+            correction: The robot's clock less the operator's, as far as it's known now [s].
+            uncertainty: Of that [s].
+        """
         self.advance_play(now=now)
-        if orders.epoch > self.epoch and self._play_at(now) >= self.engine.timeline.end:
+        if orders.epoch > self.epoch and self.rests(now=now):
             self._begin(orders, now)
-        if orders.epoch != self.epoch or not self._counts(orders, now):
+        if orders.epoch != self.epoch or not self._counts(orders, now, correction, uncertainty):
             return
         if self._newest is None or orders.number > self._newest[0]:
             self._newest = orders.number, orders.sent_at, now
@@ -210,12 +194,13 @@ class RobotSite:
             self._messages += 1
             self._play.hear(self._log.complete_until, self.engine.timeline, now=now)
 
-    def _counts(self, orders: Orders, now: float) -> bool:
+    def _counts(self, orders: Orders, now: float, correction: float, uncertainty: float) -> bool:
         """Whether the watchdog lets a message count."""
         if self._watchdog is None:
             return True
-        stamp = Stamp(orders.epoch, orders.number, orders.sent_at)
-        return self._watchdog.heard(stamp, now=now, authentic=True).counts
+        stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
+        self._verdict = self._watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
+        return self._verdict.counts
 
     def _watch(self, now: float) -> None:
         """Let the watchdog do what is due by now."""
@@ -223,8 +208,9 @@ class RobotSite:
             return
         for action in self._watchdog.advance(now=now):
             if isinstance(action, BeginStop):
-                self.halt(f"nothing fresh came from the operator: {action.reason.value}", now=now)
-        if self.halted and self._play_at(now) >= self.engine.timeline.end:
+                last = "" if self._verdict.counts else f" (the last message was refused: {self._verdict})"
+                self.halt(f"nothing fresh came from the operator: {action.reason.value}{last}", now=now)
+        if self.halted and self.rests(now=now):
             self._watchdog.stopped(self._watchdog.number, now=now)
 
     def _begin(self, orders: Orders, now: float) -> None:
@@ -241,13 +227,13 @@ class RobotSite:
         else:
             self.engine = Engine(self._model, q=stood.initial, clock=self._clock)
         self.epoch, self.halted, self.parted = orders.epoch, "", False
-        self._log, self._newest, self._messages = _Log(began), None, 0
+        self._log, self._newest, self._messages = ReceivedLog(began), None, 0
         self._offset = AdaptiveOffset(self.config.offset)
         self._receipts.clear()
         self._play = (
             Playout(self.engine.timeline, self.engine.limits, now=now, p=began, config=self.config.playout)
             if fixed is None
-            else _Fixed(fixed)
+            else EvenPlay(fixed)
         )
         self._plays.append((now, self._play))
 
@@ -285,9 +271,13 @@ class RobotSite:
         self._due = now + self.config.beat
         return (self._report(now),)
 
+    def rests(self, *, now: float) -> bool:
+        """Whether everything is over that it plays."""
+        return self._play_at(now) >= self.engine.timeline.end
+
     def next_deadline(self) -> float:
         """When there's something to do, by the robot's clock [s]."""
-        play = None if isinstance(self._play, _Fixed) else self._play.next_deadline()
+        play = None if isinstance(self._play, EvenPlay) else self._play.next_deadline()
         watch = None if self._watchdog is None else self._watchdog.next_deadline()
         return min(self._due, math.inf if play is None else play, math.inf if watch is None else watch)
 
@@ -297,29 +287,44 @@ class RobotSite:
             return self._play.at(t)
         return play_of(((since, play.at) for since, play in reversed(self._plays)), t)
 
+    def foreseen(self, t: Array) -> PlayState:
+        """Where play is at ascending times by the robot's clock [s], (k,), if nobody looks at it before."""
+        known = int(np.searchsorted(t, self._plays[-1][0]))
+        later = self._play.foreseen(t[known:])
+        return PlayState(*map(np.concatenate, zip(self.play_at(t[:known]), later, strict=True))) if known else later
+
     def reference(self, play: PlayState) -> Reference:
         """What the body follows where play is, (k, n) each."""
         p, pace, rate = play.p, play.pace[:, None], play.rate[:, None]
         q, qd, qdd = (self.engine.timeline.sample(p, derivative=k) for k in range(3))
         return Reference(q, qd * pace, qdd * pace * pace + qd * rate)
 
-    def measured(self, q: Array, *, now: float) -> None:
-        """Take in measured joints [rad], (n,); where one is too far from its reference, the robot stops."""
-        self._measured = np.array(q, float)
+    def measured(self, q: Array, *, now: float, at: float | None = None) -> bool:
+        """Take in measured joints; where one is too far from its reference, the robot stops.
+
+        Args:
+            q: Joints [rad], (n,).
+            now: By the robot's clock [s].
+            at: When it was to be there, where that's another time [s].
+
+        Returns:
+            Whether it stops for that, and is to be held where it was measured.
+        """
+        at = now if at is None else at
+        p = float(self.play_at(np.array([at])).p[0])
+        self._measured, self._measured_at = np.array(q, float), (at, p)
         if self.halted or self.epoch == 0:
-            return
-        away = np.abs(q - self.engine.timeline.sample(float(self.play_at(np.array([now])).p[0])))
-        joint = int(away.argmax())
-        if away[joint] > self.config.tolerance:
-            limit = self.config.tolerance
-            self.halt(
-                f"joint {joint + 1} is {away[joint]:.3g} rad from where it should be, more than {limit:g} rad",
-                now=now,
-                measured=q,
-            )
+            return False
+        away = np.abs(q - self.engine.timeline.sample(p))
+        joint, limit = int(away.argmax()), self.config.tolerance
+        if away[joint] <= limit:
+            return False
+        reason = f"joint {joint + 1} is {away[joint]:.3g} rad from where it should be, more than {limit:g} rad"
+        self.halt(reason, now=now, measured=q)
+        return True
 
     def halt(self, reason: str, *, now: float, measured: Array | None = None) -> None:
-        """Stop at once, and wait for a new epoch.
+        """Stop at once, and wait for a new epoch; who has stopped already only lets itself be held elsewhere.
 
         Args:
             reason: What to report.
@@ -327,7 +332,7 @@ class RobotSite:
             measured: Where to hold the arm [rad], (n,), when it's not where it should be; without it the arm brakes
                 from its reference, within the limits.
         """
-        if self.halted:
+        if self.halted and measured is None:
             return
         play = self.play_at(np.array([now]))
         p, limits, timeline = float(play.p[0]), self.engine.limits, self.engine.timeline
@@ -341,9 +346,10 @@ class RobotSite:
             timeline = timeline.edited(p, [piece(stop(state, Profile.PARABOLIC, limits)[0], HOLD)])
         self._clock = ManualClock(p)
         self.engine = Engine(self._model, timeline=timeline, clock=self._clock)
-        self._play = _Fixed(p - now)
+        # What the next epoch puts after this end isn't played before that begins.
+        self._play = EvenPlay(p - now, end=timeline.end)
         self._plays.append((now, self._play))
-        self.halted, self.parted = reason, True
+        self.halted, self.parted = self.halted or reason, True
         self._due = now
         if self._watchdog is not None and self._watchdog.state is WatchdogState.RUNNING:
             self._watchdog.stop(StopReason.FAULT, now=now)
@@ -359,7 +365,7 @@ class RobotSite:
         q.flags.writeable = False
         return Report(
             self.epoch, self._reports, now, self._newest, self._log.executed, float(p[0]), float(pace[0]), q,
-            self.halted, self._told(), plan,
+            *self._measured_at, self.halted, self._told(), plan,
         )  # fmt: skip
 
     def _told(self) -> tuple[tuple[int, Receipt], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
@@ -42,3 +43,17 @@ def play_of(newest_first: Iterable[tuple[float, Callable[[Array], PlayState]]], 
         states.append(at(t[:high]))
     states.reverse()
     return PlayState(*(np.concatenate([state[i] for state in states]) for i in range(3)))
+
+
+class EvenPlay:
+    """Play at an even pace, 1 or none: p = pace · t + D, up to an end."""
+
+    def __init__(self, D: float, pace: float = 1.0, end: float = math.inf) -> None:
+        self.D, self.pace, self.end = D, pace, end
+
+    def at(self, t: Array) -> PlayState:
+        """Where play is at times [s], (k,)."""
+        p = self.pace * np.asarray(t, float) + self.D
+        return PlayState(np.minimum(p, self.end), np.where(p < self.end, self.pace, 0.0), np.zeros_like(p))
+
+    foreseen = at

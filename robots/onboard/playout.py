@@ -15,22 +15,26 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from robots.onboard.legs import STEADY, Leg, along, braking
 from robots.onboard.play import PlayState, play_of
 from vrs.checks import number_in
 from vrs.model import Array, Limits
-from vrs.pacing import Law, certified, change, rest_after
+from vrs.pacing import Law, certified, change, rest_after, seems_kept
 from vrs.planning import violation
 from vrs.planning.plan import stacked
 from vrs.timeline import Timeline
 
 _RAMPS = tuple(np.geomspace(0.05, 2.5, 18).tolist())
 """Durations of a change of pace to try [s]."""
+_GO_ON = (1.0, 0.9, 0.75, 0.5, 0.25)
+"""Paces to take a motion up again at: where it needs all that the limits allow, a change of pace has no room."""
 _SLEW_RAMPS = (0.4, 0.2, 0.1)
 """Durations of a small change of pace to try [s]."""
 _LOOK = 0.25
@@ -41,6 +45,8 @@ _SOON = 0.05
 """When to look again if the pace couldn't be changed [s]."""
 _STEP = 1e-3
 """Least way [s of the timeline] that makes a later escape worth while."""
+_LATE = 0.01
+"""A decision that's more overdue [s] isn't made any more: the body has followed what was foreseen."""
 _NEEDS = 64
 """Escapes that say how much timeline it takes to slow down."""
 _LEGS = 4096
@@ -76,27 +82,12 @@ class Stretch(NamedTuple):
     """Where on the timeline it began [s]."""
 
 
-class _Leg(NamedTuple):
-    """A change of pace, then a steady pace."""
-
-    begin: float
-    """By the robot's clock [s]."""
-    law: Law
-    p: float
-    """Where the law ends [s]."""
-    pace: float
-    """The steady pace."""
-
-
 class _Escape(NamedTuple):
     """Where play must slow down at the latest, and how."""
 
     p: float
     law: Law | None = None
     """None where the arm rests at p by itself."""
-
-
-_STEADY = Law((), ())
 
 
 class Playout:
@@ -127,9 +118,10 @@ class Playout:
         """
         self._timeline, self._limits = timeline, limits
         self._config = PlayoutConfig() if config is None else config
+        self._quicker = _at_pace(limits, 1.0 + self._config.slew)
         self._smooth = smooth if smooth is not None else _never
         self._complete = p
-        self._leg = _Leg(now, _STEADY, p, 0.0)
+        self._leg = Leg(now, STEADY, p, 0.0)
         self._legs = deque([self._leg], maxlen=_LEGS)
         self._due: float | None = None
         self._escape = _Escape(p)
@@ -138,8 +130,10 @@ class Playout:
         # To begin with: braking from full speed takes half of this way, and seldom more than three times that.
         self._needs = deque([1.5 * float((limits.qd_max / limits.qdd_max).max())], maxlen=_NEEDS)
         self._slowed: tuple[float, float] | None = None
+        self._known_rest = (p, p)
+        """From where on it's known when the motion next rests, and when: it's complete, and so won't change."""
         self._refused = math.nan
-        """When a motion rests that can't be played faster: it's complete, and so won't change."""
+        """When a motion rests that can't be played faster."""
         self.stretches: list[Stretch] = []
         """When play slowed down in mid-motion; the driver may empty it."""
 
@@ -177,7 +171,9 @@ class Playout:
     def advance(self, *, now: float) -> None:
         """Do what is due by now [s]."""
         while self._due is not None and self._due <= now:
-            self._decide(self._due)
+            late = now - self._due > _LATE
+            waits = self._leg.pace == 0.0 and not self._leg.law.durations
+            self._decide(now if late and waits else self._due, late=late and not waits)
 
     def next_deadline(self) -> float | None:
         """When the pace must be looked at again, by the robot's clock [s]; None while it waits for a message."""
@@ -187,11 +183,22 @@ class Playout:
         """Where play is at ascending times up to the next deadline [s], (k,), as far back as decisions are kept."""
         t = np.asarray(t, float)
         if not len(t) or t[0] >= self._leg.begin:
-            return _along(self._leg, t)
-        return play_of(((leg.begin, partial(_along, leg)) for leg in reversed(self._legs)), t)
+            return along(self._leg, t)
+        return play_of(((leg.begin, partial(along, leg)) for leg in reversed(self._legs)), t)
 
-    def _decide(self, t: float) -> None:
-        """Choose how to go on from where play is at a time; no law is under way then."""
+    def foreseen(self, t: Array) -> PlayState:
+        """Where play is at ascending times [s], (k,), if nobody looks before: it takes its escape, and waits."""
+        t = np.asarray(t, float)
+        if not len(t) or self._due is None or t[-1] < self._due:
+            return self.at(t)
+        ahead = copy(self)
+        ahead._legs, ahead.stretches = self._legs.copy(), []
+        while ahead._due is not None and ahead._due <= t[-1]:
+            ahead._decide(ahead._due, late=True)
+        return ahead.at(t)
+
+    def _decide(self, t: float, *, late: bool = False) -> None:
+        """Choose how to go on from where play is at a time; no law is under way. Too late, it's as foreseen."""
         leg = self._leg
         p, pace = leg.p + leg.pace * max(t - leg.begin - leg.law.duration, 0.0), leg.pace
         if abs(p - self._escape.p) <= _ROUNDING:
@@ -204,6 +211,8 @@ class Playout:
             p = until
         if until > p:
             self._rest(t, p, wanted, min(until, self._complete), abs(behind))
+        elif late:
+            self._as_foreseen(t, p, pace)
         elif not self._timeline.state_before(p).qd.any():
             self._depart(t, p, wanted)
         elif pace == 0.0:
@@ -211,15 +220,25 @@ class Playout:
         else:
             self._play(t, p, pace, wanted)
 
+    def _as_foreseen(self, t: float, p: float, pace: float) -> None:
+        """Go on without a look at what is known: to the escape, then along it, then wait."""
+        if pace > 0.0 and p < self._escape.p - _ROUNDING:
+            self._steady(t, p, pace, self._escape, _LOOK)
+        elif pace > 0.0 and self._escape.law is not None:
+            self._brake(t, p)
+        else:
+            self._wait(t, p)
+            self._due = t + _LOOK
+
     def _steady(self, t: float, p: float, pace: float, escape: _Escape, longest: float) -> None:
         """Play at a steady pace up to an escape, and look again after `longest` seconds at the latest."""
-        self._leg, self._escape = _Leg(t, _STEADY, p, pace), escape
+        self._leg, self._escape = Leg(t, STEADY, p, pace), escape
         self._legs.append(self._leg)
         self._due = t + min((escape.p - p) / pace, longest) if pace > 0 else None
 
     def _change(self, t: float, law: Law, pace: float, escape: _Escape) -> None:
         """Change the pace by a law."""
-        self._leg, self._escape = _Leg(t, law, law.end, pace), escape
+        self._leg, self._escape = Leg(t, law, law.end, pace), escape
         self._legs.append(self._leg)
         self._due = t + law.duration
 
@@ -236,7 +255,7 @@ class Playout:
 
     def _depart(self, t: float, p: float, wanted: float) -> None:
         """Begin to move, if a way to stop is known."""
-        pace = wanted if wanted < 1.0 or self._allows(p, wanted) else 1.0
+        pace = wanted if wanted <= 1.0 or self._allows(p) else 1.0
         escape = self._later(p, pace)
         if escape is None:
             self._wait(t, p)
@@ -245,19 +264,27 @@ class Playout:
 
     def _go_on(self, t: float, p: float) -> None:
         """Take up the motion again where play stopped on the way."""
-        if self._complete - p >= self._config.buffer:
+        found = self._resumption(p) if self._complete - p >= self._config.buffer else None
+        if found is None:
+            self._wait(t, p)
+            return
+        law, pace, escape = found
+        self._change(t, law, pace, escape)
+        if self._slowed is not None:
+            self.stretches.append(Stretch(self._slowed[0], t + law.duration, self._slowed[1]))
+            self._slowed = None
+
+    def _resumption(self, p: float) -> tuple[Law, float, _Escape] | None:
+        """The change from pace 0 to the highest pace that keeps the limits, and the escape after it."""
+        for pace in _GO_ON:
             for ramp in _RAMPS:
-                law = change(p, 0.0, 1.0, ramp, 0.0)
-                escape = self._later(law.end, 1.0) if law.end < self._complete else None
+                law = change(p, 0.0, pace, ramp, 0.0)
+                escape = self._later(law.end, pace) if law.end < self._complete else None
                 if escape is None:
                     break
                 if self._keeps(law):
-                    self._change(t, law, 1.0, escape)
-                    if self._slowed is not None:
-                        self.stretches.append(Stretch(self._slowed[0], t + ramp, self._slowed[1]))
-                        self._slowed = None
-                    return
-        self._wait(t, p)
+                    return law, pace, escape
+        return None
 
     def _play(self, t: float, p: float, pace: float, wanted: float) -> None:
         """Go on moving; slow down if no later escape is known than the one that's reached."""
@@ -268,8 +295,9 @@ class Playout:
             self._brake(t, p)
             return
         longest = _LOOK if escape.law is not None else _REST_LOOK
-        if wanted != pace and (wanted <= 1.0 or self._allows(p, wanted)):
-            until = self._complete if wanted <= 1.0 else rest_after(self._timeline, p)
+        wanted = wanted if wanted <= 1.0 or self._allows(p) else 1.0
+        if wanted != pace:
+            until = self._complete if wanted <= 1.0 else self._rest_after(p)
             for ramp in _SLEW_RAMPS:
                 law = change(p, 0.0, wanted, ramp, pace)
                 after = self._later(law.end, wanted) if law.end < until else None
@@ -289,7 +317,7 @@ class Playout:
     def _later(self, p: float, pace: float) -> _Escape | None:
         """The latest escape that was found on the way from p on, for play at a pace; None if there's none."""
         complete = self._complete
-        rest = rest_after(self._timeline, p, complete)
+        rest = self._rest_after(p)
         if rest < math.inf:
             return _Escape(rest)
         smooth = self._smooth_on(p, complete)
@@ -297,12 +325,21 @@ class Playout:
         for k in (*range(first, len(_RAMPS)), *range(first)):
             ramp = _RAMPS[k]
             begin = complete - 0.5 * pace * ramp - _ROUNDING
-            law = change(begin, 0.0, 0.0, ramp, pace) if smooth else _braking(begin, pace, ramp)
+            law = change(begin, 0.0, 0.0, ramp, pace) if smooth else braking(begin, pace, ramp)
             if begin > p + _STEP and self._keeps(law):
                 self._ramp = k
                 self._needs.append(complete - begin)
                 return _Escape(begin, law)
         return None
+
+    def _rest_after(self, p: float) -> float:
+        """When the motion from p on next rests; infinity where that isn't known to be complete."""
+        since, rest = self._known_rest
+        if not since <= p < rest:
+            rest = rest_after(self._timeline, p, self._complete)
+            if rest < math.inf:
+                self._known_rest = p, rest
+        return rest
 
     def _smooth_on(self, low: float, high: float) -> bool:
         """Whether anything between two times of the timeline keeps jerk limits."""
@@ -313,19 +350,21 @@ class Playout:
     def _keeps(self, law: Law) -> bool:
         """Whether the motion along a law keeps the limits."""
         jerk = self._smooth_on(law.coefficients[0][0], law.end)
+        # Most that are tried don't, and samples tell so in a fraction of a certificate's time.
+        if not seems_kept(self._timeline, law, self._limits, jerk=jerk):
+            return False
         return certified(self._timeline, law, self._limits, jerk=jerk) is None
 
-    def _allows(self, p: float, pace: float) -> bool:
-        """Whether the motion from p on is known until it rests, and can be played at a pace up to there."""
+    def _allows(self, p: float) -> bool:
+        """Whether the motion from p on is known until it rests, and can be played at the highest pace."""
         timeline = self._timeline
-        rest = rest_after(timeline, p, self._complete)
+        rest = self._rest_after(p)
         if rest in (math.inf, self._refused):
             return False
         low, high = max(timeline.index_at(p), 0), timeline.index_at(rest)
         segments = [timeline.segment(i) for i in range(low, high)]
         plan = stacked([s.duration for s in segments], [s.coefficients for s in segments], timeline.dof)
-        jerk = self._smooth_on(p, rest)
-        allowed = violation(plan, _at_pace(self._limits, pace), jerk=jerk) is None
+        allowed = violation(plan, self._quicker, jerk=self._smooth_on(p, rest)) is None
         if not allowed:
             self._refused = rest
         return allowed
@@ -339,22 +378,6 @@ def _at_pace(limits: Limits, pace: float) -> Limits:
         qdd_max=limits.qdd_max / pace**2,
         qddd_max=limits.qddd_max / pace**3,
     )
-
-
-def _along(leg: _Leg, t: Array) -> PlayState:
-    """Where play is at times on a leg, (k,)."""
-    u = t - leg.begin
-    late = u - leg.law.duration
-    p, pace, rate = leg.p + leg.pace * late, np.full_like(u, leg.pace), np.zeros_like(u)
-    changing = late < 0
-    if changing.any():
-        p[changing], pace[changing], rate[changing], _ = leg.law(u[changing])
-    return PlayState(p, pace, rate)
-
-
-def _braking(p: float, pace: float, duration: float) -> Law:
-    """Slow down evenly to a stop."""
-    return Law((duration,), ((p, pace, -0.5 * pace / duration),))
 
 
 def _never(command_id: int) -> bool:  # noqa: ARG001

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import truediv
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,6 +53,21 @@ class Measured:
     """Drive torques [N m], (k, 6), limited; row i acted during step i."""
     saturated: NDArray[np.int64]
     """Steps in which a drive was at its limit, by joint, (6,)."""
+
+
+class Prepared(NamedTuple):
+    """References with the feed-forward that belongs to them, (k, 6) each."""
+
+    q: Array
+    """[rad]."""
+    qd: Array
+    """[rad/s]."""
+    feedforward: Array
+    """[N m]."""
+
+    def row(self, i: int) -> Prepared:
+        """One of them, (1, 6) each."""
+        return Prepared(self.q[i : i + 1], self.qd[i : i + 1], self.feedforward[i : i + 1])
 
 
 def puma_links(payload: Payload | None = None) -> tuple[RigidLink, ...]:
@@ -177,11 +192,21 @@ class RealArm:
             WorldClosedError: If the arm is closed.
             DivergedError: If the arm's state explodes.
         """
-        refs = _references(q_ref, qd_ref, qdd_ref)
-        client, k = self._world.client, len(refs[0])
-        feedforward = self._servo.feedforward(*refs) if k else np.empty((0, DOF))
+        return self.follow(self.prepare(q_ref, qd_ref, qdd_ref))
+
+    def prepare(self, q_ref: ArrayLike, qd_ref: ArrayLike, qdd_ref: ArrayLike) -> Prepared:
+        """Work out beforehand what `follow` needs; arguments and errors as of `run`.
+
+        For a single row it takes more time than the step itself, for a block next to none.
+        """
+        q, qd, qdd = _references(q_ref, qd_ref, qdd_ref)
+        return Prepared(q, qd, self._servo.feedforward(q, qd, qdd) if len(q) else np.empty((0, DOF)))
+
+    def follow(self, prepared: Prepared) -> Measured:
+        """Follow references that `prepare` has made ready; returns and raises as `run`."""
+        client = self._world.client
         if self.reality.ideal:
-            return self._follow(refs, feedforward)
+            return self._follow(prepared)
         bullet, body, drives, servo = self._world.bullet, self._body, self._drives, self._servo
         control, step, read = bullet.setJointMotorControlArray, bullet.stepSimulation, bullet.getJointStates
         mass_matrix, inverse_dynamics = bullet.calculateMassMatrix, bullet.calculateInverseDynamics
@@ -193,7 +218,7 @@ class RealArm:
         saturated = [0] * DOF
         q, qd = self._q, self._qd
         reading = self._read(q)
-        for u, target in zip(feedforward.tolist(), refs[0].tolist(), strict=True):
+        for u, target in zip(prepared.feedforward.tolist(), prepared.q.tolist(), strict=True):
             tau = servo.torques(reading, u, target)
             if limited and max(map(truediv, map(abs, tau), dynamics.TORQUE_MAX)) > 1.0:
                 for j, limit in enumerate(dynamics.TORQUE_MAX):
@@ -288,13 +313,14 @@ class RealArm:
     ) -> None:
         self.close()
 
-    def _follow(self, refs: tuple[Array, Array, Array], feedforward: Array) -> Measured:
-        if len(refs[0]):
-            self._q, self._qd = refs[0][-1].tolist(), refs[1][-1].tolist()
-            self._steps += len(refs[0])
+    def _follow(self, prepared: Prepared) -> Measured:
+        q, qd, feedforward = prepared
+        if len(q):
+            self._q, self._qd = q[-1].tolist(), qd[-1].tolist()
+            self._steps += len(q)
             self._servo.hold(self._q)
             self._set_state()
-        return Measured(refs[0], refs[1], frozen_array(feedforward), np.zeros(DOF, dtype=np.int64))
+        return Measured(q, qd, frozen_array(feedforward), np.zeros(DOF, dtype=np.int64))
 
     def _keep(self, q: list[float], qd: list[float]) -> None:
         self._q, self._qd = q, qd

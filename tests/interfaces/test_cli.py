@@ -116,3 +116,45 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path):
     assert process.returncode == 130
     assert "Traceback" not in err
     assert err.strip().splitlines()[-1] == "vrs: interrupted"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("serve", "--host", "0.0.0.0"), "--token-file"),
+        (("robot", "--listen", "0.0.0.0:8601"), "--token-file"),
+        (("serve", "--robot", "r2d2"), "puma560"),
+        (("serve", "--link-loss", "pray"), "halt or hold"),
+        (("serve", "--robot-at", "no:port:here"), "robot-at"),
+        (("serve", "--delay", "never"), "delay"),
+        (("robot", "--body", "jelly"), "puma560"),
+        (("robot", "--pose", "lotus"), "nominal"),
+        (("robot", "--offset", "fixed"), "fixed:S"),
+        (("robot", "--timeout", "9"), "0.1"),
+        (("robot", "--lead", "0"), "0.01"),
+        (("robot", "--listen", "127.0.0.1:99999"), "listen"),
+    ],
+)
+def test_doors_say_what_is_allowed(capsys, arguments, said):
+    assert _status(list(arguments)) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("vrs: ")
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_token_file_is_made_for_its_owner_alone(tmp_path):
+    from interfaces.cli.doors import access_for
+    from interfaces.stream.access import read_tokens
+    from interfaces.stream.control import Role
+
+    path = tmp_path / "tokens"
+    access = access_for("192.0.2.1", path, free={Role.SITE})
+    assert path.stat().st_mode & 0o777 == 0o600
+    tokens = read_tokens(path)
+    assert set(tokens) == set(Role)
+    assert access.refusal(Role.SITE, None) != ""
+    assert access.refusal(Role.SITE, tokens[Role.VIEWER]) != ""
+    assert access.refusal(Role.SITE, tokens[Role.SITE]) == ""
+    again = access_for("127.0.0.1", path, free={Role.SITE})
+    assert again.refusal(Role.OPERATOR, tokens[Role.ADMIN]) == ""

@@ -272,7 +272,7 @@ def test_slider_play_rate_and_markers_move_time(open_page: Any, report: str) -> 
     assert page.locator("#marks .mark-lost").count() == 1
     page.locator("#marks .mark-payload").click()
     assert page.locator("#clock").text_content() == "3.00 s"
-    page.locator("#rate").select_option("8")
+    page.locator("#rate").select_option("2")
     page.locator("#play").click()
     page.wait_for_function("report.time() > 4")
     page.locator("#play").click()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from interfaces import Supervisor
@@ -135,12 +135,12 @@ def test_an_arm_that_is_held_stops_and_goes_on_only_when_told() -> None:
     operator, robot = lab.operator, lab.robot
     lab.schedule(0.5, lambda now: operator.execute(MotionCommand(JointTarget(NOMINAL + 0.8)), now=now))
     lab.run(1.5)
-    robot.measured(NOMINAL + 0.3, now=lab.now)
+    robot.measured(NOMINAL + 0.1, now=lab.now)
     assert "from where it should be" in robot.halted
     lab.run(4.0)
     assert operator.halted == robot.halted
     assert operator.corrections[-1].error.any()
-    assert np.abs(operator.engine.joints(4.0) - NOMINAL - 0.3).max() < 1e-9
+    assert np.abs(operator.engine.joints(4.0) - NOMINAL - 0.1).max() < 1e-9
     assert "resume" in operator.execute(MotionCommand(JointTarget(NOMINAL)), now=4.0).reason
     assert operator.resume(now=4.0) == ""
     assert operator.execute(MotionCommand(JointTarget(NOMINAL), execute_at=4.5), now=4.0).stands
@@ -200,6 +200,11 @@ def test_a_supervisor_of_the_virtual_robot_moves_the_real_one() -> None:
     assert lab.operator.receipts[1].stands
 
 
+# Starved where one joint needs all of its acceleration: it goes on at a lower pace.
+@example(
+    seed=469, loss=0.44012571245102416, duplicate=0.0001, reorder=0.4166304010247954, mean=0.42730838066067267,
+    service=Service.IN_ORDER,
+)  # fmt: skip
 @settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
 @given(
     seed=st.integers(0, 1000), loss=st.floats(0, 0.5), duplicate=st.floats(0, 0.5), reorder=st.floats(0, 0.5),

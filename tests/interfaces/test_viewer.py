@@ -291,7 +291,7 @@ def test_a_long_history_comes_in_parts_over_a_bad_link_while_the_arm_moves():
     for k in range(10):
         joined.run(1.0)
         joined.engine.execute(to(k, insertion=Insertion.APPEND))
-    joined.run(10.0)
+    joined.run(30.0)
     t = np.linspace(0, 80, 5000)
     assert len(viewer.timeline) == len(joined.engine.timeline) > 5000
     assert np.abs(viewer.timeline.sample(t) - joined.engine.joints(t)).max() < 1e-9

@@ -145,7 +145,7 @@ def test_a_robot_that_cannot_follow_stops_and_the_run_ends():
     assert not told(run, "unfinished")
     assert run.corrections
     assert run.q_shown[-1] == pytest.approx(PLAN.start, abs=1e-9)
-    assert any("robot stopped by itself" in r.reason for r in run.receipts_virtual)
+    assert any("robot doesn't follow" in r.reason for r in run.receipts_virtual)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -46,22 +47,31 @@ def spaced() -> Timeline:
 
 
 class Run:
-    """A playout fed with messages that say c = sent at given arrivals, and where it was at each tick."""
+    """A playout fed with messages that say c = sent at given arrivals, and where it was at each tick.
 
-    def __init__(self, timeline: Timeline, sent: Array, arrived: Array, offset: float, **options: object) -> None:
+    The driver comes late to its deadlines by the given times [s], in turn.
+    """
+
+    def __init__(
+        self, timeline: Timeline, sent: Array, arrived: Array, offset: float, late: Sequence[float] = (0.0,),
+        **options: object,
+    ) -> None:  # fmt: skip
         self.timeline = timeline
         self.playout = Playout(timeline, LIMITS, now=0.0, p=offset, **options)  # type: ignore[arg-type]
         self.playout.aim(offset, now=0.0)
         states: list[PlayState] = []
         self.over = -np.inf
         grid, k, message, now = np.arange(0.0, arrived[-1] + 40.0, GRID), 0, 0, 0.0
+        turns = 0
         while now < grid[-1]:
             due = self.playout.next_deadline()
             coming = float(arrived[message]) if message < len(arrived) else np.inf
-            now = min(np.inf if due is None else due, coming, float(grid[-1]))
-            high = int(np.searchsorted(grid, now))
+            turns += 1
+            wanted = np.inf if due is None else due + late[turns % len(late)]
+            now = max(now, min(wanted, coming, float(grid[-1])))
+            high = max(int(np.searchsorted(grid, now - (0.01 if any(late) else 0.0))), k)
             if high > k:
-                state = self.playout.at(grid[k:high])
+                state = self.playout.foreseen(grid[k:high])
                 self.over = max(self.over, float((state.p - self.playout.complete_until).max()))
                 states.append(state)
                 k = high
@@ -86,6 +96,58 @@ class Run:
         velocity = np.abs(np.diff(qd * pace, axis=0))
         assert (velocity <= LIMITS.qdd_max * GRID * (1 + 1e-6) + 1e-9).all()
         assert self.p[-1] > timeline.end
+
+
+@settings(max_examples=15, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+@given(
+    st.integers(0, 10), st.lists(st.floats(0.0, 2.0), min_size=5, max_size=30), st.floats(0.5, 8.0),
+    st.floats(0.02, 3.0),
+)  # fmt: skip
+def test_who_stood_still_finds_what_was_foreseen(
+    seed: int, delays: list[float], stands_at: float, still: float
+) -> None:
+    timeline = plan(seed)
+    sent, arrived = messages(timeline, np.array(delays), 0.05)
+    playout = Playout(timeline, LIMITS, now=0.0, p=-1.0)
+    playout.aim(-1.0, now=0.0)
+    for c, now in zip(sent, arrived, strict=True):
+        if now > stands_at:
+            break
+        while (due := playout.next_deadline()) is not None and due <= now:
+            playout.advance(now=due)
+        playout.hear(float(c), timeline, now=float(now))
+    while (due := playout.next_deadline()) is not None and due <= stands_at:
+        playout.advance(now=due)
+    t = stands_at + 0.001 * np.arange(-200, 4000)
+    before = len(playout.stretches), playout.next_deadline(), playout.at(t[:200])
+    parts = [playout.foreseen(t[k : k + 500]) for k in range(0, len(t), 500)]
+    whole = playout.foreseen(t)
+    after = len(playout.stretches), playout.next_deadline(), playout.at(t[:200])
+    assert before[:2] == after[:2]
+    assert all(map(np.array_equal, before[2], after[2]))
+    for column, part in zip(whole, zip(*parts, strict=True), strict=True):
+        assert np.array_equal(column, np.concatenate(part))
+    pace, rate = whole.pace[:, None], whole.rate[:, None]
+    qd, qdd = timeline.sample(whole.p, derivative=1), timeline.sample(whole.p, derivative=2)
+    assert whole.p.max() <= playout.complete_until + 1e-9
+    assert (np.abs(qdd * pace**2 + qd * rate) <= LIMITS.qdd_max * (1 + 1e-9)).all()
+    assert (np.abs(np.diff(qd * pace, axis=0)) <= LIMITS.qdd_max * 0.001 * (1 + 1e-6) + 1e-9).all()
+    assert not (qd * pace)[-1].any()
+    playout.advance(now=stands_at + still)
+    over = t < stands_at + still - 0.01
+    for column, found in zip(whole, playout.at(t[over]), strict=True):
+        assert np.array_equal(column[over], found)
+    assert len(playout.foreseen(t[:0]).p) == 0
+
+
+@settings(max_examples=15, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+@given(
+    st.integers(0, 10), st.lists(st.floats(0.0, 1.0), min_size=5, max_size=30),
+    st.lists(st.floats(0.0, 0.6), min_size=3, max_size=20),
+)  # fmt: skip
+def test_a_driver_that_is_often_late_keeps_the_laws(seed: int, delays: list[float], late: list[float]) -> None:
+    timeline = plan(seed)
+    Run(timeline, *messages(timeline, np.array(delays), 0.05), -1.0, late=late).check()
 
 
 def messages(timeline: Timeline, delays: Array, beat: float) -> tuple[Array, Array]:

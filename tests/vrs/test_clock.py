@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vrs.clock import ManualClock, SlewedClock
+from vrs.clock import ManualClock, SlewedClock, WallClock
 from vrs.errors import InvalidValueError
 
 SHIFTS = st.floats(-4000.0, 4000.0)
@@ -98,3 +98,13 @@ def test_nonsense_is_refused_and_changes_nothing():
     with pytest.raises(InvalidValueError):
         SlewedClock(base, D=math.inf)
     assert (clock.now(), clock.target) == (3.0, 2.0)
+
+
+def test_a_wall_clock_can_be_made_again_from_its_origin():
+    clock = WallClock(5.0)
+    before = clock.now()
+    again = WallClock.since(clock.origin).now()
+    assert before <= again <= clock.now()
+    assert again >= 5.0
+    with pytest.raises(InvalidValueError, match="origin"):
+        WallClock.since(math.nan)

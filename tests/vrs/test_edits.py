@@ -378,6 +378,21 @@ class TestStop:
         assert engine.timeline == before
         assert engine.receipts[:3] == receipts
 
+    def test_what_follows_may_be_too_short_to_last_at_its_time(self):
+        engine = Engine(MODEL, q=A)
+        engine.execute(to(B, 0.1))
+        engine.execute(to(C, float(np.nextafter(np.nextafter(0.1, 1.0), 1.0))))
+        engine.execute(Retime(2, 0.0, issued_at=0.0))
+        engine.cancel(2)
+        last = engine.timeline.segments[-1]
+        assert last.end == last.start == engine.timeline.end
+        before = engine.timeline
+        engine.execute(Stop(issued_at=0.0, execute_at=0.0))
+        assert len(engine.timeline) == 0
+        assert engine.resume().status is Status.ACCEPTED
+        assert list(engine.timeline.segments) == list(before.segments)
+        check(engine)
+
 
 class TestSteering:
     def test_inputs_in_a_row_are_one_command_and_end_by_themselves(self):
@@ -479,3 +494,76 @@ def test_a_move_cut_a_moment_after_its_start_is_not_rounded():
     for a, b in pairwise(mine):
         jump = a.value(a.end, derivative=2) - b.value(b.start, derivative=2)
         assert np.abs(jump).max() <= 1e-9
+
+
+def test_a_retime_leaves_alone_what_moved_before_a_stop():
+    engine = Engine(MODEL, q=A)
+    end = engine.execute(to(B, 0.5)).end
+    engine.stop(execute_at=end - 1e-12)
+    engine.resume()
+    assert engine.receipt(1).is_still
+    t = 0.5 * (engine.timeline.segments[-1].start + end)
+    past = np.linspace(0.0, t, 500)[:-1]
+    was = engine.joints(past)
+    assert engine.retime(1, t).execute_at == t
+    assert np.array_equal(engine.joints(past), was)
+    check(engine)
+
+
+def test_a_stop_of_what_moved_before_another_stop_resumes_behind_it():
+    engine = Engine(MODEL, q=A)
+    end = engine.execute(to(B, 0.5)).end
+    engine.stop(execute_at=end - 1e-12)
+    engine.resume()
+    engine.stop(execute_at=0.9)
+    t = engine.resume().execute_at
+    moves = [s for s in engine.timeline.segments if s.start >= t]
+    assert [s.command_id for s in moves] == [1] * len(moves)
+    assert np.abs(engine.joints(engine.timeline.end) - B).max() < 1e-9
+    assert engine.timeline.end < 2 * end
+    check(engine)
+
+
+def test_a_smooth_move_joins_what_it_did_before_a_stop_without_a_jump():
+    smooth = Profile.JERK_LIMITED
+    engine = Engine(MODEL, q=A)
+    engine.execute(to(B, 0.5, profile=smooth))
+    engine.execute(to(C, 0.5 + 1e-7, profile=smooth))
+    engine.stop(execute_at=1.0)
+    engine.resume()
+    answer = engine.retime(2, 0.5 + 5e-8)
+    assert answer.status is Status.ACCEPTED
+    assert "parabolas" not in answer.reason
+    check(engine, smooth=True)
+
+
+def rounded_up(clock: ManualClock) -> tuple[Engine, float, float]:
+    """A plan, the time that a receipt says its move 2 begins, and the knot, an ulp earlier, where it does."""
+    engine = Engine(MODEL, q=A, clock=clock)
+    engine.execute(to(B, 0.5))
+    engine.execute(to(C, 0.788))
+    start = engine.retime(2, 2.1).execute_at
+    knot = next(s.start for s in engine.timeline.segments if s.command_id == 2)
+    assert 0.0 < start - knot <= 1e-12
+    return engine, start, knot
+
+
+def test_a_move_is_taken_out_whole_at_the_time_that_its_receipt_says():
+    engine, start, knot = rounded_up(ManualClock())
+    engine.cancel(2, execute_at=start)
+    assert 2 not in [s.command_id for s in engine.timeline.segments]
+    assert engine.timeline.end == knot
+    check(engine)
+
+
+@pytest.mark.parametrize("command", [Retime(2, 5.0), Cancel(2)])
+def test_rounding_never_lets_an_edit_change_the_past(command):
+    clock = ManualClock()
+    engine, start, knot = rounded_up(clock)
+    clock.advance(start - clock.now())
+    assert clock.now() == start
+    engine.execute(command)
+    mine = [s for s in engine.timeline.segments if s.command_id == 2]
+    assert mine
+    assert mine[0].start == knot
+    check(engine)

@@ -42,6 +42,18 @@ def leaf_of(timeline: Timeline, index: int) -> object:
     return timeline._locate(index)[0]
 
 
+def test_knots_are_the_segments_starts_and_first_velocities_across_leaves():
+    timeline = drifting(130)
+    timeline = timeline.edited(timeline.end, [Piece([0.5], [timeline.final()[None]], HOLD)])
+    timeline = timeline.edited(20.0, [Piece([2.0], [np.ones((3, 6))], 999)], tail=60, tail_start=23.0)
+    for low, high in ((0, len(timeline)), (0, 1), (40, 41), (30, 90), (47, 48), (5, 5)):
+        starts, qd = timeline.knots(low, high)
+        assert starts.tolist() == [timeline.start_of(i) for i in range(low, high)]
+        assert np.array_equal(qd, np.array([timeline.state_after(i).qd for i in range(low, high)]).reshape(-1, 6))
+        owners = dict.fromkeys(timeline.owner_of(i) for i in range(low, high))
+        assert timeline.owners(low, high) == tuple(owner for owner in owners if owner != HOLD)
+
+
 def test_scalar_and_batch_agree_and_with_the_segments():
     timeline = drifting(400)
     t = np.random.default_rng(1).uniform(0, timeline.end + 1, 500)

@@ -405,6 +405,24 @@ def test_many_times_a_segment_and_few_agree():
             assert (np.abs(batch - each) <= (1e-14 if order == 0 else 0.0) * np.maximum(1, np.abs(batch))).all()
 
 
+@pytest.mark.parametrize("derivative", range(4))
+def test_times_over_many_nodes_are_as_the_segments_have_them(derivative: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(tree, "LEAF", 8)
+    monkeypatch.setattr(tree, "CAPACITY", 8)
+    monkeypatch.setattr(evaluation, "_DENSE", 200)
+    monkeypatch.setattr(evaluation, "_GATHERED", 400)
+    rng = np.random.default_rng(6)
+    timeline = Timeline(np.zeros(N))
+    # Cubic nodes in a row, more than are gathered at once, and now and then one of a higher degree between them.
+    for k in range(300):
+        timeline = timeline.edited(timeline.end, [piece(rng, k + 1, 5, orders=9 if k % 50 == 30 else 5)])
+    t = np.sort(rng.uniform(timeline.start, timeline.end, 4000))
+    segments = timeline.segments
+    want = [segments[timeline.index_at(x)].value(x, derivative=derivative) for x in t.tolist()]
+    timeline.sample(t)
+    assert np.array_equal(timeline.sample(t, derivative=derivative), want)
+
+
 def test_a_state_before_is_that_of_the_earlier_segment_and_clean_at_rest():
     # A parabola that ends at rest, up to rounding; then a cubic that doesn't.
     down = np.array([[0.0] * N, [0.2 + 1e-13] * N, [-0.1] * N])
@@ -456,3 +474,54 @@ def test_long_certified_motions_sample_alike_one_by_one():
         batch = timeline.sample(t)
         each = np.array([timeline.sample(x) for x in t.tolist()])
         assert (np.abs(batch - each) <= 2e-15 * np.maximum(1, np.abs(batch))).all()
+
+
+def check_at_knots(timeline: Timeline) -> None:
+    """One by one, indexed and many at once, the last segment that doesn't start after a time counts."""
+    knots = np.array([timeline.start_of(i) for i in range(len(timeline))])
+    t = np.sort(
+        np.concatenate([np.repeat(knots, 100), np.linspace(timeline.start, timeline.end, 2000, endpoint=False)])
+    )
+    last = len(knots) - 1 - np.argmax(knots[::-1] <= t[:, None], axis=1)
+    want = [timeline.segment(i).value(x)[0] for i, x in zip(last.tolist(), t.tolist(), strict=True)]
+    for _ in range(2):
+        assert np.array_equal(timeline.sample(t)[:, 0], want)
+        assert np.array_equal([timeline.sample(x)[0] for x in t.tolist()], want)
+
+
+def stairs(count: int, first: int = 0) -> list[np.ndarray]:
+    """Coefficients of segments that can be told apart by their values."""
+    return [np.full((1, 1), 1e-8 * (first + i)) for i in range(count)]
+
+
+def test_a_segment_that_is_only_rounding_starts_no_later_than_what_follows_it():
+    timeline = Timeline(np.zeros(1), 1000.0).edited(1000.0, [Piece([0.7] * 5, stairs(5), 1)])
+    follows = np.nextafter(timeline.start_of(3), 0.0)
+    new = Piece([timeline.start_of(3) - timeline.start_of(2), 1e-13], stairs(2, 5), 2)
+    after = timeline.edited(timeline.start_of(2), [new], 4, float(follows))
+    starts = [segment.start for segment in after.segments]
+    assert starts == sorted(starts)
+    assert starts[-1] == follows
+    check_at_knots(after)
+
+
+@pytest.mark.usefixtures("small_nodes")
+def test_leaves_that_overlap_by_rounding_are_read_alike():
+    rng = np.random.default_rng(373)
+    durations = 1e-3 * 0.5 ** rng.integers(30, 52, 24)
+    timeline = Timeline(np.zeros(1)).edited(0.0, [Piece(durations.tolist(), stairs(24), 1)])
+    for _ in range(3):
+        index = int(rng.integers(0, 12))
+        start = timeline.start_of(index)
+        timeline = timeline.edited(start, [], index, start + float(rng.uniform(0.0, 1.0)))
+    starts = np.array([segment.start for segment in timeline.segments])
+    assert (np.diff(starts) < 0).any()
+    check_at_knots(timeline)
+
+
+def test_segments_that_overlap_by_rounding_are_put_in_order():
+    spans = [(0.0, 1.0), (1.0, 1e-10), (1.0 - 5e-10, 1.0), (2.0 - 5e-10, 1.0)]
+    rows = stairs(len(spans))
+    timeline = Timeline(np.zeros(1), 0.0, [PolynomialSegment(*at, a) for at, a in zip(spans, rows, strict=True)])
+    assert [segment.start for segment in timeline.segments] == [0.0, 1.0, 1.0, 2.0 - 5e-10]
+    check_at_knots(timeline)

@@ -11,6 +11,7 @@ import pytest
 
 from robots import puma560
 from vrs import (
+    Cancel,
     Engine,
     Insertion,
     JointTarget,
@@ -19,6 +20,7 @@ from vrs import (
     MotionCommand,
     PolynomialSegment,
     Profile,
+    Resume,
     Retime,
     ScaleTime,
     Stop,
@@ -222,6 +224,39 @@ def test_an_edit_of_the_past_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
     with pytest.raises(LawBrokenError, match="the past"):
         watch.execute(Retime(3, 8.0))
+
+
+def cut_short(late: float = 0.0) -> tuple[Watch, float]:
+    """A watch over a move whose receipt lies an ulp after its knot, and that time; with a clock."""
+    watch = Watch(Engine(MODEL, q=A, clock=ManualClock()))
+    watch.execute(MotionCommand(JointTarget(B), None, 0.5))
+    watch.execute(MotionCommand(JointTarget(C), None, 0.788))
+    watch.execute(Retime(2, 2.1))
+    knot = next(s.start for s in watch.engine.timeline.segments if s.command_id == 2)
+    assert 0.0 < 2.1 - knot <= 1e-12
+    return watch, 2.1 + late
+
+
+def test_a_move_taken_out_at_its_receipts_time_breaks_no_law() -> None:
+    watch, t = cut_short()
+    assert watch.execute(Cancel(2, execute_at=t)).undone
+
+
+def test_a_move_under_way_that_is_taken_out_whole_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    watch, t = cut_short(late=1e-6)
+    execute = Engine.execute
+    monkeypatch.setattr(Engine, "execute", lambda engine, _: execute(engine, Cancel(2)))
+    with pytest.raises(LawBrokenError, match="the past"):
+        watch.execute(Cancel(2, execute_at=t))
+
+
+def test_a_retime_of_the_rest_after_a_stop_breaks_no_law() -> None:
+    watch = Watch(Engine(MODEL, q=A))
+    end = watch.execute(MotionCommand(JointTarget(B), None, 0.5)).end
+    watch.execute(Stop(execute_at=end - 1e-12))
+    watch.execute(Resume())
+    watch.execute(Retime(1, end - 0.1))
+    assert watch.engine.receipt(1).execute_at == end - 0.1
 
 
 @pytest.mark.parametrize("command", [ScaleTime(0.5, execute_at=0.9), Stop(execute_at=0.9)])

@@ -48,7 +48,7 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan,
 
 
 def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[Plan, str]:
-    """Plan from rest to a moving state.
+    """Plan from rest to a state that moves or accelerates.
 
     Args:
         start: Where it begins [rad], (n,).
@@ -62,7 +62,7 @@ def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[
     Raises:
         PlanningError: If no plan keeps the limits.
     """
-    if not any(goal.qd.tolist()):
+    if not any(goal.qd.tolist()) and not any(goal.qdd.tolist()):
         return rest_to_rest(start, goal.q, speed, limits), ""
     still = np.zeros(len(start))
     plan = online(State(start, still, still), goal, speed, limits, order=3)

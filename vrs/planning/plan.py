@@ -13,12 +13,15 @@ from vrs.chunk import State
 from vrs.model import Array
 from vrs.planning.bounds import TOLERANCE
 from vrs.planning.certificate import violation
+from vrs.polynomials import state_of
+from vrs.segment import evaluate
 
 __all__ = [
     "TAYLOR",
     "TOLERANCE",
     "Plan",
     "empty",
+    "end_position",
     "end_state",
     "integrate",
     "packed",
@@ -67,15 +70,23 @@ class Plan:
         orders = self.orders or _orders(a)
         return [row if order == len(row) else row[:order] for row, order in zip(a, orders, strict=True)]
 
+    def packed_rows(self) -> list[bytes]:
+        """The same as bytes, in C order: what a timeline keeps."""
+        m, K, n = self.coefficients.shape
+        data, size = self.coefficients.tobytes(), 8 * n
+        begins = range(0, m * K * size, K * size)
+        orders = self.orders or _orders(self.coefficients)
+        return [data[begin : begin + order * size] for begin, order in zip(begins, orders, strict=True)]
+
 
 def _orders(a: Array) -> list[int]:
     """How many coefficients of each segment aren't leading zeros, at least 1."""
     K = a.shape[1]
     orders = [K] * len(a)
-    for i, leading in enumerate(np.logical_or.reduce(a[:, -1], axis=1).tolist()):
-        if not leading:
+    # Of few numbers, `any` of a list is ten times quicker than an array's.
+    for i, leading in enumerate(a[:, -1].tolist()):
+        if not any(leading):
             order = K - 1
-            # Of few numbers, `any` of a list is ten times quicker than an array's.
             while order > 1 and not any(a[i, order - 1].tolist()):
                 order -= 1
             orders[i] = max(order, 1)
@@ -146,11 +157,11 @@ def integrate(state: State, durations: Array, control: Array, order: int) -> Pla
 
 def end_state(plan: Plan) -> State:
     """Where a plan that isn't empty ends."""
-    h, a = float(plan.durations[-1]), plan.coefficients[-1]
-    q = a[-1].copy()
-    qd, qdd = np.zeros_like(q), np.zeros_like(q)
-    for row in a[-2::-1]:
-        qdd = qdd * h + qd
-        qd = qd * h + q
-        q = q * h + row
-    return State(q, qd, 2.0 * qdd)
+    last = plan.coefficients[-1]
+    q, qd, qdd = state_of(last.tobytes(), last.shape[1], float(plan.durations[-1]))
+    return State(np.array(q), np.array(qd), np.array(qdd))
+
+
+def end_position(plan: Plan) -> Array:
+    """Where a plan that isn't empty ends, (n,) [rad]."""
+    return evaluate(plan.coefficients[-1], float(plan.durations[-1]), 0)

@@ -5,6 +5,7 @@ Each joint has a profile: phases of constant jerk. All joints' phases together m
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from itertools import accumulate, pairwise
 from math import copysign, sqrt
@@ -14,7 +15,7 @@ import numpy as np
 
 from vrs.chunk import State
 from vrs.model import Array, Limits
-from vrs.planning.plan import Plan, empty
+from vrs.planning.plan import Plan, empty, packed
 
 Profile: TypeAlias = list[tuple[float, float, float]]
 """(duration [s], jerk [rad/s³], acceleration at its end [rad/s²]) of each phase."""
@@ -266,21 +267,25 @@ def joined(state: State, a: Sequence[float], profiles: list[Profile]) -> Plan:
     if len(grid) == 1:
         return empty(n)
     middles = [0.5 * (before + after) for before, after in pairwise(grid)]
-    at, jerks = [], []
+    at: list[float] = []
+    jerks: list[float] = []
     for profile, first in zip(profiles, a, strict=True):
         column: list[float] = []
         slopes: list[float] = []
         start, now = 0.0, first
         for h, j, after in profile:
-            while len(slopes) < len(middles) and middles[len(slopes)] < start + h:
-                column.append(now + j * (grid[len(slopes)] - start))
-                slopes.append(j)
-            start += h
-            now = after
+            end, done = start + h, len(slopes)
+            stop = bisect_left(middles, end, done)
+            column += [now + j * (t - start) for t in grid[done:stop]]
+            slopes += [j] * (stop - done)
+            start, now = end, after
         rest = [0.0] * (len(middles) - len(slopes))
-        at.append(column + rest)
-        jerks.append(slopes + rest)
-    return from_accelerations(state, np.diff(grid), np.array(at).T, np.array(jerks).T)
+        at += column + rest
+        jerks += slopes + rest
+    knots = np.array(grid)
+    return from_accelerations(
+        state, knots[1:] - knots[:-1], packed(at).reshape(n, -1).T, packed(jerks).reshape(n, -1).T
+    )
 
 
 def from_accelerations(state: State, h: Array, a: Array, jerks: Array) -> Plan:
@@ -297,8 +302,8 @@ def from_accelerations(state: State, h: Array, a: Array, jerks: Array) -> Plan:
     c[:, 3] = jerks / 6.0
     c[:, 2] = 0.5 * a
     c[0, 1], c[0, 0] = state.qd, state.q
-    gain = np.cumsum(step * (a + 0.5 * step * jerks), axis=0)
+    gain = np.add.accumulate(step * (a + 0.5 * step * jerks))
     c[1:, 1] = state.qd + gain[:-1]
-    way = np.cumsum(step * (c[:, 1] + step * (c[:, 2] + step * c[:, 3])), axis=0)
+    way = np.add.accumulate(step * (c[:, 1] + step * (c[:, 2] + step * c[:, 3])))
     c[1:, 0] = state.q + way[:-1]
     return Plan(h, c)

@@ -21,6 +21,9 @@ from vrs.receipt import Receipt
 from vrs.testing.laws import Columns
 from vrs.timeline import Timeline
 
+_ROUNDING = 1e-9
+"""Receipts' times may differ from knots by so much [s]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
@@ -69,22 +72,30 @@ class Scene:
         if isinstance(command, Retime):
             return min(self.begins(command), start)
         if isinstance(command, (Cancel, InsertVia)):
-            moment = self.moment(command, -np.inf)
-            return max(self.begins(command), moment)
+            moment, begins = self.moment(command, -np.inf), self.begins(command)
+            if isinstance(command, Cancel) and moment <= given(self.receipts[command.command_id].execute_at):
+                # What hasn't begun is taken out whole, from its knot on, but nothing that's past.
+                return begins if self.now is None else max(begins, self.now)
+            return max(begins, moment)
         return start
 
     def move_of(self, command: Retime | Cancel | InsertVia) -> int | None:
         """First segment of a move that's edited; None if it has none."""
-        old = self.old
-        near = old.index_at(given(self.receipts[command.command_id].execute_at))
-        places = (i for i in (near, near + 1, near - 1) if 0 <= i < len(old))
-        return next((i for i in places if old.owners[i] == command.command_id), None)
+        old, name = self.old, command.command_id
+        start = given(self.receipts[name].execute_at)
+        knots = np.flatnonzero(np.abs(old.starts - start) <= _ROUNDING).tolist()
+        mine = [i for i in knots if old.owners[i] == name]
+        if mine:
+            return min(mine, key=lambda i: abs(old.start_of(i) - start))
+        # It may begin with a rest; what it moved until a stop, before it began, isn't part of it.
+        near = old.index_at(start + _ROUNDING)
+        return next((i for i in (near, near + 1) if 0 <= i < len(old) and old.owners[i] == name), None)
 
     def begins(self, command: Retime | Cancel | InsertVia) -> float:
         """When a move that's edited begins [s]; receipts round."""
         start, first = given(self.receipts[command.command_id].execute_at), self.move_of(command)
         knot = start if first is None else self.old.start_of(first)
-        return knot if abs(knot - start) <= 1e-9 else start
+        return knot if abs(knot - start) <= _ROUNDING else start
 
     def first_that_stays(self, command: Retime | Cancel | InsertVia) -> int:
         """Index, in what was scheduled, of the first segment that the edit of a move must leave as it is."""

@@ -1,0 +1,73 @@
+"""What every command that listens shares: who may come in, and by which names."""
+
+from __future__ import annotations
+
+import gc
+import ipaddress
+import socket
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from interfaces.stream.access import Access
+    from interfaces.stream.control import Role
+
+
+def version() -> str:
+    """Name and version of this program."""
+    return f"vrs-teleop {metadata.version('vrs-teleop')}"
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> Access:
+    """Who may come in: with a token file whoever has a token, without one whoever is on this machine.
+
+    Args:
+        host: Where it listens.
+        token_file: Read, or made if it's missing.
+        free: Roles that need no token on loopback without a token file.
+
+    Raises:
+        InvalidValueError: If other machines would come in without tokens.
+        FormatError: If the file can't be used.
+    """
+    from interfaces.stream.access import Access, make_tokens, read_tokens
+
+    if token_file is None:
+        if not is_loopback(host):
+            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
+        return Access(free=free)
+    return Access(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), free=())
+
+
+def names_of(host: str) -> list[str]:
+    """Names by which a server is rightly addressed that listens on a host."""
+    if is_loopback(host):
+        return ["127.0.0.1", "localhost", "::1"]
+    if host not in {"0.0.0.0", "::"}:  # noqa: S104 - compared, not listened on
+        return [host]
+    own = socket.gethostname()
+    try:
+        found = {str(info[4][0]) for info in socket.getaddrinfo(own, None)}
+    except OSError:
+        found = set()
+    return sorted({"127.0.0.1", "localhost", "::1", own, *found})
+
+
+def keep_quiet() -> None:
+    """Let the garbage collector pass over all that is loaded: its long passes would stop a robot for 20 ms."""
+    gc.collect()
+    gc.freeze()

@@ -1,0 +1,163 @@
+"""`vrs robot`: only the real robot, for an operator's site somewhere else."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.doors import access_for, keep_quiet, names_of, version
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from interfaces.runtime.live.robot import LiveRobot
+
+
+BEAT = 1.0 / 30.0
+"""Time between two reports [s]."""
+
+
+def robot(
+    listen: Annotated[
+        str,
+        typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
+    ] = "127.0.0.1:8601",
+    offset: Annotated[
+        str,
+        typer.Option(
+            "--offset", metavar="OFFSET", help="How far behind the operator it plays: adaptive or fixed:S"
+        ),
+    ] = "adaptive",
+    link_loss: Annotated[
+        str,
+        typer.Option(
+            "--link-loss",
+            metavar="POLICY",
+            help="halt: stop when nothing comes for --timeout, and wait for a resume; hold: wait and go on.",
+        ),
+    ] = "halt",
+    timeout: Annotated[
+        float, typer.Option("--timeout", metavar="S", help="T_loss under halt [s], 0.1 to 2.")
+    ] = 0.5,
+    max_age: Annotated[
+        float,
+        typer.Option(
+            "--max-age",
+            metavar="S",
+            help="Oldest message that counts under halt [s], 0.01 to 2; doubt about the clocks is added.",
+        ),
+    ] = 0.5,
+    lead: Annotated[
+        float,
+        typer.Option(
+            "--lead", metavar="S", help="How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay."
+        ),
+    ] = 0.05,
+    body: Annotated[
+        str, typer.Option("--body", metavar="BODY", help="puma560 (simulated physics) or exact (follows exactly).")
+    ] = "puma560",
+    friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
+    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = "nominal",
+    token_file: Annotated[
+        Path | None,
+        typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
+    ] = None,
+    until_eof: Annotated[
+        bool, typer.Option("--until-eof", help="End when standard input does, once the robot rests.")
+    ] = False,
+) -> None:
+    """Run the real robot and its site, until Ctrl-C or SIGTERM."""
+    import uvloop
+
+    from interfaces.link.proxy import parse_address
+    from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
+    from interfaces.runtime.physics_messages import BodyKind
+    from interfaces.stream.control import Role
+    from interfaces.teleop import RobotHostConfig, RobotSiteConfig
+    from robots import puma560
+    from robots.onboard import WatchdogConfig
+
+    address = parse_address("--listen", listen)
+    model = puma560.model()
+    if pose not in model.poses:
+        raise InvalidValueError("pose", pose, f"one of {', '.join(sorted(model.poses))}")
+    if body not in set(BodyKind):
+        raise InvalidValueError("body", body, f"one of {', '.join(BodyKind)}")
+    if link_loss not in {"halt", "hold"}:
+        raise InvalidValueError("link-loss", link_loss, "halt or hold")
+    number_in("lead", lead, 0.01, 0.3, unit=" s")
+    watchdog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
+    halts = link_loss == "halt"
+    site = RobotSiteConfig(fixed_offset=_offset(offset), beat=BEAT, watchdog=watchdog if halts else None)
+    config = LiveRobotConfig(
+        model, model.poses[pose], RobotHostConfig(site=site, lead=lead), BodyKind(body), friction, version()
+    )
+    access = access_for(address.host, token_file, free={Role.SITE})
+
+    async def main() -> str:
+        return await _serve(LiveRobot(config, access), address.host, address.port, until_eof=until_eof)
+
+    problem = uvloop.run(main())
+    if problem:
+        typer.echo(f"vrs: {problem}", err=True)
+        raise typer.Exit(1)
+
+
+def _offset(text: str) -> float | None:
+    from interfaces.link import delay_profile
+    from interfaces.runtime.offset import FIXED, fixed_offset
+
+    if text == FIXED:
+        allowed = "'adaptive' or 'fixed:S', as in fixed:0.5: a robot knows no profile"
+        raise InvalidValueError("offset", text, allowed)
+    return fixed_offset(text, delay_profile("none"))
+
+
+async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> str:
+    """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
+    import asyncio
+
+    from interfaces.runtime.live.process import READY
+    from interfaces.runtime.live.robot import LARGEST
+    from interfaces.runtime.priority import hasten
+    from interfaces.stream import sockets
+    from interfaces.stream.access import hosts
+    from interfaces.stream.server import application
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, robot.ended.set)
+    listening = sockets.bind(host, port)
+    port = listening.getsockname()[1]
+    app = application(robot.routes, hosts(names_of(host), port))
+    async with sockets.serve(app, listening, largest=LARGEST), robot.running():
+        await robot.ready()
+        keep_quiet()
+        hasten(1)
+        if not robot.ended.is_set():
+            typer.echo(f"{READY}ws://{host}:{port}/site ({robot.config.model.name}, {robot.config.body})")
+            sys.stdout.flush()
+        if until_eof:
+            _end_with_input(robot)
+        await robot.ended.wait()
+        await robot.rest()
+    return robot.problem
+
+
+def _end_with_input(robot: LiveRobot) -> None:
+    """Let the robot end when standard input does."""
+    import asyncio
+    import os
+
+    loop, source = asyncio.get_running_loop(), sys.stdin.fileno()
+
+    def look() -> None:
+        if not os.read(source, 4096):
+            loop.remove_reader(source)
+            robot.ended.set()
+
+    loop.add_reader(source, look)

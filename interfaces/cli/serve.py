@@ -1,0 +1,161 @@
+"""`vrs serve`: the operator's site: virtual robot, streams, a page to look at, and a robot if there's none."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.doors import access_for, keep_quiet, names_of, version
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from interfaces.link import LinkConditions
+    from interfaces.stream.access import Access
+
+
+def serve(
+    host: Annotated[
+        str,
+        typer.Option("--host", metavar="HOST", help="Address to listen on; off loopback with --token-file only."),
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, metavar="N", help="0 for any that's free.")
+    ] = 8600,
+    robot: Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560.")] = "puma560",
+    delay: Annotated[
+        str,
+        typer.Option(
+            "--delay",
+            metavar="PROFILE",
+            help="Emulated on the way to the robot: none, constant:S, domain, country, mon, tue, wed, thu, fri, "
+            "lunar or trace:FILE.csv.",
+        ),
+    ] = "none",
+    loss: Annotated[
+        str, typer.Option("--loss", metavar="P", help="Emulated loss: a probability, or as vrs link takes it.")
+    ] = "0",
+    service: Annotated[
+        str, typer.Option("--service", metavar="ORDER", help="Emulated delivery: datagram or in-order.")
+    ] = "datagram",
+    seed: Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Seed of the emulated link.")] = 0,
+    offset: Annotated[
+        str,
+        typer.Option(
+            "--offset",
+            metavar="OFFSET",
+            help="How far the robot that this starts plays behind: adaptive, fixed (from the profile) or fixed:S.",
+        ),
+    ] = "adaptive",
+    link_loss: Annotated[
+        str,
+        typer.Option("--link-loss", metavar="POLICY", help="Of the robot that this starts: halt or hold."),
+    ] = "halt",
+    max_age: Annotated[
+        float,
+        typer.Option("--max-age", metavar="S", help="Of the robot that this starts: oldest message that counts."),
+    ] = 0.5,
+    body: Annotated[
+        str, typer.Option("--body", metavar="BODY", help="Of the robot that this starts: puma560 or exact.")
+    ] = "puma560",
+    robot_at: Annotated[
+        str | None,
+        typer.Option("--robot-at", metavar="HOST:PORT", help="Where vrs robot listens; without it one is started."),
+    ] = None,
+    robot_token_file: Annotated[
+        Path | None, typer.Option("--robot-token-file", metavar="FILE", help="Token file of that robot.")
+    ] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
+    ] = None,
+) -> None:
+    """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
+    import uvloop
+
+    from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
+    from interfaces.link.proxy import parse_address
+    from interfaces.runtime.offset import QUANTILE, fixed_offset, spelled
+    from interfaces.stream.access import OPEN, read_tokens
+    from interfaces.stream.control import Role
+
+    if robot != "puma560":
+        raise InvalidValueError("robot", robot, "puma560")
+    if link_loss not in {"halt", "hold"}:
+        raise InvalidValueError("link-loss", link_loss, "halt or hold")
+    profile = delay_profile(delay)
+    way = Conditions(delay=profile, loss=loss_model(loss), service=service)  # type: ignore[arg-type]
+    options = ["--offset", spelled(fixed_offset(offset, profile)), "--link-loss", link_loss, "--body", body]
+    options += ["--max-age", f"{max_age:g}"]
+    # Half a round trip isn't known of the clocks, and counts as age.
+    usual = 2.0 * profile.quantile(QUANTILE)
+    if link_loss == "halt" and usual > max_age:
+        typer.echo(
+            f"vrs: messages will often be {usual:.2g} s old, with what isn't known of the clocks, and those older "
+            f"than {max_age:g} s don't count: try --link-loss hold, or --max-age up to 2",
+            err=True,
+        )
+    at = None if robot_at is None else parse_address("--robot-at", robot_at)
+    token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
+    access = access_for(host, token_file, free=OPEN)
+    uvloop.run(
+        _serve(
+            access,
+            host,
+            port,
+            LinkConditions.symmetric(way),
+            seed,
+            None if at is None else f"ws://{at}/site",
+            token,
+            options,
+        )
+    )
+
+
+async def _serve(
+    access: Access,
+    host: str,
+    port: int,
+    conditions: LinkConditions,
+    seed: int,
+    robot_at: str | None,
+    robot_token: str | None,
+    options: Sequence[str],
+) -> None:
+    """Run until a signal comes."""
+    import asyncio
+    import contextlib
+
+    from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
+    from interfaces.runtime.live.process import local_robot
+    from interfaces.stream import sockets
+    from interfaces.stream.access import hosts
+    from interfaces.stream.server import application
+    from robots import puma560
+
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    model = puma560.model()
+    listening = sockets.bind(host, port)
+    port = listening.getsockname()[1]
+    async with contextlib.AsyncExitStack() as stack:
+        stack.callback(listening.close)
+        url = await stack.enter_async_context(local_robot(options)) if robot_at is None else robot_at
+        config = LiveOperatorConfig(
+            model, model.poses["nominal"], url, conditions, robot_token, seed, server=version()
+        )
+        operator = LiveOperator(config, access)
+        app = application(operator.routes, hosts(names_of(host), port))
+        await stack.enter_async_context(sockets.serve(app, listening))
+        await stack.enter_async_context(operator.running())
+        keep_quiet()
+        shown = f"[{host}]" if ":" in host else host
+        typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
+        typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}", err=True)
+        await ended.wait()

@@ -1,0 +1,38 @@
+"""`connect`: the door to a robot elsewhere. What it needs is loaded when it's called."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from interfaces.stream.connect import Connection
+
+
+def connect(
+    url: str,
+    *,
+    role: str = "operator",
+    token: str | None = None,
+    name: str = "client",
+    encoding: str = "vrs.1.msgpack",
+    timeout: float = 5.0,
+) -> Connection:
+    """Reach a robot that `vrs serve` serves.
+
+    Args:
+        url: `HOST:PORT`, `http://HOST:PORT` or `ws://HOST:PORT/ws`.
+        role: What to do: `viewer`, `operator` or `admin`.
+        token: What the role needs; none on a loopback address, but for an admin.
+        name: For people, 1 to 100 characters.
+        encoding: How messages are written, `vrs.1.msgpack` or `vrs.1.json`.
+        timeout: How long to wait for the first answer [s].
+
+    Raises:
+        UnreachableError: If there's no answer, or the server refuses.
+        ValueError: If role or encoding is none of those.
+    """
+    from interfaces.stream.codec import Encoding
+    from interfaces.stream.connect import Connection
+    from interfaces.stream.control import Role
+
+    return Connection(url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout)

@@ -1,0 +1,217 @@
+"""The operator's site, live: the virtual robot, its clients, and the line to the real one."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import secrets
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from starlette.routing import BaseRoute
+
+from interfaces.link import LinkConditions
+from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.runtime.live.turning import Turning
+from interfaces.site import Site
+from interfaces.stream.access import Access
+from interfaces.stream.control import Role, State
+from interfaces.stream.hub import Hub, HubConfig
+from interfaces.stream.meshcat import Committed, MeshcatScene
+from interfaces.stream.meshcat.page import routes as view_routes
+from interfaces.stream.server import HubServer
+from interfaces.teleop import OperatorSite, OperatorSiteConfig, Report, RobotLine
+from robots.onboard.lease import Ended, Grant, Lease
+from vrs.clock import WallClock, seconds_since_1970
+from vrs.commands import Stop
+from vrs.errors import VrsError
+from vrs.model import Array, RobotModel
+
+SHOW = 1.0 / 60.0
+"""Time between two frames of the view [s]."""
+UNHEARD = 0.75
+"""A robot of which nothing has come for so long [s] isn't connected, as clients are told."""
+GONE = 2.0
+"""A robot of which nothing has come for so long [s] has stopped by itself, as far as a lease is concerned."""
+NOT_MET = "the robot hasn't been met yet"
+"""Why nothing can be commanded at first."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveOperatorConfig:
+    """An operator's site."""
+
+    model: RobotModel
+    q: Array
+    """Where the virtual robot stands at first [rad], (n,); it goes to where the real one is met."""
+    robot: str
+    """Where the robot's site listens: `ws://HOST:PORT/site`."""
+    conditions: LinkConditions
+    """What is emulated on the way to the robot, both ways."""
+    robot_token: str | None = field(default=None, repr=False)
+    """Token of the role `site` at the robot."""
+    seed: int = 0
+    """Seed of the emulated link, ≥ 0."""
+    rates: tuple[float, ...] = (60.0, 30.0, 10.0)
+    """Rates of the broadcasters [1/s]."""
+    site: OperatorSiteConfig = field(default_factory=OperatorSiteConfig)
+    """How the operator's site sends."""
+    server: str = "vrs"
+    """Name and version of the program."""
+
+
+class LiveOperator:
+    """The virtual robot and all that joins it to people and to the real one. Enter `running` in its loop."""
+
+    def __init__(self, config: LiveOperatorConfig, access: Access) -> None:
+        """Session time begins here.
+
+        Args:
+            config: The site.
+            access: Who may do what.
+        """
+        self.config = config
+        self.clock = WallClock()
+        self.operator = OperatorSite(config.model, config.q, now=0.0, config=config.site, halted=NOT_MET)
+        self.site = Site(self.operator.engine)
+        self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
+        self._turning = Turning(self.clock, self._turn)
+        self.robot = RobotClient(self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token)
+        # Every lease of an earlier life has a smaller epoch.
+        lease = Lease(epoch=int(seconds_since_1970()) << 32)
+        hub = HubConfig(rates=config.rates, server=config.server, instance=secrets.token_urlsafe(9))
+        self.hub = Hub(self.site, lease, access, self, config=hub)
+        self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
+        self.scene = MeshcatScene(config.model)
+        self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
+        self._wants_resume = self._ending = False
+        self._shown: tuple[Report | None, bool, str] = (None, False, "")
+        self._states = 0
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """What it answers."""
+        return [*self.server.routes, *self._view]
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[LiveOperator]:
+        """Serve clients, and keep the robot connected."""
+        async with self.server.running():
+            tasks = [asyncio.create_task(self.robot.run()), asyncio.create_task(self._draw())]
+            self._turning.start()
+            try:
+                yield self
+            finally:
+                self._turning.stop()
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _draw(self) -> None:
+        """Draw both robots for those who look."""
+        links = self.config.model.links
+        while True:
+            await asyncio.sleep(SHOW)
+            if not self.scene.viewers:
+                continue
+            now, report, timeline = self.clock.now(), self.operator.report, self.operator.engine.timeline
+            real = None if report is None else links(report.q)
+            follows = report is not None and not self.operator.halted
+            path = Committed(timeline, report.q_at) if follows and report is not None else None
+            self.scene.show(virtual=links(timeline.sample(now)), real=real, path=path, now=now)
+
+    def _turn(self, now: float) -> float | None:
+        version = self.operator.engine.timeline.version
+        for message in self.line.advance(now=now):
+            self.robot.send(message)
+        if self._wants_resume and (not self.operator.halted or not self.operator.resume(now=now)):
+            self._wants_resume = False
+        self._end_lease(now)
+        self._show()
+        if self.operator.engine.timeline.version != version:
+            self.server.kick()
+        return self.line.next_deadline()
+
+    def began(self, grant: Grant, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+        """A lease has begun: a robot that had stopped by itself may go on."""
+        self._wants_resume = True
+        self._turning.soon()
+
+    def ended(self, ended: Ended, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+        """A lease has ended: the robots stop on their way."""
+        self._ending, self._wants_resume = True, False
+        with contextlib.suppress(VrsError):
+            self.operator.execute(Stop(), now=now)
+        self._turning.soon()
+
+    def resume(self, epoch: int, *, now: float) -> str:  # noqa: ARG002 - the hub says it
+        """Let a robot go on that stopped by itself; why it can't, empty if it does."""
+        return self.operator.resume(now=now)
+
+    def _end_lease(self, now: float) -> None:
+        """Let the next one have the lease once both robots rest."""
+        report, end = self.operator.report, self.operator.engine.timeline.end
+        if not self._ending or now < end:
+            return
+        heard = self.line.silence(now=now) < GONE
+        if report is not None and heard and not report.halted:
+            follows = report.epoch != self.operator.epoch or report.play < end
+        else:
+            follows = False
+        if not follows:
+            self._ending = False
+            self.hub.stopped(now=now)
+            self.server.kick()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the robot's site is heard of."""
+        return self.line.connected and self.clock.now() - self.robot.heard < UNHEARD
+
+    def _show(self) -> None:
+        """Tell clients where the real robot is, when that's news."""
+        report = self.operator.report
+        shown = report, self.connected, self.operator.halted
+        if report is None or shown == self._shown:
+            return
+        self._shown = shown
+        self._states += 1
+        expected = self.operator.engine.timeline.sample(report.q_at)
+        self.hub.show(
+            State(
+                number=self._states,
+                t=report.measured_at,
+                q=report.q,
+                play=report.q_at,
+                pace=report.pace,
+                D=report.q_at - report.measured_at,
+                following_error=float(np.abs(expected - report.q).max()),
+                epoch=report.epoch,
+                connected=self.connected,
+                halted=self.operator.halted,
+                corrections=len(self.operator.corrections),
+            )
+        )
+        self.server.kick()
+
+    def health(self) -> dict[str, Any]:
+        """How it is, for `/health`."""
+        report, attached = self.operator.report, self.robot.attached
+        silence = self.clock.now() - self.robot.heard
+        return {
+            "robot_at": self.config.robot,
+            "delay": self.config.conditions.forward.delay.name,
+            "connected": self.connected,
+            "problem": self.robot.problem,
+            "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
+            "halted": self.operator.halted,
+            "epoch": self.operator.epoch,
+            "corrections": len(self.operator.corrections),
+            "behind": None if report is None or report.halted else report.measured_at - report.q_at,
+            "link_loss": None if attached is None else attached.link_loss,
+            "offset": None if attached is None else attached.offset,
+            "timer_late": self._turning.latest,
+        }

@@ -1,0 +1,69 @@
+"""A robot's site as a child process: started, found, and ended."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import sys
+from collections.abc import AsyncIterator, Sequence
+
+from vrs.errors import VrsError
+
+READY = "vrs: robot listens on "
+"""What a robot's site says on standard output before its address."""
+_START = 60.0
+"""Time for it to be ready [s]."""
+_END = 4.0
+"""Time for it to come to rest and end [s]."""
+
+
+class RobotStartError(VrsError):
+    """The robot's site couldn't be started."""
+
+    def __init__(self, problem: str) -> None:
+        self.problem = problem
+        super().__init__(f"the robot's site didn't start: {problem}")
+
+
+@contextlib.asynccontextmanager
+async def local_robot(options: Sequence[str]) -> AsyncIterator[str]:
+    """Run `vrs robot` on a loopback port meanwhile; it ends by itself if this process does.
+
+    Args:
+        options: Of `vrs robot`, but for the address.
+
+    Returns:
+        Where its site listens.
+
+    Raises:
+        RobotStartError: If it isn't ready in time.
+    """
+    command = [sys.executable, "-P", "-m", "interfaces.cli", "robot", "--listen", "127.0.0.1:0", "--until-eof"]
+    process = await asyncio.create_subprocess_exec(
+        *command,
+        *options,
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+        start_new_session=True,
+    )
+    try:
+        assert process.stdout is not None
+        try:
+            async with asyncio.timeout(_START):
+                line = (await process.stdout.readline()).decode().strip()
+        except TimeoutError:
+            raise RobotStartError(f"it said nothing for {_START:g} s") from None
+        if not line.startswith(READY):
+            raise RobotStartError(line or "it ended at once")
+        yield line.removeprefix(READY).split()[0]
+    finally:
+        if process.stdin is not None:
+            process.stdin.close()
+        try:
+            async with asyncio.timeout(_END):
+                await process.wait()
+        except TimeoutError:
+            process.kill()
+            await process.wait()

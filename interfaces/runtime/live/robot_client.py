@@ -1,0 +1,141 @@
+"""The operator's connection to a robot's site: made again whenever it breaks."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import secrets
+from collections import deque
+from collections.abc import Callable
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import WebSocketException
+from websockets.typing import Subprotocol
+
+from interfaces.stream.codec import Encoding, decode, encode
+from interfaces.stream.control import Attached, Hello, Ping, Pong, Problem, Role
+from interfaces.stream.errors import ProtocolError
+from interfaces.teleop import Orders, Report, RobotLine
+from vrs.clock import Clock
+from vrs.errors import VrsError
+
+AGAIN = 0.25
+"""Time between two attempts to connect [s]."""
+OPENING = 3.0
+"""Longest that a connection may take to be made, and answered [s]."""
+LARGEST = 4 << 20
+"""Longest message of a robot: a plan of thousands of segments [B]."""
+_WAITING = 64
+"""Most messages that wait to be sent; older ones are dropped, for newer ones repeat what counts."""
+_BLOCKED = 2.0
+"""A connection that takes nothing for so long is broken [s]."""
+
+
+class RobotRefusedError(VrsError):
+    """A robot's site doesn't let this operator in."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        super().__init__(f"the robot's site refuses: {text}")
+
+
+class RobotClient:
+    """Keeps a `RobotLine` connected."""
+
+    def __init__(
+        self, line: RobotLine, url: str, clock: Clock, changed: Callable[[], None], *, token: str | None = None
+    ) -> None:
+        """Say where the robot is; `run` connects.
+
+        Args:
+            line: What speaks and listens.
+            url: `ws://HOST:PORT/site`.
+            clock: Session time.
+            changed: Called when something has come, or the connection has.
+            token: Of the role `site`.
+        """
+        self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
+        self._session = secrets.token_urlsafe(12)
+        self._waiting: deque[Orders | Pong] = deque(maxlen=_WAITING)
+        self._wake = asyncio.Event()
+        self.attached: Attached | None = None
+        """What the robot said of itself; None while there's no connection."""
+        self.problem = "not connected yet"
+        """Why there's no connection."""
+        self.heard = -1e9
+        """When something came off the connection last [s]; the emulated delay isn't in it."""
+        self.connections = 0
+
+    def send(self, message: Orders | Pong) -> None:
+        """Put a message on the connection."""
+        self._waiting.append(message)
+        self._wake.set()
+
+    async def run(self) -> None:
+        """Connect, and connect again, until it's cancelled."""
+        while True:
+            try:
+                await self._once()
+            except (OSError, TimeoutError, WebSocketException, ProtocolError, RobotRefusedError) as error:
+                self.problem = str(error) or type(error).__name__
+            finally:
+                self._line.connected, self.attached = False, None
+                self._changed()
+            await asyncio.sleep(AGAIN)
+
+    async def _once(self) -> None:
+        async with connect(
+            self.url,
+            subprotocols=[Subprotocol(Encoding.MSGPACK.value)],
+            compression=None,
+            open_timeout=OPENING,
+            close_timeout=0.5,
+            ping_interval=None,
+            max_size=LARGEST,
+        ) as socket:
+            hello = Hello(Role.SITE, "vrs serve", self._token, self._session)
+            await socket.send(encode(hello, Encoding.MSGPACK))
+            async with asyncio.timeout(OPENING):
+                answer = decode(_bytes(await socket.recv()), Encoding.MSGPACK, allowed=Attached | Problem)
+            if isinstance(answer, Problem):
+                raise RobotRefusedError(answer.text)
+            self.attached, self.problem = answer, ""
+            self.connections += 1
+            self._waiting.clear()
+            self._line.connected = True
+            self._changed()
+            writer = asyncio.create_task(self._write(socket))
+            try:
+                async for data in socket:
+                    self._take(_bytes(data))
+            finally:
+                writer.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await writer
+            self.problem = "the robot's site closed the connection"
+
+    def _take(self, data: bytes) -> None:
+        message: Report | Ping | Problem = decode(
+            data, Encoding.MSGPACK, allowed=Report | Ping | Problem, largest=LARGEST
+        )
+        self.heard = self._clock.now()
+        if isinstance(message, Problem):
+            self.problem = message.text
+            return
+        self._line.receive(message, now=self.heard)
+        self._changed()
+
+    async def _write(self, socket: ClientConnection) -> None:
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while self._waiting:
+                    async with asyncio.timeout(_BLOCKED):
+                        await socket.send(encode(self._waiting.popleft(), Encoding.MSGPACK))
+        except (OSError, TimeoutError, WebSocketException):
+            socket.transport.abort()
+
+
+def _bytes(data: str | bytes) -> bytes:
+    return data.encode() if isinstance(data, str) else data

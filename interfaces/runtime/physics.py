@@ -1,0 +1,333 @@
+"""A body in a process of its own, fed with references ahead of time, so that nothing here can delay a tick."""
+
+from __future__ import annotations
+
+import math
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self, TypeAlias
+
+import numpy as np
+
+from interfaces.runtime.physics_messages import (
+    MESSAGE_MOST,
+    ROWS_MOST,
+    Attach,
+    BodyKind,
+    Close,
+    Fault,
+    Measurement,
+    News,
+    Order,
+    Ready,
+    Release,
+    Rows,
+    Setup,
+    decode_news,
+    encode,
+)
+from interfaces.teleop import Reference
+from vrs.checks import number_in
+from vrs.clock import WallClock
+from vrs.commands import finite_array
+from vrs.errors import InvalidValueError, VrsError
+from vrs.model import Array, Limits
+
+TICK = 0.001
+"""Length of a tick [s]."""
+LEAD = 0.02
+"""How far ahead of the wall clock decisions are made [s], so that their rows are there in time."""
+HORIZON = 0.5
+"""How far ahead of a decision its rows reach [s], if the arm doesn't rest before."""
+SILENCE = 0.2
+"""Time without a report after which that is told [s]."""
+
+_AHEAD = ROWS_MOST // 2
+"""Most ticks ahead, and most that are given once more."""
+_START_TIME = 60.0
+"""How long the process may take to start [s]."""
+_END_TIME = 2.0
+"""How long it may take to come to rest and end [s]."""
+_STATUS_TIME = 0.05
+"""How long to wait for the exit status of a process that has closed its socket [s]."""
+_BUFFER = 1 << 20
+"""Bytes that wait in either direction, as far as the system grants them."""
+_READS_MOST = 1024
+"""Most messages taken in at a time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhysicsConfig:
+    """Which body, and where it stands."""
+
+    limits: Limits
+    """The robot's."""
+    q: Array
+    """Where it stands [rad], (n,), within the limits."""
+    body: BodyKind = BodyKind.PUMA560
+    """Which one."""
+    friction: bool = True
+    """Whether its joints have friction."""
+    every: int = 10
+    """Ticks from one report to the next, in [1, 1000]."""
+
+    def __post_init__(self) -> None:
+        n = self.limits.dof
+        q = finite_array("q", self.q, (n,), f"finite joint values [rad], shape ({n},)")
+        self.limits.check(q)
+        object.__setattr__(self, "q", q)
+        object.__setattr__(self, "body", BodyKind(self.body))
+        if isinstance(self.every, bool) or not isinstance(self.every, int):
+            raise InvalidValueError("every", self.every, "a whole number in [1, 1000]")
+        number_in("every", self.every, 1, 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class Silent:
+    """The process has said nothing for a while: it stands still, or this machine is overloaded."""
+
+    since: float
+    """When it last did, by the robot's clock [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The process is no more."""
+
+    status: int | None
+    """Its exit status, negative for the signal that ended it; None if the system doesn't know it yet."""
+
+
+Event: TypeAlias = Ready | Measurement | Fault | Silent | Ended
+
+
+class PhysicsStartError(VrsError):
+    """The process of the physics couldn't be started."""
+
+    def __init__(self, problem: str) -> None:
+        self.problem = problem
+        super().__init__(f"the physics didn't start: {problem}")
+
+
+class PhysicsProcess:
+    """The process, seen from its parent: nothing here waits, but for `close`.
+
+    A driver calls `poll` when the descriptor can be read and when `next_deadline` has come.
+    """
+
+    def __init__(self, config: PhysicsConfig, clock: WallClock) -> None:
+        """Start it; it takes references once it has said that it's ready.
+
+        Args:
+            config: Which body.
+            clock: The robot's clock, which the process then reads, too.
+
+        Raises:
+            PhysicsStartError: If it can't be started.
+        """
+        self._n, self._run = config.limits.dof, 0
+        self._heard, self._ready, self._silent = clock.now(), False, False
+        self._ended: Ended | None = None
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        for end in (ours, theirs):
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
+        self._socket = ours
+        command = [sys.executable, "-P", "-m", "interfaces.runtime.physics_process", str(theirs.fileno())]
+        try:
+            self._process = subprocess.Popen(
+                command,
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                start_new_session=True,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+            )
+        except OSError as problem:
+            ours.close()
+            raise PhysicsStartError(str(problem)) from problem
+        finally:
+            theirs.close()
+        ours.setblocking(False)
+        limits = config.limits
+        bounds = (limits.q_min, limits.q_max, limits.qd_max, limits.qdd_max, limits.qddd_max)
+        self._send(
+            Setup(
+                config.body, config.friction, TICK, config.every, clock.origin, os.getpid(),
+                tuple(config.q.tolist()), tuple(tuple(bound.tolist()) for bound in bounds),  # type: ignore[arg-type]
+            )
+        )  # fmt: skip
+
+    @property
+    def pid(self) -> int:
+        """The process's id."""
+        return self._process.pid
+
+    def fileno(self) -> int:
+        """The descriptor that can be read when there's something to `poll`."""
+        return self._socket.fileno()
+
+    def feed(self, reference: Reference, start: int, *, placed: bool = False) -> bool:
+        """Give references, which count for their ticks and instead of all that was given for later ones.
+
+        After the last one its position is held, if it's at rest; if it's not, the body brakes and tells a fault.
+
+        Args:
+            reference: A row a tick, 1 to `ROWS_MOST` of them.
+            start: Tick of the first.
+            placed: Whether the reference may jump to the first row, which is at rest where the body was measured.
+
+        Returns:
+            Whether they were sent: not before it's ready, and not when it has ended or doesn't read.
+
+        Raises:
+            InvalidValueError: If the shape isn't (k, n) three times.
+        """
+        shape = np.shape(reference.q)
+        if len(shape) != 2 or not 1 <= shape[0] <= ROWS_MOST or shape[1] != self._n:
+            raise InvalidValueError("reference", shape, f"1 to {ROWS_MOST} rows of {self._n} joints")
+        if any(np.shape(part) != shape for part in reference):
+            raise InvalidValueError("reference", [np.shape(part) for part in reference], "of one shape")
+        rows = np.stack(reference, axis=1).astype(np.float64, copy=False)
+        return self._ready and self._send(Rows(self._run, start, placed, rows.tobytes()))
+
+    def acknowledge(self, fault: Fault) -> None:
+        """Let what is fed from now on count: it begins where the fault's stop rests; see `References.restart`."""
+        self._run = max(self._run, fault.number)
+
+    def attach(self, mass: float) -> bool:
+        """Let the body take a load [kg]; returns whether that was sent.
+
+        Raises:
+            InvalidValueError: If no load has that mass.
+        """
+        from robots.bullet import Payload
+
+        return self._send(Attach(Payload(mass=mass).mass))
+
+    def release(self) -> bool:
+        """Let the body drop its load; returns whether that was sent."""
+        return self._send(Release())
+
+    def poll(self, *, now: float) -> tuple[Event, ...]:
+        """Take in what the process said, and notice if it says nothing or has ended.
+
+        Args:
+            now: By the robot's clock [s].
+        """
+        events: list[Event] = []
+        for _ in range(_READS_MOST):
+            if self._ended is not None:
+                break
+            try:
+                data = self._socket.recv(MESSAGE_MOST)
+            except BlockingIOError:
+                break
+            except ConnectionError:
+                data = b""
+            if not data:
+                events.append(self._end())
+                break
+            news: News = decode_news(data)
+            self._heard, self._silent = now, False
+            self._ready = self._ready or isinstance(news, Ready)
+            events.append(news)
+        if self._ended is None and not self._silent and now - self._heard > self._patience:
+            if not self._ready:
+                self._process.kill()
+            self._silent = True
+            events.append(Silent(self._heard))
+        return tuple(events)
+
+    def next_deadline(self) -> float:
+        """When to poll even if nothing can be read, by the robot's clock [s]."""
+        return math.inf if self._silent or self._ended is not None else self._heard + self._patience + 1e-6
+
+    @property
+    def _patience(self) -> float:
+        return SILENCE if self._ready else _START_TIME
+
+    def close(self) -> None:
+        """Let the body come to rest and the process end; it's killed if it doesn't. A second call does nothing."""
+        self._send(Close())
+        try:
+            self._process.wait(_END_TIME)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._ended = self._ended or Ended(self._process.returncode)
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _end(self) -> Ended:
+        """The process has closed its end of the socket."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(_STATUS_TIME)
+        self._ended = Ended(self._process.returncode)
+        return self._ended
+
+    def _send(self, order: Order) -> bool:
+        """Send a message, if there's room for it."""
+        if self._ended is not None:
+            return False
+        try:
+            self._socket.send(encode(order))
+        except (BlockingIOError, ConnectionError):
+            return False
+        return True
+
+
+class References:
+    """What the body is to follow, ahead of time: what is decided, and what follows if nobody decides more."""
+
+    def __init__(
+        self, reference: Callable[[Array], Reference], *, now: float, tick: float = TICK, horizon: float = HORIZON
+    ) -> None:
+        """Begin with the first tick after now.
+
+        Args:
+            reference: What it's to follow at ascending times of the robot's clock [s], (k,), if no more is heard.
+            now: For when was decided: the wall clock's time plus the lead [s].
+            tick: Length of a tick [s].
+            horizon: How far to look ahead [s], if the arm doesn't rest for good before; at most 500 ticks.
+        """
+        self._reference, self._tick = reference, tick
+        self._count = round(number_in("horizon", horizon, tick, _AHEAD * tick) / tick)
+        self._next = self._after(now)
+
+    def restart(self, *, now: float) -> None:
+        """Leave out what was before now [s]: after a fault the body holds, and follows from here on."""
+        self._next = self._after(now)
+
+    def take(self, *, now: float) -> tuple[int, Reference]:
+        """Say what to `feed`: from where it was last taken on, as all that was decided since may differ.
+
+        Args:
+            now: For when was decided [s].
+
+        Returns:
+            The first tick, and a row for it and each one after it.
+        """
+        following = self._after(now)
+        first = max(self._next, following - _AHEAD)
+        self._next = following
+        t: Array = self._tick * np.arange(first, following + self._count, dtype=np.float64)
+        reference = self._reference(t)
+        moving = np.flatnonzero(reference.qd.any(axis=1) | reference.qdd.any(axis=1))
+        count = min(int(moving[-1]) + 2 if len(moving) else 1, len(t))
+        return first, Reference(*(part[:count] for part in reference))
+
+    def _after(self, now: float) -> int:
+        return math.floor(now / self._tick + 1e-9) + 1

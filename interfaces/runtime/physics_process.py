@@ -1,0 +1,210 @@
+"""The process that runs a body at each tick: `python -m interfaces.runtime.physics_process DESCRIPTOR`.
+
+It ends when its parent does: its socket then says so, or the operating system gives it another parent.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import select
+import socket
+import sys
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from interfaces.runtime.physics_messages import (
+    MESSAGE_MOST,
+    BodyKind,
+    Measurement,
+    News,
+    Setup,
+    decode_order,
+    encode,
+)
+from interfaces.runtime.priority import hasten
+from interfaces.runtime.tick_loop import Moved, TickBody, TickLoop
+from vrs.clock import WallClock
+from vrs.errors import FormatError
+from vrs.model import Array
+
+if TYPE_CHECKING:
+    from robots.puma560.body import Prepared, RealArm
+
+_SETUP_TIME = 10.0
+"""How long to wait for the first message [s]."""
+_LOOK = 0.1
+"""How often it's looked who the parent is [s]."""
+_LAST_WORDS = 0.2
+"""How long the last message may take [s]."""
+_UNSENT_MOST = 64
+"""Most messages that wait until the parent reads."""
+
+
+class ExactTicks:
+    """A body that is where its reference is."""
+
+    def prepare(self, rows: Array) -> list[Moved]:
+        """Say where each reference is."""
+        q, qd, _ = rows.transpose(1, 0, 2).tolist()
+        return [Moved(x, v, ()) for x, v in zip(q, qd, strict=True)]
+
+    def step(self, prepared: Moved) -> Moved:
+        """Go there."""
+        return prepared
+
+    def attach(self, mass: float) -> None:
+        """Take a load, which changes nothing."""
+
+    def release(self) -> None:
+        """Drop the load, which changes nothing."""
+
+
+class PumaTicks:
+    """The PyBullet PUMA 560, a tick at a time."""
+
+    def __init__(self, arm: RealArm) -> None:
+        self._arm = arm
+
+    def prepare(self, rows: Array) -> Sequence[Prepared]:
+        """Work out the feed-forward."""
+        prepared = self._arm.prepare(*rows.transpose(1, 0, 2))
+        return [prepared.row(i) for i in range(len(rows))]
+
+    def step(self, prepared: Prepared) -> Moved:
+        """Let the servo and the physics act for a tick."""
+        measured = self._arm.follow(prepared)
+        return Moved(measured.q[0].tolist(), measured.qd[0].tolist(), measured.tau[0].tolist())
+
+    def attach(self, mass: float) -> None:
+        """Take a load that the servo doesn't know."""
+        from robots.bullet import Payload
+
+        self._arm.attach(Payload(mass=mass))
+
+    def release(self) -> None:
+        """Drop the load."""
+        self._arm.release()
+
+
+@contextmanager
+def tick_body(setup: Setup) -> Iterator[TickBody]:
+    """Make the body that the parent wants."""
+    if setup.body is BodyKind.EXACT:
+        yield ExactTicks()
+        return
+    from robots.bullet import Reality
+    from robots.puma560.body import RealArm
+
+    with RealArm(reality=Reality(friction=setup.friction, dt=setup.tick), q=setup.q) as arm:
+        yield PumaTicks(arm)
+
+
+class _Parent:
+    """The socket to the parent; nothing waits for it."""
+
+    def __init__(self, connection: socket.socket, process: int) -> None:
+        self._socket, self._process = connection, process
+        self._unsent: deque[News] = deque(maxlen=_UNSENT_MOST)
+        self.gone = False
+
+    def wait(self, seconds: float) -> bytes | None:
+        """Wait for a message, no longer than this [s]; None if there's none."""
+        if self.gone:
+            select.select([], [], [], max(seconds, 0.0))
+            return None
+        if not select.select([self._socket], [], [], max(seconds, 0.0))[0]:
+            return None
+        try:
+            data = self._socket.recv(MESSAGE_MOST)
+        except BlockingIOError:
+            return None
+        except OSError:
+            data = b""
+        self.gone = not data
+        return data or None
+
+    def tell(self, news: list[News]) -> None:
+        """Send what there is; of what doesn't fit only the measurements are lost."""
+        self._unsent.extend(news)
+        while self._unsent and not self.gone:
+            message = self._unsent.popleft()
+            try:
+                self._socket.send(encode(message))
+            except BlockingIOError:
+                kept = [m for m in (message, *self._unsent) if not isinstance(m, Measurement)]
+                self._unsent = deque(kept, maxlen=_UNSENT_MOST)
+                return
+            except OSError:
+                self.gone = True
+
+    def look(self) -> None:
+        """Notice that the parent has ended, even if somebody else has inherited its end of the socket."""
+        self.gone = self.gone or os.getppid() != self._process
+
+
+def run(connection: socket.socket) -> int:
+    """Run the body until the parent has ended or says so, and it rests.
+
+    Args:
+        connection: To the parent; its first message is the setup.
+
+    Returns:
+        The exit status: 0, 1 if the body failed, 2 if there was no setup.
+    """
+    connection.settimeout(_SETUP_TIME)
+    try:
+        setup = decode_order(connection.recv(MESSAGE_MOST))
+    except (OSError, FormatError):
+        return 2
+    if not isinstance(setup, Setup):
+        return 2
+    connection.setblocking(False)
+    clock, parent = WallClock.since(setup.origin), _Parent(connection, setup.parent)
+    with tick_body(setup) as body:
+        realtime = hasten(2)
+        # What is there now stays: the collector needn't look through it again and again between two ticks.
+        gc.collect()
+        gc.freeze()
+        loop = TickLoop(
+            body,
+            setup.joint_limits(),
+            setup.q,
+            tick=setup.tick,
+            every=setup.every,
+            now=clock.now(),
+            realtime=realtime,
+        )
+        _tick(loop, parent, clock)
+    connection.settimeout(_LAST_WORDS)
+    parent.tell(loop.take())
+    return 1 if loop.failed else 0
+
+
+def _tick(loop: TickLoop, parent: _Parent, clock: WallClock) -> None:
+    look = clock.now()
+    while not loop.finished:
+        data = parent.wait(loop.next_deadline() - clock.now())
+        if data is not None:
+            try:
+                loop.receive(decode_order(data))
+            except FormatError as problem:
+                loop.refuse(str(problem))
+        now = clock.now()
+        if now >= look:
+            look = now + _LOOK
+            parent.look()
+        if parent.gone:
+            loop.leave()
+        loop.advance(now=now)
+        if not loop.finished:
+            parent.tell(loop.take())
+
+
+if __name__ == "__main__":
+    with socket.socket(fileno=int(sys.argv[1])) as _connection:
+        _status = run(_connection)
+    # Nothing is left to tidy up, and the Toolbox's extensions would write what they leak to the terminal.
+    os._exit(_status)

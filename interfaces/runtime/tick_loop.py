@@ -1,0 +1,363 @@
+"""What the process of the physics does at each tick; it reads no clock and knows no socket.
+
+A late tick is made good at once, up to `PAUSE`. After a longer pause the missed ticks are left out: they'd be a
+burst. Where the references end in mid-motion, jump or were left out, each joint brakes within its limits from the
+last reference, and the arm holds until the parent has acknowledged that. Where it rests and the first rows of a
+motion come too late, by up to `row_buffer.KEPT` ticks, it begins late, and is on time again when it rests next.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from interfaces.runtime.physics_messages import (
+    LATENESS,
+    Attach,
+    Close,
+    Doing,
+    Fault,
+    FaultKind,
+    Measurement,
+    News,
+    Order,
+    Ready,
+    Release,
+    Row,
+    Rows,
+    TickCounts,
+)
+from interfaces.runtime.row_buffer import RowBuffer
+from robots.onboard.stops import from_measured
+from vrs.errors import FormatError, VrsError
+from vrs.model import Array, Limits
+
+PAUSE = 0.05
+"""Longest time [s] without ticks that is made good."""
+AHEAD_MOST = 5000
+"""How many ticks ahead references may lie."""
+
+_CHUNK = 8
+"""Rows that are prepared together: one alone costs as much as the tick."""
+_NEWS_MOST = 64
+"""Most messages that wait to be sent; of these the faults stay."""
+_OVER = 1.01
+"""How many times its limit a reference's speed may be."""
+_TICKS = 2.0
+"""A reference may change its speed as much as the limits allow in so many ticks."""
+_PLACED = 0.05
+"""How far from where it's measured a joint may be placed [rad], and from where it will be so much later [s]."""
+_SAME = 1e-9
+"""Ticks nearer than this to whole numbers are whole."""
+
+
+class Moved(NamedTuple):
+    """Where a tick brought the body, a number a joint each."""
+
+    q: Sequence[float]
+    """Encoder readings [rad]."""
+    qd: Sequence[float]
+    """[rad/s]."""
+    tau: Sequence[float]
+    """[N m]; empty if it has no drives."""
+
+
+class TickBody(Protocol):
+    """A body that is moved a tick at a time."""
+
+    def prepare(self, rows: Array) -> Sequence[Any]:
+        """Make references, (k, 3, n), ready: what `step` takes for each."""
+
+    def step(self, prepared: Any) -> Moved:
+        """Follow a reference for a tick."""
+
+    def attach(self, mass: float) -> None:
+        """Take a load [kg]."""
+
+    def release(self) -> None:
+        """Drop the load."""
+
+
+class _Step(NamedTuple):
+    q: list[float]
+    qd: list[float]
+    qdd: list[float]
+    prepared: Any
+
+
+class _Counter:
+    """Counts how late ticks are."""
+
+    def __init__(self, tick: float) -> None:
+        self._tick = tick
+        self._ticks = self._late = 0
+        self.skipped = 0
+        self._worst = 0.0
+        self._histogram = [0] * (len(LATENESS) + 1)
+
+    def add(self, late: float) -> None:
+        """Count a tick that begins so much after it was due [s]."""
+        self._ticks += 1
+        self._late += late > self._tick
+        self._worst = max(self._worst, late)
+        self._histogram[bisect_left(LATENESS, late)] += 1
+
+    def counts(self) -> TickCounts:
+        """All until now."""
+        return TickCounts(self._ticks, self._late, self._worst, self.skipped, tuple(self._histogram))
+
+
+class TickLoop:
+    """Runs a body on references, and brings it to rest where they fail."""
+
+    def __init__(
+        self, body: TickBody, limits: Limits, q: Row, *, tick: float, every: int, now: float, realtime: bool = False
+    ) -> None:
+        """Hold a position.
+
+        Args:
+            body: At rest at q.
+            limits: Joint limits.
+            q: Where it holds [rad].
+            tick: Length of a tick [s].
+            every: Ticks from one report to the next, ≥ 1.
+            now: By the robot's clock [s].
+            realtime: What to tell the parent of the process's priority.
+        """
+        self._body, self._limits, self._tick, self._every = body, limits, tick, every
+        self._speeds, self._changes = (_OVER * limits.qd_max).tolist(), (_TICKS * tick * limits.qdd_max).tolist()
+        self._last = math.floor(now / tick + _SAME)
+        self._at = _Step(list(q), [0.0] * len(q), [0.0] * len(q), None)
+        self._measured = Moved(q, [0.0] * len(q), ())
+        self._buffer, self._ahead = RowBuffer(), deque[tuple[int, _Step]]()
+        self._placing: int | None = None
+        self._lag = 0
+        self._brake: deque[_Step] = deque()
+        self._doing = Doing.FOLLOWING
+        self._faults = self._acknowledged = 0
+        self._alone = self._failed = False
+        self._counter = _Counter(tick)
+        self._news: deque[News] = deque([Ready(self._last, realtime)])
+
+    @property
+    def finished(self) -> bool:
+        """Whether there's nothing more to be done: the body failed, or the parent left and the arm rests."""
+        return self._failed or (self._alone and self._doing is Doing.HOLDING)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the body failed."""
+        return self._failed
+
+    def next_deadline(self) -> float:
+        """When the next tick is due, by the robot's clock [s]."""
+        return (self._last + 1) * self._tick
+
+    def take(self) -> list[News]:
+        """What is to be sent; a report that can't be needn't be, a fault must."""
+        news = list(self._news)
+        self._news.clear()
+        return news
+
+    def receive(self, order: Order) -> None:
+        """Take in a message of the parent."""
+        try:
+            match order:
+                case Rows():
+                    self._take_rows(order)
+                case Attach(mass=mass):
+                    self._body.attach(mass)
+                case Release():
+                    self._body.release()
+                case Close():
+                    self.leave()
+                case _:
+                    raise FormatError("message to the physics", f"{type(order).__name__} comes but once")
+        except VrsError as problem:
+            self.refuse(str(problem))
+
+    def refuse(self, problem: str) -> None:
+        """Come to rest, as the parent sends what makes no sense."""
+        if self._doing is Doing.FOLLOWING:
+            self._fail(FaultKind.REFUSED, problem, self._last + 1)
+
+    def leave(self) -> None:
+        """Come to rest for good: the parent has ended, or wants it."""
+        if not self._alone:
+            self._alone = True
+            if self._doing is Doing.FOLLOWING:
+                self._stop()
+
+    def advance(self, *, now: float) -> None:
+        """Run the next tick, if it's due by now [s]: one, however many are."""
+        k = self._last + 1
+        late = now - k * self._tick
+        if late < -_SAME * self._tick or self.finished:
+            return
+        if late > PAUSE:
+            self._counter.skipped += (missed := math.floor(now / self._tick + _SAME) - k)
+            k += missed
+            if self._doing is Doing.FOLLOWING and any(self._at.qd):
+                self._fail(FaultKind.PAUSED, f"the physics stood still for {late:.3f} s", k)
+        self._counter.add(late)
+        step = self._step(k)
+        try:
+            self._measured = self._body.step(step.prepared)
+        except VrsError as problem:
+            self._failed = True
+            self._faults += 1
+            here = tuple(self._at.q)
+            self._tell(Fault(self._faults, FaultKind.BODY, str(problem), k, here, k))
+            return
+        self._at, self._last = step, k
+        if self._doing is Doing.BRAKING and not self._brake:
+            self._settle()
+        if k % self._every == 0:
+            q, qd, tau = map(tuple, self._measured)
+            followed = k - self._lag
+            self._tell(Measurement(k, self._doing, q, qd, tau, tuple(step.q), followed, self._counter.counts()))
+
+    def _take_rows(self, message: Rows) -> None:
+        if message.run != self._faults or self._alone:
+            return
+        rows = message.array(len(self._speeds))
+        if not np.isfinite(rows).all() or (np.abs(rows[:, 1]) > self._speeds).any():
+            raise FormatError("rows", "a reference isn't a number, or faster than the limits")
+        if message.start > self._last + AHEAD_MOST:
+            raise FormatError("rows", f"tick {message.start} is more than {AHEAD_MOST} ahead")
+        if not self._buffer.put(message.start, rows):
+            raise FormatError("rows", "too many blocks")
+        while self._ahead and self._ahead[-1][0] >= message.start:
+            self._ahead.pop()
+        if message.placed:
+            self._placing = message.start
+        self._acknowledged = message.run
+        if self._doing is Doing.HOLDING:
+            self._doing = Doing.FOLLOWING
+
+    def _step(self, k: int) -> _Step:
+        """What the body does in a tick."""
+        if self._doing is Doing.FOLLOWING:
+            step = self._following(k)
+            if step is not None:
+                return step
+        return self._brake.popleft() if self._brake else self._held()
+
+    def _following(self, k: int) -> _Step | None:
+        """The reference of a tick; None if the arm must brake instead."""
+        if self._lag and not any(self._at.qd):
+            self._catch_up(k)
+        step = self._row(k - self._lag)
+        if step is None:
+            if not any(self._at.qd):
+                return self._held()
+            self._fail(FaultKind.STARVED, "the references ended in mid-motion", k)
+            return None
+        placing = self._placing is not None and k - self._lag >= self._placing
+        joint = self._misplaced(step) if placing else self._jump(step)
+        if placing:
+            self._placing = None
+        if joint is None:
+            return step
+        later = None if placing or any(self._at.qd) else self._depart_later(k)
+        if later is None:
+            way = f"from {self._at.q[joint]:.6g} rad at {self._at.qd[joint]:.4g} rad/s"
+            text = f"joint {joint + 1} would jump {way} to {step.q[joint]:.6g} rad at {step.qd[joint]:.4g} rad/s"
+            self._fail(FaultKind.JUMPED, text, k)
+        return later
+
+    def _row(self, tick: int) -> _Step | None:
+        """The reference for a tick; None if there's none."""
+        while self._ahead and self._ahead[0][0] < tick:
+            self._ahead.popleft()
+        if not self._ahead or self._ahead[0][0] > tick:
+            rows = self._buffer.take(tick, _CHUNK)
+            if rows is None:
+                return None
+            if len(rows) == 1 and (rows[0, 0] == self._at.q).all() and not rows[0, 1:].any():
+                return self._held()
+            self._ahead = deque(zip(range(tick, tick + len(rows)), self._prepared(rows), strict=True))
+        return self._ahead.popleft()[1]
+
+    def _depart_later(self, k: int) -> _Step | None:
+        """Begin a motion late whose first rows came too late; None if none begins where the arm rests."""
+        for start in self._buffer.starts(k):
+            step = self._row(start)
+            if step is not None and self._jump(step) is None:
+                self._lag = k - start
+                return step
+        return None
+
+    def _catch_up(self, k: int) -> None:
+        """Be on time again, if the arm rests until then anyway."""
+        for tick in range(k - self._lag, k + 1):
+            rows = self._buffer.take(tick, 1)
+            if rows is None or (rows[0, 0] != self._at.q).any() or rows[0, 1:].any():
+                return
+        self._lag = 0
+
+    def _jump(self, step: _Step) -> int | None:
+        """The first joint whose speed or position the limits don't let change like this in a tick or two."""
+        h = self._tick
+        for j, (q0, v0, q1, v1, change) in enumerate(
+            zip(self._at.q, self._at.qd, step.q, step.qd, self._changes, strict=True)
+        ):
+            if abs(v1 - v0) > change or abs(q1 - q0 - 0.5 * h * (v0 + v1)) > h * change:
+                return j
+        return None
+
+    def _misplaced(self, step: _Step) -> int | None:
+        """The first joint that moves, or is placed away from where it was measured."""
+        for j, (q, v, x, w) in enumerate(zip(step.q, step.qd, *self._measured[:2], strict=True)):
+            if v != 0.0 or abs(q - x) > _PLACED * (1.0 + abs(w)):
+                return j
+        return None
+
+    def _fail(self, kind: FaultKind, text: str, k: int) -> None:
+        """Brake, tell it, and take no more references until it's acknowledged."""
+        self._faults += 1
+        rest = self._stop()
+        self._tell(Fault(self._faults, kind, text, k, tuple(rest), k + max(len(self._brake) - 1, 0)))
+
+    def _stop(self) -> list[float]:
+        """Begin to brake; return where the references will rest [rad]."""
+        self._buffer.clear()
+        self._ahead.clear()
+        self._placing, self._lag = None, 0
+        stop = from_measured(0.0, self._at.q, self._at.qd, self._limits)
+        ticks = math.ceil(stop.end / self._tick - _SAME) if stop.end > 0 else 0
+        t = np.minimum(self._tick * np.arange(1, ticks + 1, dtype=np.float64), stop.end)
+        rows = np.stack([stop.timeline.sample(t, derivative=k) for k in range(3)], axis=1)
+        if ticks:
+            rows[-1, 0], rows[-1, 1:] = stop.rest, 0.0
+        self._brake.clear()
+        self._brake.extend(self._prepared(rows) if ticks else ())
+        self._doing = Doing.BRAKING if ticks else Doing.HOLDING
+        return self._brake[-1].q if self._brake else self._at.q
+
+    def _settle(self) -> None:
+        """The references rest."""
+        again = self._acknowledged == self._faults and not self._alone
+        self._doing = Doing.FOLLOWING if again else Doing.HOLDING
+
+    def _prepared(self, rows: Array) -> list[_Step]:
+        q, qd, qdd = rows.transpose(1, 0, 2).tolist()
+        return list(map(_Step, q, qd, qdd, self._body.prepare(rows)))
+
+    def _held(self) -> _Step:
+        """Stay at the last reference, at rest."""
+        if self._at.prepared is None or any(self._at.qd) or any(self._at.qdd):
+            rows = np.zeros((1, 3, len(self._at.q)))
+            rows[0, 0] = self._at.q
+            self._at = self._prepared(rows)[0]
+        return self._at
+
+    def _tell(self, news: News) -> None:
+        if len(self._news) >= _NEWS_MOST:
+            self._news = deque(n for n in self._news if not isinstance(n, Measurement))
+        self._news.append(news)

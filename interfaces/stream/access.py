@@ -1,0 +1,179 @@
+"""Who may come in: tokens of the roles, and the exact Host and Origin of what comes."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import os
+import secrets
+import stat
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from interfaces.stream.control import Role
+from vrs.errors import FormatError, InvalidValueError
+
+TOKEN_BYTES = 32
+"""Random bytes of a token."""
+LARGEST_FILE = 4096
+"""Largest token file [bytes]."""
+LONGEST_TOKEN = 256
+"""Longest token that is looked at [characters]."""
+
+
+_RANKS = {Role.VIEWER: 0, Role.OPERATOR: 1, Role.ADMIN: 2}
+OPEN = frozenset({Role.VIEWER, Role.OPERATOR})
+"""Roles that need no token on a loopback address, as long as there is no token file."""
+
+
+class Access:
+    """Decides which role a client gets. It keeps digests of the tokens, never the tokens themselves.
+
+    The token of an admin also opens the roles of an operator and a viewer, that of an operator a viewer's.
+    """
+
+    def __init__(self, tokens: Mapping[Role, str] | None = None, *, free: Iterable[Role] = OPEN) -> None:
+        """Give each role its token.
+
+        Args:
+            tokens: Text by role; a role without a token is open only if `free` says so.
+            free: Roles that need no token. With tokens for other machines this is empty.
+
+        Raises:
+            InvalidValueError: If a token is shorter than 32 random bytes are, or the admin's role is free.
+        """
+        tokens = {} if tokens is None else tokens
+        for token in tokens.values():
+            if not 4 * TOKEN_BYTES // 3 <= len(token) <= LONGEST_TOKEN:
+                raise InvalidValueError("token", f"{len(token)} characters", "43 to 256 characters")
+        self._free = frozenset(free)
+        if Role.ADMIN in self._free:
+            raise InvalidValueError("free", "admin", "roles other than admin")
+        self._digests = {Role(role): _digest(token) for role, token in tokens.items()}
+
+    def __repr__(self) -> str:
+        roles = ", ".join(sorted(self._digests))
+        return f"Access(tokens for: {roles or 'nobody'})"
+
+    @property
+    def needs_tokens(self) -> bool:
+        """Whether nobody comes in without a token."""
+        return not self._free
+
+    def refusal(self, role: Role, token: str | None) -> str:
+        """Why a client can't have a role; empty if it can.
+
+        Every token is compared, in constant time, whatever the others gave.
+
+        Args:
+            role: What it asks for.
+            token: What it shows.
+        """
+        entitled = False
+        shown = _digest("" if token is None else token[: LONGEST_TOKEN + 1])
+        for owner, digest in self._digests.items():
+            same = hmac.compare_digest(digest, shown)
+            entitled |= same and _opens(owner, role)
+        if entitled or (token is None and role in self._free):
+            return ""
+        return f"the role {role} needs its token" if token is None else f"this token isn't one for the role {role}"
+
+
+def read_tokens(path: Path) -> dict[Role, str]:
+    """Read a token file: on each line a role and its token.
+
+    Raises:
+        FormatError: If there's no such file, others may read it, or it holds anything else.
+    """
+    where = f"token file {path}"
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    except OSError as error:
+        raise FormatError(where, error.strerror or "can't be opened") from None
+    state = os.fstat(descriptor)
+    if not stat.S_ISREG(state.st_mode):
+        os.close(descriptor)
+        raise FormatError(where, "it isn't a file")
+    with open(descriptor, "rb") as file:
+        mode = stat.S_IMODE(state.st_mode)
+        if mode != 0o600:
+            raise FormatError(where, f"its mode must be 0600, so that nobody else reads it; it's {mode:04o}")
+        data = file.read(LARGEST_FILE + 1)
+    if len(data) > LARGEST_FILE:
+        raise FormatError(where, f"it's longer than {LARGEST_FILE} bytes")
+    tokens: dict[Role, str] = {}
+    for number, line in enumerate(data.decode("ascii", "replace").splitlines(), 1):
+        words = line.split()
+        if not words:
+            continue
+        if len(words) != 2 or words[0] not in set(Role) or words[0] in tokens:
+            raise FormatError(where, f"line {number} must hold a role and its token, each role once")
+        if not 4 * TOKEN_BYTES // 3 <= len(words[1]) <= LONGEST_TOKEN:
+            raise FormatError(where, f"the token of line {number} must have 43 to 256 characters")
+        tokens[Role(words[0])] = words[1]
+    if not tokens:
+        raise FormatError(where, "it holds no token")
+    return tokens
+
+
+def make_tokens(path: Path, random_bytes: Callable[[int], bytes] = secrets.token_bytes) -> dict[Role, str]:
+    """Make a token file with a token of 32 random bytes for each role.
+
+    Args:
+        path: Where; nothing may be there.
+        random_bytes: So many bytes that nobody can guess.
+
+    Raises:
+        FormatError: If it can't be made.
+    """
+    tokens = {
+        role: base64.urlsafe_b64encode(random_bytes(TOKEN_BYTES)).rstrip(b"=").decode("ascii") for role in Role
+    }
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise FormatError(f"token file {path}", error.strerror or "can't be made") from None
+    with open(descriptor, "w", encoding="ascii") as file:
+        os.fchmod(descriptor, 0o600)
+        file.writelines(f"{role} {token}\n" for role, token in tokens.items())
+    return tokens
+
+
+def hosts(names: Iterable[str], port: int) -> frozenset[str]:
+    """What the Host of a request may be: names and addresses with the port; IPv6 addresses in brackets."""
+    bracketed = (f"[{name}]" if ":" in name else name for name in names)
+    return frozenset(f"{name.lower()}:{port}" for name in bracketed)
+
+
+def check_host(given: Sequence[str], allowed: frozenset[str]) -> bool:
+    """Whether a request names this server, exactly and once.
+
+    Args:
+        given: The values of its Host headers.
+        allowed: From `hosts`.
+    """
+    return len(given) == 1 and given[0].lower() in allowed
+
+
+def check_origin(given: Sequence[str], allowed: frozenset[str]) -> bool:
+    """Whether a request comes from a page of this server, or from no browser at all.
+
+    Args:
+        given: The values of its Origin headers: none from a program that isn't a browser.
+        allowed: From `hosts`; pages are served by http, or by https in front of it.
+    """
+    if not given:
+        return True
+    scheme, separator, host = given[0].partition("://")
+    return len(given) == 1 and bool(separator) and scheme in {"http", "https"} and host.lower() in allowed
+
+
+def _digest(token: str) -> bytes:
+    return hashlib.sha256(token.encode("utf-8", "replace")).digest()
+
+
+def _opens(owner: Role, role: Role) -> bool:
+    if owner is Role.SITE or role is Role.SITE:
+        return owner is role
+    return _RANKS[owner] >= _RANKS[role]

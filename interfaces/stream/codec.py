@@ -1,0 +1,184 @@
+"""Messages to bytes and back, in two encodings."""
+
+from __future__ import annotations
+
+import enum
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import cache
+from types import UnionType
+from typing import Any, Generic, TypeAlias, TypeVar, get_args
+
+import msgspec
+import numpy as np
+
+from interfaces import messages
+from interfaces.messages import Reply, Request
+from interfaces.stream import control
+from interfaces.stream.control import Notice, ProblemCode, Question
+from interfaces.stream.errors import ProtocolError
+from interfaces.stream.wire import Message as Wire
+from interfaces.stream.wire import control as controls
+from interfaces.stream.wire import replies, requests, sites
+from interfaces.stream.wire.segments import Packed, Plain
+from interfaces.teleop.messages import Orders, Report
+from vrs.errors import InvalidValueError
+
+LARGEST = 65_536
+"""Longest message that is read unless told otherwise [B]."""
+
+Value: TypeAlias = Request | Reply | Question | Notice | Orders | Report
+"""What crosses."""
+T = TypeVar("T")
+
+WIRES: dict[type, type[Wire]] = {
+    messages.Order: requests.OrderWire,
+    messages.Ask: requests.AskWire,
+    messages.Follow: requests.FollowWire,
+    messages.Want: requests.WantWire,
+    messages.Outcome: replies.OutcomeWire,
+    messages.Answer: replies.AnswerWire,
+    messages.Broadcast: replies.BroadcastWire,
+    messages.Scene: replies.SceneWire,
+    messages.History: replies.HistoryWire,
+    messages.Change: replies.ChangeWire,
+    messages.Pulse: replies.PulseWire,
+    control.Hello: controls.HelloWire,
+    control.Welcome: controls.WelcomeWire,
+    control.Attached: controls.AttachedWire,
+    control.Ping: controls.PingWire,
+    control.Pong: controls.PongWire,
+    control.Acquire: controls.AcquireWire,
+    control.TakeOver: controls.TakeOverWire,
+    control.Release: controls.ReleaseWire,
+    control.Resume: controls.ResumeWire,
+    control.Beat: controls.BeatWire,
+    control.Lease: controls.LeaseWire,
+    control.Problem: controls.ProblemWire,
+    control.State: controls.StateWire,
+    Orders: sites.OrdersWire,
+    Report: sites.ReportWire,
+}
+"""The wire form of each message."""
+TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}
+"""Messages by the type that stands in them."""
+
+
+class Encoding(enum.StrEnum):
+    """How messages are written; the value is the WebSocket subprotocol."""
+
+    MSGPACK = "vrs.1.msgpack"
+    """Binary frames."""
+    JSON = "vrs.1.json"
+    """Text frames."""
+
+
+class _Head(msgspec.Struct, frozen=True):
+    type: str
+
+
+_HEADS: dict[Encoding, Callable[[bytes], _Head]] = {
+    Encoding.MSGPACK: msgspec.msgpack.Decoder(_Head).decode,
+    Encoding.JSON: msgspec.json.Decoder(_Head).decode,
+}
+
+
+def _plain(value: object) -> object:
+    """NumPy's scalars as Python's."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise InvalidValueError("field", value, "what a message may hold")
+
+
+_WRITERS: dict[Encoding, Callable[[Wire], bytes]] = {
+    Encoding.MSGPACK: msgspec.msgpack.Encoder(enc_hook=_plain).encode,
+    Encoding.JSON: msgspec.json.Encoder(enc_hook=_plain).encode,
+}
+
+
+def encode(message: Value, encoding: Encoding) -> bytes:
+    """A message as one frame.
+
+    Raises:
+        InvalidValueError: If it's no message.
+    """
+    kind = WIRES.get(type(message))
+    if kind is None:
+        raise InvalidValueError("message", message, f"one of {', '.join(known.__name__ for known in WIRES)}")
+    return _WRITERS[encoding](kind.of(message, encoding is Encoding.MSGPACK))
+
+
+def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARGEST) -> Any:
+    """The message in a frame.
+
+    Args:
+        data: The frame.
+        encoding: How it's written.
+        allowed: Class of the messages that may come here, or a union of such.
+        largest: Longest frame [B].
+
+    Raises:
+        ProtocolError: If it's anything else.
+    """
+    if len(data) > largest:
+        raise ProtocolError(ProblemCode.TOO_LARGE, f"{len(data)} bytes; at most {largest} are read")
+    try:
+        wire = _reader(encoding, allowed)(data)
+        return wire.read()
+    except msgspec.ValidationError as error:
+        raise _invalid(data, encoding, allowed, str(error)) from None
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise ProtocolError(ProblemCode.MALFORMED, str(error)) from None
+    except (InvalidValueError, OverflowError) as error:
+        raise ProtocolError(ProblemCode.OUT_OF_RANGE, str(error)) from None
+
+
+def _invalid(data: bytes, encoding: Encoding, allowed: Any, problem: str) -> ProtocolError:
+    try:
+        kind = _HEADS[encoding](data).type
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        return ProtocolError(ProblemCode.MALFORMED, str(error))
+    if kind not in TYPES:
+        return ProtocolError(ProblemCode.UNKNOWN_TYPE, f"no type {kind[:40]!r}")
+    if TYPES[kind] not in _classes(allowed):
+        return ProtocolError(ProblemCode.NOT_ALLOWED, f"{kind} can't come here")
+    return ProtocolError(ProblemCode.OUT_OF_RANGE, f"{kind}: {problem}")
+
+
+def _classes(allowed: Any) -> tuple[type, ...]:
+    return get_args(allowed) if isinstance(allowed, UnionType) or get_args(allowed) else (allowed,)
+
+
+@cache
+def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
+    packed = encoding is Encoding.MSGPACK
+    union: Any = None
+    for value in _classes(allowed):
+        kind: Any = WIRES[value]
+        if issubclass(kind, Generic):
+            kind = kind[Packed if packed else Plain]
+        union = kind if union is None else union | kind
+    reader: Callable[[bytes], Wire] = (msgspec.msgpack if packed else msgspec.json).Decoder(union).decode
+    return reader
+
+
+class SharedEncoder:
+    """Encodes the same message for many receivers once: it remembers the newest ones, by identity."""
+
+    def __init__(self, size: int = 64) -> None:
+        """Remember so many."""
+        self._size = size
+        self._known: OrderedDict[tuple[int, Encoding], tuple[Value, bytes]] = OrderedDict()
+
+    def encode(self, message: Value, encoding: Encoding) -> bytes:
+        """See `encode`."""
+        key = id(message), encoding
+        known = self._known.get(key)
+        # An id is free again once its object is gone; what is remembered isn't gone.
+        if known is not None:
+            return known[1]
+        data = encode(message, encoding)
+        self._known[key] = message, data
+        if len(self._known) > self._size:
+            self._known.popitem(last=False)
+        return data

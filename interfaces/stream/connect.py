@@ -1,0 +1,237 @@
+"""The four interfaces of a robot that a server serves, for `interfaces.connect`."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from types import TracebackType
+from typing import TypeVar
+
+from interfaces.link.clock_sync import ClockEstimate
+from interfaces.messages import Form
+from interfaces.ports import EnginePort
+from interfaces.stream import control
+from interfaces.stream.client import Ask, ClientCore
+from interfaces.stream.codec import Encoding
+from interfaces.stream.control import Lease, Problem, ProblemCode, Role, State, Welcome
+from interfaces.stream.line import Line, UnreachableError, Worker
+from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
+from interfaces.viewer import Shown
+from vrs.clock import WallClock
+
+T = TypeVar("T")
+
+
+class _Session:
+    """A client on a line, for those that use it from other threads."""
+
+    def __init__(self, url: str, core: ClientCore, clock: WallClock, worker: Worker, timeout: float) -> None:
+        self.core, self._clock = core, clock
+        self.changed = threading.Condition(threading.RLock())
+        self.line = Line(url, core, clock, self.changed, worker)
+        try:
+            self.line.wait_open(timeout)
+        except UnreachableError:
+            self.line.close()
+            raise
+
+    @property
+    def port(self) -> EnginePort:
+        return self.core.port
+
+    def now(self) -> float:
+        """Session time [s]."""
+        with self.changed:
+            t = self.core.time(self._clock.now())
+        assert t is not None
+        return t
+
+    def local(self) -> float:
+        return self._clock.now()
+
+    def do(self, action: Callable[[float], T]) -> T:
+        with self.changed:
+            result = action(self.now())
+        self.line.wake()
+        return result
+
+    def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
+        with self.changed:
+            return self.changed.wait_for(ready, timeout) if timeout > 0 else ready()
+
+
+class Connection:
+    """A robot that a server serves. A context manager: at its end everything is closed.
+
+    Lost connections are taken up again by themselves. Calls may come from any thread.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        role: Role = Role.OPERATOR,
+        token: str | None = None,
+        name: str = "client",
+        encoding: Encoding = Encoding.MSGPACK,
+        timeout: float = 5.0,
+    ) -> None:
+        """Connect; see `interfaces.connect`."""
+        self._url, self._token, self._name, self._encoding = _address(url), token, name, encoding
+        self._timeout = timeout
+        self._clock = WallClock()
+        self._worker = Worker()
+        self._sessions: list[_Session] = []
+        try:
+            self._session = self._open(Role(role))
+        except UnreachableError:
+            self._worker.close()
+            raise
+        self.designer = RemoteDesigner(self._session)
+        """Issues commands; they need the lease."""
+        self.observer = RemoteObserver(self._session)
+        """Asks for positions."""
+        self.supervisor = RemoteSupervisor(self.designer, self.observer)
+        """Both."""
+        self._add(self._session, self.designer)
+        self._add(self._session, self.observer)
+
+    def _open(self, role: Role) -> _Session:
+        core = ClientCore(role=role, name=self._name, token=self._token, encoding=self._encoding)
+        self._sessions.append(_Session(self._url, core, self._clock, self._worker, self._timeout))
+        return self._sessions[-1]
+
+    @staticmethod
+    def _add(session: _Session, part: RemoteDesigner | RemoteObserver | RemoteViewer) -> None:
+        with session.changed:
+            session.line.parts.append(part)
+        session.line.wake()
+
+    def __enter__(self) -> Connection:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End all connections; a lease that is held is released."""
+        if self._session.core.epoch:
+            self.release(wait=1.0)
+        for session in self._sessions:
+            session.line.close()
+        self._sessions.clear()
+        self._worker.close()
+
+    def _end(self, session: _Session) -> None:
+        session.line.close()
+        if session in self._sessions:
+            self._sessions.remove(session)
+
+    def viewer(
+        self, *, rate: float = 50.0, form: Form = Form.SEGMENTS, show: Callable[[Shown], None] | None = None
+    ) -> RemoteViewer:
+        """A viewer, on a connection of its own.
+
+        Args:
+            rate: Frames to show a second, 0.1 to 1000.
+            form: What crosses.
+            show: Is called with each frame, in another thread: to be quick.
+
+        Raises:
+            UnreachableError: If the connection doesn't come about.
+            InvalidValueError: If rate is out of range.
+        """
+        session = self._open(Role.VIEWER)
+        viewer = RemoteViewer(session, rate=rate, form=Form(form), show=show, end=partial(self._end, session))
+        self._add(session, viewer)
+        return viewer
+
+    def acquire(self, *, wait: float = 5.0) -> Lease | Problem:
+        """Ask for the lease; it's kept by itself until it's released.
+
+        Args:
+            wait: How long to wait for the answer [s].
+
+        Returns:
+            The lease, `yours` if it was given; or why not.
+        """
+        return self._wish(lambda number, _: control.Acquire(number), wait)
+
+    def take_over(self, *, wait: float = 5.0) -> Lease | Problem:
+        """Take the lease from whoever has it: for an admin. Waits until the robot has stopped.
+
+        Args:
+            wait: How long to wait [s].
+
+        Returns:
+            The lease as it's then, `yours` if it was given; or why not.
+        """
+        answer = self._wish(lambda number, _: control.TakeOver(number), wait)
+        if isinstance(answer, Lease) and not answer.yours:
+            self._session.wait(lambda: self._session.core.epoch > 0, wait)
+            return self.lease or answer
+        return answer
+
+    def release(self, *, wait: float = 5.0) -> Lease | Problem:
+        """Give the lease back; the robot stops."""
+        return self._wish(control.Release, wait)
+
+    def resume(self, *, wait: float = 5.0) -> Lease | Problem:
+        """Let the robot go on after it stopped by itself."""
+        return self._wish(control.Resume, wait)
+
+    def _wish(self, ask: Ask, wait: float) -> Lease | Problem:
+        core = self._session.core
+        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now()))
+        self._session.wait(lambda: core.answer(number) is not None, wait)
+        missing = Problem(ProblemCode.STOPPING, f"no answer within {wait:g} s", number)
+        return core.answer(number) or missing
+
+    def now(self) -> float:
+        """Session time [s]: that of all stamps and positions."""
+        return self._session.now()
+
+    @property
+    def clock(self) -> ClockEstimate:
+        """Session time less local time, and how sure that is [s]."""
+        with self._session.changed:
+            estimate = self._session.core.sync.estimate(self._clock.now())
+        assert estimate is not None
+        return estimate
+
+    @property
+    def lease(self) -> Lease | None:
+        """The lease as it was last heard of."""
+        return self._session.core.lease
+
+    @property
+    def state(self) -> State | None:
+        """The real robot as it was last heard of; None before that."""
+        return self._session.core.state
+
+    @property
+    def welcome(self) -> Welcome:
+        """What the server said of itself and its robot."""
+        welcome = self._session.core.welcome
+        assert welcome is not None
+        return welcome
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there's a connection just now."""
+        return self._session.core.phase is self._session.core.phase.OPEN
+
+    def wait(self, ready: Callable[[Connection], bool], timeout: float = 5.0) -> bool:
+        """Wait until something is so of this connection, or the time [s] is over; whether it is."""
+        return self._session.wait(lambda: ready(self), timeout)
+
+
+def _address(url: str) -> str:
+    scheme, separator, rest = url.partition("://")
+    if not separator:
+        scheme, rest = "ws", url
+    scheme = {"http": "ws", "https": "wss"}.get(scheme, scheme)
+    return f"{scheme}://{rest}" if "/" in rest else f"{scheme}://{rest}/ws"

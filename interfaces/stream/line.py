@@ -1,0 +1,218 @@
+"""Keeps clients connected: a thread with its own loop, and the sockets of each client; a thin shell."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Protocol
+
+from interfaces.ports import earliest
+from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
+from interfaces.stream.codec import Encoding
+from interfaces.stream.control import Problem
+from interfaces.stream.errors import ProtocolError
+from vrs.clock import Clock
+from vrs.errors import VrsError
+
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
+OPENING = 5.0
+"""Time for a connection to stand [s]."""
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 2.0
+"""Time before the next attempt to connect [s]: at first, and at most, doubling in between."""
+_BLOCKED = 5.0
+"""A message that can't be sent for so long ends the connection [s]."""
+
+
+class UnreachableError(VrsError, ConnectionError):
+    """No connection to a server came about, or it refuses this client."""
+
+    def __init__(self, url: str, reason: str) -> None:
+        self.url, self.reason = url, reason
+        super().__init__(f"{url}: {reason}")
+
+
+class Part(Protocol):
+    """What is moved on in session time while there's a connection."""
+
+    def advance(self, *, now: float) -> object:
+        """Do what is due."""
+
+    def next_deadline(self) -> float | None:
+        """When something is due [s]."""
+
+    def renew(self) -> None:
+        """Begin anew: the server knows nothing any more."""
+
+
+class Worker:
+    """A thread with an event loop."""
+
+    def __init__(self) -> None:
+        self.loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="vrs-client", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self.loop)
+        self.loop.run_forever()
+
+    def close(self) -> None:
+        """End it."""
+        self.loop.call_soon_threadsafe(self.loop.stop)
+        self._thread.join(timeout=5.0)
+        self.loop.close()
+
+
+class Line:
+    """One client's connections to a server, one after the other.
+
+    `changed` is the lock of all that the client has, and told of whenever something has come.
+    """
+
+    def __init__(
+        self, url: str, core: ClientCore, clock: Clock, changed: threading.Condition, worker: Worker
+    ) -> None:
+        """Begin to connect.
+
+        Args:
+            url: Of the server's WebSocket, `ws://HOST:PORT/ws`.
+            core: The client.
+            clock: Local time.
+            changed: Lock of the client and its parts.
+            worker: Where it runs.
+        """
+        self.url, self.core, self.clock, self.changed = url, core, clock, changed
+        self.parts: list[Part] = []
+        self.failure = ""
+        """Why the last connection didn't come about or ended."""
+        self._worker = worker
+        self._sessions = 0
+        self._wake = asyncio.Event()
+        self._closing = False
+        self._done = asyncio.run_coroutine_threadsafe(self._keep(), worker.loop)
+
+    def wake(self) -> None:
+        """Something is to be sent."""
+        with contextlib.suppress(RuntimeError):
+            self._worker.loop.call_soon_threadsafe(self._wake.set)
+
+    def wait_open(self, timeout: float) -> None:
+        """Wait until the server has said welcome.
+
+        Raises:
+            UnreachableError: If it doesn't within the time [s], or refuses.
+        """
+        core = self.core
+        with self.changed:
+            self.changed.wait_for(
+                lambda: core.phase in {Phase.OPEN, Phase.CLOSED} or bool(self.failure), timeout=timeout
+            )
+            if core.phase is not Phase.OPEN:
+                said = core.problem.text if isinstance(core.problem, Problem) else ""
+                raise UnreachableError(self.url, said or self.failure or f"no answer within {timeout:g} s")
+
+    def close(self) -> None:
+        """End the connection."""
+        self._closing = True
+        self.wake()
+        with contextlib.suppress(Exception):
+            self._done.result(timeout=OPENING)
+
+    async def _keep(self) -> None:
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import WebSocketException
+        from websockets.typing import Subprotocol
+
+        pause = FIRST_PAUSE
+        while not self._closing and self.core.phase is not Phase.CLOSED:
+            try:
+                async with connect(
+                    self.url,
+                    subprotocols=[Subprotocol(self.core.encoding)],
+                    compression=None,
+                    max_size=FROM_SERVER,
+                    open_timeout=OPENING,
+                    ping_interval=None,
+                    close_timeout=1.0,
+                    proxy=None,
+                ) as socket:
+                    await self._converse(socket)
+                reason = "the connection ended"
+                pause = FIRST_PAUSE
+            except (OSError, WebSocketException, ProtocolError, TimeoutError) as error:
+                reason = str(error) or type(error).__name__
+            with self.changed:
+                self.failure = reason
+                self.core.disconnected()
+                self.changed.notify_all()
+            with contextlib.suppress(TimeoutError):
+                if not self._closing:
+                    await asyncio.wait_for(self._wait_closing(), pause)
+            pause = min(2 * pause, LONGEST_PAUSE)
+
+    async def _wait_closing(self) -> None:
+        while not self._closing:
+            self._wake.clear()
+            await self._wake.wait()
+
+    async def _converse(self, socket: ClientConnection) -> None:
+        with self.changed:
+            self.failure = ""
+            self.core.connected(now=self.clock.now())
+        reader = asyncio.create_task(self._read(socket))
+        try:
+            while not (self._closing or reader.done()):
+                out, wait = self._turn()
+                for data in out:
+                    frame = data if self.core.encoding is Encoding.MSGPACK else data.decode()
+                    await asyncio.wait_for(socket.send(frame), _BLOCKED)
+                if wait > 0:
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(self._wake.wait(), wait)
+                self._wake.clear()
+        finally:
+            reader.cancel()
+            await asyncio.wait([reader])
+        if not reader.cancelled():
+            reader.result()
+
+    async def _read(self, socket: ClientConnection) -> None:
+        try:
+            async for data in socket:
+                with self.changed:
+                    self.core.receive(data, now=self.clock.now())
+                self._wake.set()
+        finally:
+            self._wake.set()
+
+    def _turn(self) -> tuple[tuple[bytes, ...], float]:
+        """What is to be sent, and how long to wait then [s]."""
+        core = self.core
+        with self.changed:
+            now = self.clock.now()
+            if core.is_silent(now):
+                raise TimeoutError("the server isn't heard any more")
+            t = core.time(now)
+            deadline = None
+            if t is not None and core.phase is Phase.OPEN:
+                for part in self._renewed():
+                    part.advance(now=t)
+                soonest = earliest(*(part.next_deadline() for part in self.parts))
+                deadline = None if soonest is None else now + (soonest - t)
+            out = core.advance(now=now)
+            self.changed.notify_all()
+            deadline = earliest(deadline, core.next_deadline())
+            return out, 1.0 if deadline is None else min(max(deadline - self.clock.now(), 0.0), 1.0)
+
+    def _renewed(self) -> Iterator[Part]:
+        sessions = self.core.sessions
+        if sessions != self._sessions:
+            if self._sessions:
+                for part in self.parts:
+                    part.renew()
+            self._sessions = sessions
+        return iter(self.parts)

@@ -1,0 +1,9 @@
+"""Both robots in MeshCat's viewer, for many viewers at once."""
+
+from __future__ import annotations
+
+from interfaces.stream.meshcat.committed import Committed
+from interfaces.stream.meshcat.newest import Slot
+from interfaces.stream.meshcat.scene import MeshcatScene
+
+__all__ = ["Committed", "MeshcatScene", "Slot"]

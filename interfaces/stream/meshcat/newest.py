@@ -1,0 +1,122 @@
+"""The newest value of each key, for readers that are as slow as they like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from vrs.errors import InvalidValueError
+
+MOST_READERS = 1024
+"""Readers of one scene."""
+
+
+class Newest:
+    """Bytes by key, made once for all readers; an old value is kept for nobody.
+
+    Putting never waits. A reader costs a number: the version that it has read up to.
+    """
+
+    def __init__(self, greeting: bytes) -> None:
+        """Start without values.
+
+        Args:
+            greeting: What each reader gets before anything else.
+        """
+        self.greeting = greeting
+        self.version = 0
+        """Counts up with each change of any value."""
+        self._values: dict[str, tuple[int, bytes]] = {}
+        self._slots: set[Slot] = set()
+        self._later: dict[int, tuple[bytes, ...]] = {}
+
+    @property
+    def readers(self) -> int:
+        """How many readers there are."""
+        return len(self._slots)
+
+    def put(self, key: str, data: bytes) -> None:
+        """Replace the value of a key; an equal value changes nothing."""
+        known = self._values.get(key)
+        if known is not None and known[1] == data:
+            return
+        self._values.pop(key, None)
+        self.version += 1
+        self._values[key] = self.version, data
+        self._later.clear()
+
+    def wake(self) -> None:
+        """Tell the readers that wait that something may have changed."""
+        for slot in self._slots:
+            slot.changed()
+
+    def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
+        """Give a reader a place.
+
+        Args:
+            changed: Is called when there may be something to take; it must return at once.
+
+        Raises:
+            InvalidValueError: If there are too many.
+        """
+        if len(self._slots) >= MOST_READERS:
+            raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_READERS} a scene")
+        slot = Slot(self, changed)
+        self._slots.add(slot)
+        return slot
+
+    def leave(self, slot: Slot) -> None:
+        """Give a place back; one that was given back already is none."""
+        self._slots.discard(slot)
+
+    def later(self, version: int) -> tuple[bytes, ...]:
+        """Values newer than a version, the oldest first; readers at the same version share the answer."""
+        found = self._later.get(version)
+        if found is None:
+            newer = []
+            for of, data in reversed(self._values.values()):
+                if of <= version:
+                    break
+                newer.append(data)
+            found = self._later[version] = tuple(reversed(newer))
+        return found
+
+    def version_of(self, count: int, version: int) -> int:
+        """Version of the last of the first `count` values newer than a version."""
+        newer = len(self.later(version))
+        if count >= newer:
+            return self.version
+        versions = [of for of, _ in self._values.values()]
+        return versions[len(versions) - newer + count - 1]
+
+
+class Slot:
+    """A reader's place: how far it has read."""
+
+    def __init__(self, newest: Newest, changed: Callable[[], None]) -> None:
+        self.changed = changed
+        self._newest = newest
+        self._version = -1
+
+    def __bool__(self) -> bool:
+        """Whether there's something to take."""
+        return self._version < self._newest.version
+
+    def take(self, most: int) -> tuple[bytes, ...]:
+        """Take what changed since the last time, the oldest first.
+
+        Args:
+            most: Most bytes; but a value comes whole, and there's at least one if anything changed.
+        """
+        newest = self._newest
+        if self._version < 0:
+            self._version = 0
+            return (newest.greeting,)
+        found = newest.later(self._version)
+        room = most
+        for count, data in enumerate(found):
+            room -= len(data)
+            if room < 0 and count:
+                self._version = newest.version_of(count, self._version)
+                return found[:count]
+        self._version = newest.version
+        return found

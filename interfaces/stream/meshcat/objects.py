@@ -1,0 +1,156 @@
+"""Objects of the scene, lowered by MeshCat's own classes. Loads those: import it where it's used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from interfaces.stream.meshcat.commands import Json
+from interfaces.stream.meshcat.library import module
+from interfaces.stream.meshcat.meshes import ShadedMesh, tube
+from vrs.model import Array
+
+g = module("geometry")
+
+GHOST = 0x3D8BF2
+"""The virtual robot's tint."""
+COMMITTED = 0xF2721B
+"""Colour of the committed path."""
+FRONT = 0
+"""Only faces that look at the camera are drawn."""
+TUBE = 0.006
+"""Radius of the committed path's line [m]."""
+_CYLINDER = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+"""three.js's cylinders stand along y."""
+
+
+class Part(NamedTuple):
+    """A child of an object: a geometry in a material."""
+
+    geometry: Any
+    material: Any
+    kind: str = "Mesh"
+    matrix: Sequence[float] | None = None
+    """Column-major, (16,); None for the identity."""
+    order: int = 0
+    """Order of drawing."""
+
+
+def group(path: str, parts: Sequence[Part], data: Json | None = None) -> Json:
+    """Lower several parts as one object.
+
+    Args:
+        path: Where it'll be; names its parts, so that equal objects give equal bytes.
+        parts: Its children; they may share geometries and materials.
+        data: What the page finds in the object's `userData`.
+    """
+    lowered: Json = {"metadata": {"version": 4.5, "type": "Object"}, "geometries": [], "materials": []}
+    known: dict[int, str] = {}
+    children: list[Json] = []
+    for part in parts:
+        for element in (part.geometry, part.material):
+            if id(element) not in known:
+                known[id(element)] = element.uuid = f"{path}:{len(known)}"
+                element.lower_in_object(lowered)
+        child: Json = {
+            "uuid": f"{path}:part{len(children)}",
+            "type": part.kind,
+            "geometry": part.geometry.uuid,
+            "material": part.material.uuid,
+            "renderOrder": part.order,
+        }
+        if part.matrix is not None:
+            child["matrix"] = list(part.matrix)
+        children.append(child)
+    lowered["object"] = {"uuid": path, "type": "Group", "children": children, "userData": data or {}}
+    return lowered
+
+
+class Shaded:
+    """A mesh with normals, which MeshCat's own geometry has no place for."""
+
+    def __init__(self, mesh: ShadedMesh, *, coloured: bool) -> None:
+        self._mesh, self._coloured = mesh, coloured
+        self.uuid = ""
+
+    def lower_in_object(self, data: Json) -> None:
+        """Add itself to the object's geometries."""
+        mesh = self._mesh
+        plain = g.TriangularMeshGeometry(mesh.vertices, mesh.faces)
+        plain.uuid = self.uuid
+        plain.lower_in_object(data)
+        attributes = data["geometries"][-1]["data"]["attributes"]
+        attributes["normal"] = g.pack_numpy_array(mesh.normals.T)
+        if self._coloured:
+            attributes["color"] = {**g.pack_numpy_array(mesh.colours.T), "normalized": True}
+
+
+def solid(path: str, mesh: ShadedMesh) -> Json:
+    """Lower a link of the real robot, in its own colours."""
+    material = g.MeshPhongMaterial(vertexColors=True, side=FRONT, shininess=25, specular=0x222222, reflectivity=1.0)
+    return group(path, [Part(Shaded(mesh, coloured=True), material)])
+
+
+def ghost(path: str, mesh: ShadedMesh) -> Json:
+    """Lower a link of the virtual robot: translucent.
+
+    Depth comes first, so that only the nearest surface shows; both are pushed back, so that the ghost yields to the
+    solid robot where the two coincide.
+    """
+    shape = Shaded(mesh, coloured=False)
+    back = {"polygonOffset": True, "polygonOffsetFactor": 1.5, "polygonOffsetUnits": 6}
+    depth = g.MeshBasicMaterial(side=FRONT, transparent=True, colorWrite=False, **back)
+    skin = g.MeshPhongMaterial(color=GHOST, opacity=0.46, side=FRONT, depthWrite=False, **back)
+    return group(path, [Part(shape, depth, order=1), Part(shape, skin, order=2)])
+
+
+def frame(path: str, previous: Array | None, colour: int, opacity: float) -> Json:
+    """Lower a link that has no shape: its axes, and a rod to the link before it.
+
+    Args:
+        path: See `group`.
+        previous: Origin of the link before, in this link's frame [m], (3,); None without a rod.
+        colour: Of the rod.
+        opacity: Of the rod.
+    """
+    triad = g.triad(0.08)
+    parts = [Part(triad.geometry, triad.material, "LineSegments")]
+    if previous is not None and np.linalg.norm(previous) > 1e-6:
+        rod = g.MeshBasicMaterial(color=colour, opacity=opacity)
+        parts.append(Part(_tube(np.array([previous, np.zeros(3)]), 0.012), rod))
+    return group(path, parts)
+
+
+def trace(path: str, points: Array, colour: int) -> Json:
+    """Lower where a tool has been: a thin line through points [m], (k, 3)."""
+    line = g.PointsGeometry(points.T.astype(np.float32))
+    return group(path, [Part(line, g.LineBasicMaterial(color=colour), "Line")])
+
+
+def committed_piece(path: str, points: Array, marks: Sequence[tuple[Array, float]], data: Json) -> Json:
+    """Lower a piece of the committed path, seen faintly through what stands before it.
+
+    Args:
+        path: See `group`.
+        points: Of the line [m], (k, 3); none, or at least two of which no two in a row are equal.
+        marks: Pose of each mark, (4, 4), its z along the path, and its size: a disc of that radius [m], or for a
+            negative one a ball.
+        data: See `group`.
+    """
+    clear = g.MeshBasicMaterial(color=COMMITTED)
+    hidden = g.MeshBasicMaterial(color=COMMITTED, opacity=0.3, depthTest=False, depthWrite=False)
+    shapes: list[tuple[Any, Sequence[float] | None]] = []
+    if len(points):
+        shapes.append((_tube(points, TUBE), None))
+    for X, size in marks:
+        shape = g.Cylinder(0.008, size) if size > 0 else g.Sphere(-size)
+        shapes.append((shape, (X @ _CYLINDER).T.ravel().tolist()))
+    parts = [Part(shape, clear, matrix=matrix) for shape, matrix in shapes]
+    parts += [Part(shape, hidden, matrix=matrix, order=3) for shape, matrix in shapes]
+    return group(path, parts, data)
+
+
+def _tube(points: Array, radius: float) -> Any:
+    return g.TriangularMeshGeometry(*tube(points, radius))

@@ -1,0 +1,225 @@
+"""Both robots and the committed path as MeshCat's commands: the scene once, then what changes."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from interfaces.report.scene import link_shapes
+from interfaces.stream.meshcat.commands import delete, set_object, set_property, set_transform
+from interfaces.stream.meshcat.committed import Committed, Path, Piece
+from interfaces.stream.meshcat.meshes import shaded
+from interfaces.stream.meshcat.newest import Newest, Slot
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
+from vrs.model import Array, RobotModel, frozen_array
+from vrs.timeline import Timeline
+
+ROOT: Final = "/vrs"
+"""The node below which everything stands."""
+PATH_PERIOD: Final = 0.1
+"""The committed path is renewed, trimmed and the traces are drawn at most this often [s]."""
+NODES: Final = 64
+"""Nodes for pieces of the committed path: they are used in turn, since the viewer never forgets one wholly."""
+STILL: Final = 2e-7
+"""A link is put anew where an element of its pose, (4, 4), is off by more than this [m, 1]."""
+TRACE: Final = 3.0
+"""How long a robot without shapes leaves a trace [s]."""
+COLOURS: Final = {"virtual": 0x2F7DE1, "real": 0x8A8578}
+OPACITY: Final = {"virtual": 0.42, "real": 1.0}
+
+
+class MeshcatScene:
+    """What all viewers see, each as quickly as it can: a value that is overtaken is sent to nobody.
+
+    The virtual robot is a ghost, the real one solid; the committed path runs ahead of the real one's tool.
+    """
+
+    def __init__(self, model: RobotModel, *, tool: ArrayLike | None = None) -> None:
+        """Make the scene, with both robots at the first of the model's named poses and only the virtual one shown.
+
+        Args:
+            model: The robot; if it has no shapes, its frames and traces are shown.
+            tool: The point whose path is drawn, in the last link's frame [m], (3,); the flange where that's known.
+        """
+        from interfaces.stream.meshcat import objects
+
+        self._objects = objects
+        self._model = model
+        shapes = link_shapes(model)
+        self._traced = not shapes
+        self._tool = frozen_array(_tool_of(model) if tool is None else tool)
+        if self._tool.shape != (3,) or not np.isfinite(self._tool).all():
+            raise InvalidValueError("tool", tool, "finite, of shape (3,)")
+        self._newest = Newest(delete(ROOT))
+        self._poses: dict[str, Array] = {}
+        self._path: tuple[Timeline, Path] | None = None
+        self._drawn: dict[int, Piece] = {}
+        self._due = float("-inf")
+        self._trails: dict[str, deque[tuple[float, Array]]] = {twin: deque(maxlen=128) for twin in COLOURS}
+        q = next(iter(model.poses.values()), 0.5 * (model.limits.q_min + model.limits.q_max))
+        rest = np.asarray(model.links(q))
+        floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
+        self._set(ROOT, "box", _box(model, floor))
+        # Below the floor by a hair: no stripes where a foot stands on it.
+        self._put("/Grid", set_transform("/Grid", _at(0.0, 0.0, floor - 0.001)))
+        self._set("/Axes", "visible", False)
+        meshes = [shaded(shape) for shape in shapes]
+        for twin in COLOURS:
+            for i in range(len(rest)):
+                path = f"{ROOT}/{twin}/body/{i}"
+                if meshes:
+                    body = (objects.ghost if twin == "virtual" else objects.solid)(path, meshes[i])
+                else:
+                    before = None if i == 0 else _rod(model, i)
+                    body = objects.frame(path, before, COLOURS[twin], OPACITY[twin])
+                self._put(f"{path} object", set_object(path, body))
+            self._move(twin, rest)
+        self._set(f"{ROOT}/real", "visible", False)
+
+    @property
+    def viewers(self) -> int:
+        """How many viewers there are."""
+        return self._newest.readers
+
+    def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
+        """Give a viewer a place: it gets the scene, and from then on what changes.
+
+        Args:
+            changed: Is called when there may be something to take; it must return at once.
+
+        Raises:
+            InvalidValueError: If there are too many.
+        """
+        return self._newest.join(changed)
+
+    def leave(self, slot: Slot) -> None:
+        """Give a place back; one that was given back already is none."""
+        self._newest.leave(slot)
+
+    def show(
+        self, *, virtual: ArrayLike, real: ArrayLike | None = None, path: Committed | None = None, now: float
+    ) -> None:
+        """Show both robots where they are now; to be called at the rate of frames, also while they rest.
+
+        Args:
+            virtual: Poses of the virtual robot's base and links, (n + 1, 4, 4), as `model.links(q)`.
+            real: The real one's; None hides it.
+            path: What the real robot is committed to; None for no path.
+            now: [s], never less than before; the same origin as ever, it only spaces updates.
+
+        Raises:
+            InvalidValueError: If poses have another shape or aren't finite; nothing changes then.
+        """
+        number_in("now", now, -1e15, 1e15)
+        poses = {"virtual": self._checked("virtual", virtual)}
+        if real is not None:
+            poses["real"] = self._checked("real", real)
+        before = self._newest.version
+        for twin, links in poses.items():
+            self._move(twin, links)
+        self._set(f"{ROOT}/real", "visible", real is not None)
+        if now >= self._due:
+            self._due = now + PATH_PERIOD
+            self._draw(path)
+            if self._traced:
+                self._trace(poses, now)
+        if self._newest.version != before:
+            self._newest.wake()
+
+    def _checked(self, name: str, links: ArrayLike) -> Array:
+        X = np.asarray(links, dtype=np.float64)
+        shape = (self._model.limits.dof + 1, 4, 4)
+        if X.shape != shape or not np.isfinite(X).all():
+            raise InvalidValueError(name, X.shape, f"finite poses of shape {shape}")
+        return X
+
+    def _move(self, twin: str, links: Array) -> None:
+        shown = self._poses.get(twin)
+        if shown is None:
+            shown = self._poses[twin] = np.full_like(links, np.inf)
+        moved = np.abs(links - shown).max(axis=(1, 2)) > STILL
+        for i in np.flatnonzero(moved).tolist():
+            path = f"{ROOT}/{twin}/body/{i}"
+            self._put(path, set_transform(path, links[i]))
+        shown[moved] = links[moved]
+
+    def _draw(self, committed: Committed | None) -> None:
+        pieces: tuple[Piece, ...] = ()
+        if committed is not None:
+            timeline, play = committed.timeline, committed.play
+            known = self._path
+            # A path reaches only so far ahead: it's sampled again as the robot comes nearer to where it was cut.
+            if known is None or known[0] is not timeline or not known[1].reaches(play):
+                known = self._path = timeline, Path(self._model, timeline, play, self._tool)
+            pieces = known[1].pieces(play)
+            if pieces:
+                self._set(f"{ROOT}/committed", "play", round(play, 2))
+        wanted = {piece.index % NODES: piece for piece in pieces if piece}
+        for node in self._drawn.keys() - wanted.keys():
+            del self._drawn[node]
+            self._set(f"{ROOT}/committed/{node}", "visible", False)
+        for node, piece in wanted.items():
+            known_piece = self._drawn.get(node)
+            if known_piece is not None and known_piece.equals(piece):
+                continue
+            self._drawn[node] = piece
+            where = f"{ROOT}/committed/{node}"
+            label = {} if piece.t is None else {"t": round(piece.t, 3), "end": piece.ends}
+            lowered = self._objects.committed_piece(where, piece.points, piece.marks, label)
+            self._put(f"{where} object", set_object(where, lowered))
+            self._set(where, "visible", True)
+
+    def _trace(self, poses: dict[str, Array], now: float) -> None:
+        for twin, trail in self._trails.items():
+            links = poses.get(twin)
+            if links is not None:
+                point = links[-1, :3, :3] @ self._tool + links[-1, :3, 3]
+                if not trail or np.linalg.norm(point - trail[-1][1]) > 1e-3:
+                    trail.append((now, point))
+            while trail and trail[0][0] < now - TRACE:
+                trail.popleft()
+            path = f"{ROOT}/{twin}/trace"
+            if len(trail) > 1:
+                points = np.array([point for _, point in trail])
+                self._put(f"{path} object", set_object(path, self._objects.trace(path, points, COLOURS[twin])))
+            self._set(path, "visible", len(trail) > 1)
+
+    def _set(self, path: str, name: str, value: Any) -> None:
+        self._put(f"{path} {name}", set_property(path, name, value))
+
+    def _put(self, key: str, command: bytes) -> None:
+        self._newest.put(key, command)
+
+
+def _tool_of(model: RobotModel) -> ArrayLike:
+    if model.name == "puma560":
+        from robots.puma560.parameters import FLANGE
+
+        return (0.0, 0.0, FLANGE)
+    return (0.0, 0.0, 0.0)
+
+
+def _at(x: float, y: float, z: float) -> Array:
+    X = np.eye(4)
+    X[:3, 3] = x, y, z
+    return X
+
+
+def _rod(model: RobotModel, i: int) -> Array | None:
+    """Origin of link i − 1 in link i's frame [m], (3,); None where that isn't constant."""
+    low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
+    one, other = ((np.linalg.inv(X[i]) @ X[i - 1])[:3, 3] for X in model.links(low + np.outer((0.4, 0.6), span)))
+    return one if np.allclose(one, other, atol=1e-9) else None
+
+
+def _box(model: RobotModel, floor: float) -> list[list[float]]:
+    """Corners of what the camera is to show [m]: the floor, and the arm at its named poses, turned about z."""
+    poses = list(model.poses.values()) or [0.5 * (model.limits.q_min + model.limits.q_max)]
+    points = np.asarray(model.links(np.array(poses)))[..., :3, 3].reshape(-1, 3)
+    reach = float(np.linalg.norm(points[:, :2], axis=1).max()) + 0.05
+    return [[-reach, -reach, floor], [reach, reach, max(float(points[:, 2].max()), floor + reach) + 0.05]]

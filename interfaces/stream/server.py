@@ -1,0 +1,232 @@
+"""The sockets of a hub: a task that writes for each client, and one look at those whose sending is blocked."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
+from websockets.frames import Opcode
+
+from interfaces.stream.access import check_host, check_origin
+from interfaces.stream.codec import Encoding
+from interfaces.stream.hub import Hub
+from interfaces.stream.session import Session
+from interfaces.stream.sockets import BoundedWebSocket
+from vrs.clock import Clock
+
+BLOCKED = 2.0
+"""A client is cut off when a message has waited so long to be sent [s]."""
+_LOOK = 0.25
+"""Time between two looks at who is blocked [s]."""
+_FAREWELL = 2.0
+"""Time for a closing handshake before a connection is cut off [s]."""
+_DONE = 1000, 1001
+"""Close codes of a client that is done."""
+
+
+class _Client:
+    __slots__ = ("blocked_since", "session", "socket", "wake")
+
+    def __init__(self, session: Session, socket: BoundedWebSocket) -> None:
+        self.session, self.socket = session, socket
+        self.wake = asyncio.Event()
+        self.blocked_since: float | None = None
+
+
+class HubServer:
+    """Joins a hub to sockets. Enter it where its loop runs; `routes` go into an application."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        clock: Clock,
+        *,
+        health: Callable[[], Mapping[str, Any]] | None = None,
+        turned: Callable[[], None] | None = None,
+    ) -> None:
+        """Serve a hub.
+
+        Args:
+            hub: Nobody else calls its `advance` while this runs.
+            clock: Session time.
+            health: More for `/health`.
+            turned: Called whenever the hub has advanced: the robot may have been told something.
+        """
+        self.hub, self.clock = hub, clock
+        self._health, self._turned = health, turned
+        self._clients: dict[Session, _Client] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self._kicked = self._running = False
+        self._now = clock.now()
+        self.cut_off = 0
+        """Clients that were cut off because their sending was blocked."""
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """`/ws` and `/health`."""
+        return [Route("/health", self._say_health), WebSocketRoute("/ws", _Endpoint(self))]
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[HubServer]:
+        """Make frames and serve clients meanwhile."""
+        watcher = asyncio.create_task(self._watch())
+        self._running = True
+        self.turn()
+        try:
+            yield self
+        finally:
+            self._running = False
+            watcher.cancel()
+            if self._timer is not None:
+                self._timer.cancel()
+            for session in self.hub.close():
+                if session in self._clients:
+                    self._clients[session].wake.set()
+
+    def kick(self) -> None:
+        """Something has come: `turn` soon."""
+        if not self._kicked and self._running:
+            self._kicked = True
+            asyncio.get_running_loop().call_soon(self.turn)
+
+    def turn(self) -> None:
+        """Do what is due, and wake the writers that have something to send."""
+        self._kicked = False
+        if not self._running:
+            return
+        now = self._now = self.clock.now()
+        for session in self.hub.advance(now=now):
+            self._clients[session].wake.set()
+        if self._turned is not None:
+            self._turned()
+        if self._timer is not None:
+            self._timer.cancel()
+        deadline = self.hub.next_deadline()
+        if deadline is not None:
+            wait = max(deadline - self.clock.now(), 0.0)
+            self._timer = asyncio.get_running_loop().call_later(wait, self.turn)
+
+    async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection that was accepted, until it ends."""
+        session = self.hub.open(encoding, now=self.clock.now())
+        client = self._clients[session] = _Client(session, scope["state"]["socket"])
+        writer = asyncio.create_task(self._write(client, send))
+        client.wake.set()
+        done = False
+        try:
+            while (message := await receive())["type"] != "websocket.disconnect":
+                data = message.get("bytes")
+                session.receive(message["text"] if data is None else data, now=self.clock.now())
+                self.kick()
+            done = message.get("code") in _DONE and session.closing is None
+        finally:
+            writer.cancel()
+            del self._clients[session]
+            self.hub.leave(session, done=done, now=self.clock.now())
+            asyncio.get_running_loop().call_later(_FAREWELL, client.socket.abort)
+            await asyncio.wait([writer])
+
+    async def _write(self, client: _Client, send: Send) -> None:
+        session, socket = client.session, client.socket
+        opcode = Opcode.BINARY if session.encoding is Encoding.MSGPACK else Opcode.TEXT
+        with contextlib.suppress(OSError):
+            while session.closing is None or session.has_more:
+                await client.wake.wait()
+                client.wake.clear()
+                more = True
+                while more:
+                    for data in session.advance(now=self._now):
+                        client.blocked_since = self._now
+                        await socket.put(data, opcode)
+                    more = session.has_more
+                client.blocked_since = None
+            assert session.closing is not None
+            code, reason = session.closing
+            await send({"type": "websocket.close", "code": code, "reason": reason[:100]})
+
+    async def _watch(self) -> None:
+        while True:
+            await asyncio.sleep(_LOOK)
+            limit = self.clock.now() - BLOCKED
+            for client in list(self._clients.values()):
+                if client.blocked_since is not None and client.blocked_since < limit:
+                    self.cut_off += 1
+                    client.socket.abort()
+
+    async def _say_health(self, request: Request) -> JSONResponse:  # noqa: ARG002 - Starlette gives it
+        hub = self.hub
+        facts = {
+            "ok": True,
+            "now": self.clock.now(),
+            "robot": hub.site.engine.model.name,
+            "server": hub.config.server,
+            "clients": len(self._clients),
+            "cut_off": self.cut_off,
+            "lease": hub.lease_state.value,
+        }
+        return JSONResponse(facts | dict(self._health() if self._health is not None else {}))
+
+
+class _Endpoint:
+    """`/ws` as an ASGI application."""
+
+    def __init__(self, server: HubServer) -> None:
+        self._server = server
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await receive()
+        chosen = next((name for name in scope["subprotocols"] if name in set(Encoding)), None)
+        if chosen is None:
+            await send({"type": "websocket.close", "code": 1002, "reason": "no subprotocol of ours"})
+            return
+        await send({"type": "websocket.accept", "subprotocol": chosen})
+        await self._server.serve(Encoding(chosen), scope, receive, send)
+
+
+class Guard:
+    """Lets in only what names this server exactly, and comes from no other's page."""
+
+    def __init__(self, app: ASGIApp, allowed: frozenset[str]) -> None:
+        """Stand before an application.
+
+        Args:
+            app: The application.
+            allowed: From `access.hosts`.
+        """
+        self._app, self._allowed = app, allowed
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, or answer 403."""
+        if scope["type"] in {"http", "websocket"}:
+            given = [(name.lower(), value.decode("latin-1")) for name, value in scope["headers"]]
+            host = [value for name, value in given if name == b"host"]
+            origin = [value for name, value in given if name == b"origin"]
+            if not (check_host(host, self._allowed) and check_origin(origin, self._allowed)):
+                await _refuse(scope, receive, send)
+                return
+        await self._app(scope, receive, send)
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008, "reason": ""})
+    else:
+        await PlainTextResponse("this Host or Origin isn't allowed here\n", 403)(scope, receive, send)
+
+
+def application(routes: Sequence[BaseRoute], allowed: frozenset[str]) -> ASGIApp:
+    """An application of routes, behind a `Guard`.
+
+    Args:
+        routes: What it answers.
+        allowed: From `access.hosts`.
+    """
+    return Guard(Starlette(routes=list(routes)), allowed)

@@ -1,0 +1,251 @@
+"""A client's connection as the server sees it: greeted, bounded, and served by its servlet."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from interfaces.messages import Ask, Broadcast, Follow, Order, Outcome, Pulse, Want
+from interfaces.servlet import Servlet
+from interfaces.stream import control
+from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
+from interfaces.stream.control import Problem, ProblemCode, Role
+from interfaces.stream.errors import ProtocolError
+from interfaces.stream.limits import Bucket, Limits
+from interfaces.stream.outbox import Outbox
+
+POLICY, TOO_LARGE, RESTART, TRY_AGAIN = 1008, 1009, 1012, 1013
+"""Close codes of WebSocket (RFC 6455, and IANA's registry)."""
+
+_FORGIVEN = 1.0
+"""Bad messages that are forgiven a second."""
+_MUTE = 1.0
+"""Time between two complaints that a client sends too fast [s]."""
+
+Closing = tuple[int, str]
+"""Close code and reason."""
+Wish = control.Acquire | control.TakeOver | control.Release | control.Resume | control.Beat
+"""What a client asks of the lease."""
+_ALLOWED = control.Ping | control.Pong | control.Problem | Wish | Order | Ask | Follow | Want
+"""What may come once the client is welcome."""
+
+
+class Seat:
+    """What a session keeps while its connection is lost: who it is, and its servlet."""
+
+    __slots__ = ("key", "left", "name", "role", "servlet", "session", "settled")
+
+    def __init__(self, key: str, name: str, role: Role) -> None:
+        self.key, self.name, self.role = key, name, role
+        self.servlet: Servlet
+        self.session: Session | None = None
+        self.left = 0.0
+        """When its connection was lost [s]."""
+        self.settled = 0
+        """Orders up to this number have an outcome."""
+
+
+class Desk(Protocol):
+    """What a session needs of the hub."""
+
+    limits: Limits
+    encoder: SharedEncoder
+    state: control.State | None
+    lease_version: int
+
+    def engine_time(self, now: float) -> float:
+        """The engine's time [s]."""
+
+    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, control.Welcome] | Problem:
+        """Let a client in, or say why not."""
+
+    def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
+        """Do what a client asks of the lease."""
+
+    def lease_for(self, seat: Seat, answers: int | None = None) -> control.Lease:
+        """The lease as a client sees it."""
+
+
+class Session:
+    """One connection. Whatever comes in, others aren't affected; what goes out is bounded."""
+
+    def __init__(self, desk: Desk, encoding: Encoding, *, now: float) -> None:
+        """Wait for `Hello`.
+
+        Args:
+            desk: The hub.
+            encoding: How its messages are written.
+            now: Session time [s].
+        """
+        self._desk, self._limits = desk, desk.limits
+        self.encoding = encoding
+        self.seat: Seat | None = None
+        self.closing: Closing | None = None
+        """Code and reason with which the connection is to be closed, when what waits is sent."""
+        self._outbox = Outbox(desk.encoder.encode, encoding, self._limits.waiting)
+        self._allowed = Bucket(self._limits.rate, self._limits.burst, now)
+        self._excess = Bucket(self._limits.excess / 10, self._limits.excess, now)
+        self._bad = Bucket(_FORGIVEN, self._limits.bad, now)
+        self._hello_until = now + self._limits.hello
+        self._quiet_until = now
+        self._lease = -1
+        self._state: control.State | None = None
+
+    @property
+    def dropped(self) -> int:
+        """Messages for the client that found no room."""
+        return self._outbox.dropped
+
+    @property
+    def has_more(self) -> bool:
+        """Whether `advance` has something at once."""
+        return bool(self._outbox)
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that wait for the client."""
+        return self._outbox.waiting
+
+    def receive(self, data: bytes | str, *, now: float) -> None:
+        """Take a frame of the client; bytes for msgpack, text for JSON.
+
+        Args:
+            data: What has come.
+            now: Session time [s].
+        """
+        if self.closing is not None:
+            return
+        if not self._allowed.take(now):
+            self._slow_down(now)
+            return
+        if len(data) > self._limits.size:
+            self.close(TOO_LARGE, ProblemCode.TOO_LARGE, f"at most {self._limits.size} bytes a message")
+            return
+        try:
+            if isinstance(data, str) is not (self.encoding is Encoding.JSON):
+                raise ProtocolError(ProblemCode.MALFORMED, "JSON comes as text, msgpack as bytes")
+            raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
+            allowed = control.Hello if self.seat is None else _ALLOWED
+            message = decode(raw, self.encoding, allowed=allowed, largest=self._limits.size)
+        except ProtocolError as error:
+            self._complain(Problem(error.code, error.text), now)
+            return
+        if self.seat is None:
+            self._greet(message, now)
+        else:
+            self._take(self.seat, message, now)
+
+    def _take(self, seat: Seat, message: Value, now: float) -> None:
+        if isinstance(message, control.Ping):
+            self._put(control.Pong(message.number, message.t, now, now))
+        elif isinstance(message, Order | Ask | Follow | Want):
+            self._serve(seat, message, now)
+        elif isinstance(message, Wish):
+            answer = self._desk.wish(seat, message, now)
+            if isinstance(answer, control.Lease):
+                self._lease = self._desk.lease_version
+            if answer is not None:
+                self._put(answer)
+
+    def _greet(self, hello: control.Hello, now: float) -> None:
+        found = self._desk.greet(self, hello, now)
+        if isinstance(found, Problem):
+            self.close(POLICY, found.code, found.text)
+            return
+        self.seat, welcome = found
+        self._lease = self._desk.lease_version
+        self._put(welcome)
+
+    def _serve(self, seat: Seat, message: Order | Ask | Follow | Want, now: float) -> None:
+        if not isinstance(message, Order):
+            if self._outbox.is_full:
+                return
+        elif seat.role is Role.VIEWER:
+            text = "a viewer commands nothing"
+            self._complain(Problem(ProblemCode.NOT_ALLOWED, text, message.number), now)
+            return
+        seat.servlet.receive(message, now=self._desk.engine_time(now))
+        self.look(now=now)
+
+    def look(self, *, now: float) -> None:
+        """Put what the servlet has into the outbox; of frames and pulses only the newest waits."""
+        seat = self.seat
+        if seat is None:
+            return
+        for reply in seat.servlet.advance(now=self._desk.engine_time(now)):
+            if isinstance(reply, Broadcast | Pulse):
+                self._outbox.put_newest(reply)
+                continue
+            if isinstance(reply, Outcome):
+                seat.settled = max(seat.settled, reply.number)
+            self._outbox.put(reply)
+
+    def is_due(self, now: float) -> bool:
+        """Whether `advance` has something to send, or the connection is to be closed, at now [s]."""
+        if self._outbox or self.closing is not None:
+            return True
+        if self.seat is None:
+            return now >= self._hello_until
+        if self._desk.lease_version != self._lease or self._desk.state is not self._state:
+            return True
+        t = self.seat.servlet.next_deadline()
+        return t is not None and t <= self._desk.engine_time(now)
+
+    def next_deadline(self) -> float | None:
+        """When `Hello` must have come [s]; afterwards the hub asks `is_due` as often as it makes frames."""
+        return self._hello_until if self.seat is None and self.closing is None else None
+
+    def advance(self, *, now: float) -> tuple[bytes, ...]:
+        """What is to be sent next, some 16 KiB at once; a transport that can't send doesn't call.
+
+        Args:
+            now: Session time [s].
+        """
+        if self.closing is None:
+            if self.seat is not None:
+                self._look_around(self.seat, now)
+            elif now >= self._hello_until:
+                self.close(POLICY, ProblemCode.HELLO_LATE, f"hello must come within {self._limits.hello:g} s")
+        return self._outbox.take()
+
+    def _look_around(self, seat: Seat, now: float) -> None:
+        desk = self._desk
+        if desk.lease_version != self._lease:
+            self._lease = desk.lease_version
+            self._outbox.put_newest(desk.lease_for(seat))
+        if desk.state is not None and desk.state is not self._state:
+            self._state = desk.state
+            self._outbox.put_newest(desk.state)
+        self.look(now=now)
+
+    def close(self, code: int, problem: ProblemCode, text: str) -> None:
+        """Close the connection, with a last word.
+
+        Args:
+            code: Close code of WebSocket.
+            problem: Why.
+            text: Why, for people.
+        """
+        if self.closing is None:
+            self.closing = code, text
+            self._put(Problem(problem, text, fatal=True))
+
+    def _put(self, message: Value) -> None:
+        self._outbox.put(message)
+
+    def _complain(self, problem: Problem, now: float) -> None:
+        if self.seat is None:
+            late = problem.code is ProblemCode.NOT_ALLOWED
+            code = ProblemCode.HELLO_EXPECTED if late else problem.code
+            self.close(POLICY, code, f"the first message must be hello: {problem.text}")
+        elif self._bad.take(now):
+            self._put(problem)
+        else:
+            self.close(POLICY, problem.code, f"too many messages that can't be taken, the last one: {problem.text}")
+
+    def _slow_down(self, now: float) -> None:
+        text = f"at most {self._limits.rate:g} messages a second"
+        if not self._excess.take(now):
+            self.close(POLICY, ProblemCode.TOO_FAST, text)
+        elif now >= self._quiet_until:
+            self._quiet_until = now + _MUTE
+            self._put(Problem(ProblemCode.TOO_FAST, text))

@@ -1,0 +1,305 @@
+"""Control messages on the wire."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from interfaces.stream import control
+from interfaces.stream.control import ProblemCode, Role
+from interfaces.stream.wire.fields import (
+    Count,
+    Epoch,
+    Finite,
+    Joints,
+    Message,
+    Name,
+    Number,
+    Stamp,
+    Text,
+    Time,
+    Wire,
+    Word,
+    array,
+    digits,
+    epoch,
+    numbers,
+    text,
+)
+from interfaces.stream.wire.requests import Rate
+from robots.onboard.lease import LeaseEnd, LeaseState
+from vrs.errors import InvalidValueError
+from vrs.model import Limits
+
+
+class HelloWire(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
+    """`Hello`."""
+
+    protocol: Number
+    role: Role
+    name: Name
+    token: Word | None = None
+    session: Word | None = None
+
+    def read(self) -> control.Hello:
+        """Who it is."""
+        return control.Hello(self.role, self.name, self.token, self.session, self.protocol)
+
+
+class LeaseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="lease"):
+    """`Lease`."""
+
+    state: LeaseState
+    epoch: Epoch | None = None
+    holder: Name | None = None
+    yours: bool = False
+    answers: Number | None = None
+    ended: LeaseEnd | None = None
+
+    @classmethod
+    def of(cls, value: control.Lease, packed: bool) -> LeaseWire:  # noqa: ARG003 - the same in both encodings
+        """See `Message.of`."""
+        number = None if value.epoch is None else str(value.epoch)
+        return cls(value.state, number, value.holder, value.yours, value.answers, value.ended)
+
+    def read(self) -> control.Lease:
+        """The lease."""
+        number = None if self.epoch is None else epoch(self.epoch)
+        return control.Lease(self.state, number, self.holder, self.yours, self.answers, self.ended)
+
+
+class LimitsWire(Wire, frozen=True, omit_defaults=True, gc=False):
+    """`Limits`."""
+
+    q_min: Joints
+    q_max: Joints
+    qd_max: Joints
+    qdd_max: Joints
+    qddd_max: Joints
+
+    @classmethod
+    def of(cls, limits: Limits) -> LimitsWire:
+        """The wire form."""
+        return cls(*[numbers(getattr(limits, name)) for name in cls.__struct_fields__])
+
+    def read(self) -> Limits:
+        """The limits."""
+        return Limits(*[array(getattr(self, name)) for name in self.__struct_fields__])
+
+
+Poses = Annotated[dict[Name, Joints], Meta(max_length=100)]
+
+
+class WelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="welcome"):
+    """`Welcome`."""
+
+    protocol: Number
+    session: Word
+    role: Role
+    robot: Word
+    dof: Annotated[int, Meta(ge=1, le=64)]
+    limits: LimitsWire
+    poses: Poses
+    now: Time
+    lease: LeaseWire
+    lease_timeout: Annotated[float, Meta(gt=0, le=3600)]
+    rates: Annotated[tuple[Rate, ...], Meta(max_length=100)] = ()
+    resumed: bool = False
+    instance: Word = ""
+    server: Word = ""
+
+    @classmethod
+    def of(cls, value: control.Welcome, packed: bool) -> WelcomeWire:
+        """See `Message.of`."""
+        return cls(
+            value.protocol,
+            value.session,
+            value.role,
+            value.robot,
+            value.limits.dof,
+            LimitsWire.of(value.limits),
+            {name: numbers(q) for name, q in value.poses.items()},
+            value.now,
+            LeaseWire.of(value.lease, packed),
+            value.lease_timeout,
+            value.rates,
+            value.resumed,
+            value.instance,
+            value.server,
+        )
+
+    def read(self) -> control.Welcome:
+        """What there is."""
+        widths = {len(q) for q in self.poses.values()} | {len(self.limits.q_min)}
+        if widths != {self.dof}:
+            raise InvalidValueError("dof", self.dof, f"as wide as limits and poses, {sorted(widths)}")
+        return control.Welcome(
+            self.session,
+            self.role,
+            self.robot,
+            self.limits.read(),
+            {name: array(q) for name, q in self.poses.items()},
+            self.now,
+            self.lease.read(),
+            self.rates,
+            self.resumed,
+            self.instance,
+            self.server,
+            self.lease_timeout,
+            self.protocol,
+        )
+
+
+class AttachedWire(Message, frozen=True, omit_defaults=True, gc=False, tag="attached"):
+    """`Attached`."""
+
+    protocol: Number
+    robot: Word
+    q: Joints
+    link_loss: Word
+    timeout: Annotated[float, Meta(gt=0, le=3600)]
+    offset: Time | None = None
+    instance: Word = ""
+    server: Word = ""
+
+    def read(self) -> control.Attached:
+        """What the robot is."""
+        return control.Attached(
+            self.robot, array(self.q), self.link_loss, self.timeout, self.offset, self.instance, self.server,
+            self.protocol,
+        )  # fmt: skip
+
+
+class PingWire(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
+    """`Ping`."""
+
+    number: Number
+    t: Stamp
+
+    def read(self) -> control.Ping:
+        """The probe."""
+        return control.Ping(self.number, self.t)
+
+
+class PongWire(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
+    """`Pong`."""
+
+    number: Number
+    t: Stamp
+    received: Stamp
+    answered: Stamp
+
+    def read(self) -> control.Pong:
+        """The echo."""
+        return control.Pong(self.number, self.t, self.received, self.answered)
+
+
+class AcquireWire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):
+    """`Acquire`."""
+
+    number: Number
+
+    def read(self) -> control.Acquire:
+        """The request."""
+        return control.Acquire(self.number)
+
+
+class TakeOverWire(Message, frozen=True, omit_defaults=True, gc=False, tag="take-over"):
+    """`TakeOver`."""
+
+    number: Number
+
+    def read(self) -> control.TakeOver:
+        """The request."""
+        return control.TakeOver(self.number)
+
+
+class HoldersWire(Message, frozen=True, omit_defaults=True, gc=False):
+    """A request of who holds the lease."""
+
+    number: Number
+    epoch: Epoch
+
+    @classmethod
+    def of(cls, value: control.Release | control.Resume, packed: bool) -> HoldersWire:  # noqa: ARG003 - see there
+        """See `Message.of`."""
+        return cls(value.number, str(value.epoch))
+
+
+class ReleaseWire(HoldersWire, frozen=True, omit_defaults=True, gc=False, tag="release"):
+    """`Release`."""
+
+    def read(self) -> control.Release:
+        """The request."""
+        return control.Release(self.number, epoch(self.epoch))
+
+
+class ResumeWire(HoldersWire, frozen=True, omit_defaults=True, gc=False, tag="resume"):
+    """`Resume`."""
+
+    def read(self) -> control.Resume:
+        """The request."""
+        return control.Resume(self.number, epoch(self.epoch))
+
+
+class BeatWire(Message, frozen=True, omit_defaults=True, gc=False, tag="beat"):
+    """`Beat`."""
+
+    epoch: Epoch
+
+    @classmethod
+    def of(cls, value: control.Beat, packed: bool) -> BeatWire:  # noqa: ARG003 - the same in both encodings
+        """See `Message.of`."""
+        return cls(str(value.epoch))
+
+    def read(self) -> control.Beat:
+        """The heartbeat."""
+        return control.Beat(epoch(self.epoch))
+
+
+class ProblemWire(Message, frozen=True, omit_defaults=True, gc=False, tag="problem"):
+    """`Problem`."""
+
+    code: ProblemCode
+    text: Text
+    number: Number | None = None
+    fatal: bool = False
+
+    @classmethod
+    def of(cls, value: control.Problem, packed: bool) -> ProblemWire:  # noqa: ARG003 - the same in both encodings
+        """See `Message.of`."""
+        return cls(value.code, text(value.text), value.number, value.fatal)
+
+    def read(self) -> control.Problem:
+        """The problem."""
+        return control.Problem(self.code, self.text, self.number, self.fatal)
+
+
+class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state"):
+    """`State`."""
+
+    number: Number
+    t: Time
+    q: Joints
+    play: Time
+    pace: Finite
+    D: Time
+    following_error: Finite
+    epoch: Epoch | None = None
+    connected: bool = True
+    halted: Text = ""
+    corrections: Count = 0
+
+    @classmethod
+    def of(cls, value: control.State, packed: bool) -> StateWire:  # noqa: ARG003 - the same in both encodings
+        """See `Message.of`."""
+        where = value.play, value.pace, value.D, value.following_error
+        rest = digits(value.epoch), value.connected, text(value.halted), value.corrections
+        return cls(value.number, value.t, numbers(value.q), *where, *rest)
+
+    def read(self) -> control.State:
+        """The state."""
+        where = self.play, self.pace, self.D, self.following_error
+        rest = epoch(self.epoch), self.connected, self.halted, self.corrections
+        return control.State(self.number, self.t, array(self.q), *where, *rest)

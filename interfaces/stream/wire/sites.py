@@ -1,0 +1,150 @@
+"""Messages between the operator's site and the robot's, on the wire."""
+
+from __future__ import annotations
+
+from typing import Annotated, Generic
+
+from msgspec import Meta
+
+from interfaces.stream.wire.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.stream.wire.fields import (
+    Count,
+    Epoch,
+    Finite,
+    Joints,
+    Message,
+    Number,
+    Stamp,
+    Text,
+    Time,
+    Wire,
+    array,
+    epoch,
+    numbers,
+    text,
+)
+from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
+from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+
+MOST_ENTRIES = 4096
+"""Entries or receipts in one message, at most."""
+
+
+class EntryWire(Wire, frozen=True, omit_defaults=True, gc=False):
+    """`Entry`."""
+
+    number: Number
+    at: Time
+    command_id: Count
+    command: CommandWire | None = None
+
+    @classmethod
+    def of(cls, entry: Entry, packed: bool) -> EntryWire:
+        """The wire form."""
+        return cls(entry.number, entry.at, entry.command_id, command_wire(entry.command, packed))
+
+    def read(self) -> Entry:
+        """The entry."""
+        return Entry(self.number, self.at, None if self.command is None else self.command.read(), self.command_id)
+
+
+class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders"):
+    """`Orders`."""
+
+    epoch: Epoch
+    number: Number
+    sent_at: Stamp
+    newest: Count
+    complete_until: Time
+    epoch_began: Time
+    heard: Count = 0
+    entries: Annotated[tuple[EntryWire, ...], Meta(max_length=MOST_ENTRIES)] = ()
+
+    @classmethod
+    def of(cls, value: Orders, packed: bool) -> OrdersWire:
+        """See `Message.of`."""
+        times = value.newest, value.complete_until, value.epoch_began
+        entries = tuple(EntryWire.of(entry, packed) for entry in value.entries)
+        return cls(str(value.epoch), value.number, value.sent_at, *times, value.heard, entries)
+
+    def read(self) -> Orders:
+        """The orders."""
+        times = self.newest, self.complete_until, self.epoch_began
+        entries = tuple(entry.read() for entry in self.entries)
+        return Orders(epoch(self.epoch), self.number, self.sent_at, *times, self.heard, entries)
+
+
+class PlanWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
+    """`PlanPart`."""
+
+    version: Count
+    since: Time
+    initial: Joints
+    dof: Dof = 0
+    start: Time = 0.0
+    segments: Planned[C] = ()
+
+    @classmethod
+    def of(cls, plan: PlanPart, packed: bool) -> PlanWire[C]:
+        """The wire form."""
+        return cls(plan.version, plan.since, numbers(plan.initial), *rows(plan.segments, packed))
+
+    def read(self) -> PlanPart:
+        """The plan."""
+        segments = segments_of(self.dof, self.start, self.segments)
+        return PlanPart(self.version, self.since, array(self.initial), segments)
+
+
+class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False, tag="report"):
+    """`Report`."""
+
+    epoch: Epoch
+    number: Number
+    sent_at: Stamp
+    executed: Count
+    play: Time
+    pace: Finite
+    q: Joints
+    measured_at: Stamp
+    q_at: Time
+    echo: tuple[Number, Stamp, Stamp] | None = None
+    halted: Text = ""
+    receipts: Annotated[tuple[tuple[Number, ReceiptWire], ...], Meta(max_length=MOST_ENTRIES)] = ()
+    plan: PlanWire[C] | None = None
+
+    @classmethod
+    def of(cls, value: Report, packed: bool) -> ReportWire[C]:
+        """See `Message.of`."""
+        return cls(
+            str(value.epoch),
+            value.number,
+            value.sent_at,
+            value.executed,
+            value.play,
+            value.pace,
+            numbers(value.q),
+            value.measured_at,
+            value.q_at,
+            value.echo,
+            text(value.halted),
+            tuple((number, ReceiptWire.of(receipt)) for number, receipt in value.receipts),
+            None if value.plan is None else PlanWire.of(value.plan, packed),
+        )
+
+    def read(self) -> Report:
+        """The report."""
+        return Report(
+            epoch(self.epoch),
+            self.number,
+            self.sent_at,
+            self.echo,
+            self.executed,
+            self.play,
+            self.pace,
+            array(self.q),
+            self.measured_at,
+            self.q_at,
+            self.halted,
+            tuple((number, receipt.read()) for number, receipt in self.receipts),
+            None if self.plan is None else self.plan.read(),
+        )

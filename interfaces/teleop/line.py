@@ -1,0 +1,64 @@
+"""The operator's end of a connection to a robot: an emulated link on the way, probes answered, silence noticed."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from interfaces.link import Link, LinkConditions
+from interfaces.ports import earliest
+from interfaces.stream.control import Ping, Pong
+from interfaces.teleop.messages import Orders, Report
+from interfaces.teleop.operator import OperatorSite
+
+ToRobot: TypeAlias = Orders | Pong
+ToOperator: TypeAlias = Report | Ping
+
+
+class RobotLine:
+    """Carries what the operator's site says to a connection, and back. Times are the operator's session time."""
+
+    def __init__(self, operator: OperatorSite, conditions: LinkConditions, rng: np.random.Generator) -> None:
+        """Begin without a connection.
+
+        Args:
+            operator: The operator's site.
+            conditions: What is emulated on the way, both ways.
+            rng: Source of everything random in that.
+        """
+        self.operator = operator
+        self.link: Link[ToRobot, ToOperator] = Link(conditions, rng)
+        self.connected = False
+        """Whether there's a connection to send on."""
+        self.heard = -math.inf
+        """When something came from the robot last [s]."""
+
+    def receive(self, message: ToOperator, *, now: float) -> None:
+        """Take a message off the connection: it's delayed, and may be lost, as the link has it."""
+        self.link.backward.send(message, now)
+
+    def advance(self, *, now: float) -> tuple[ToRobot, ...]:
+        """Do what is due by now [s], and say what is to be put on the connection."""
+        for delivery in self.link.backward.receive(now):
+            self._take(delivery.payload, now)
+        for orders in self.operator.advance(now=now):
+            self.link.forward.send(orders, now)
+        ready = tuple(delivery.payload for delivery in self.link.forward.receive(now))
+        return ready if self.connected else ()
+
+    def _take(self, message: ToOperator, now: float) -> None:
+        self.heard = now
+        if isinstance(message, Ping):
+            self.link.forward.send(Pong(message.number, message.t, now, now), now)
+        else:
+            self.operator.receive(message, now=now)
+
+    def next_deadline(self) -> float | None:
+        """When something is due [s]."""
+        return earliest(self.operator.next_deadline(), self.link.next_deadline())
+
+    def silence(self, *, now: float) -> float:
+        """For how long nothing has been heard of the robot [s]; infinite before the first time."""
+        return now - self.heard

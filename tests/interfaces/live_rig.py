@@ -1,0 +1,171 @@
+"""Both live sites for tests: in one event loop where a test looks inside, as processes where it kills them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
+from interfaces.runtime.live.robot import LARGEST, LiveRobot, LiveRobotConfig
+from interfaces.runtime.physics_messages import BodyKind
+from interfaces.stream import sockets
+from interfaces.stream.access import OPEN, Access, hosts
+from interfaces.stream.control import Role
+from interfaces.stream.server import application
+from interfaces.teleop import Reference, RobotHostConfig, RobotSiteConfig
+from robots import puma560
+from robots.onboard import WatchdogConfig
+
+MODEL = puma560.model()
+NOMINAL, READY = MODEL.poses["nominal"], MODEL.poses["ready"]
+HALT = WatchdogConfig(max_age=2.0, max_uncertainty=1.0)
+LEAD = 0.2
+"""Of robots in tests [s]: other tests share the processor."""
+
+
+class Rows:
+    """What a robot's body was given, tick by tick."""
+
+    def __init__(self, robot: LiveRobot) -> None:
+        self.q: dict[int, Any] = {}
+        feed = robot._feed_rows
+
+        def noted(rows: Reference, first: int) -> None:
+            for tick in [tick for tick in self.q if tick >= first]:
+                del self.q[tick]
+            for k in range(len(rows.q)):
+                self.q[first + k] = np.concatenate([rows.q[k], rows.qd[k]])
+            feed(rows, first)
+
+        robot._feed_rows = noted  # type: ignore[method-assign]
+
+    def until(self, tick: int) -> tuple[np.ndarray, np.ndarray]:
+        """Ticks from the first to one, and q and qd in each, (k, 12); a gap holds what was before it."""
+        ticks = np.arange(min(self.q), tick + 1)
+        rows, last = [], self.q[int(ticks[0])]
+        for k in ticks.tolist():
+            last = self.q.get(k, last)
+            rows.append(last)
+        return ticks, np.array(rows)
+
+
+@contextlib.asynccontextmanager
+async def robot_here(
+    *, site: RobotSiteConfig | None = None, body: BodyKind = BodyKind.EXACT, port: int = 0
+) -> AsyncIterator[tuple[LiveRobot, str]]:
+    """A robot's site in this loop, and its URL."""
+    host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
+    listening = sockets.bind("127.0.0.1", port)
+    port = listening.getsockname()[1]
+    robot = LiveRobot(LiveRobotConfig(MODEL, NOMINAL, host, body), Access(free={Role.SITE}))
+    app = application(robot.routes, hosts(["127.0.0.1"], port))
+    async with sockets.serve(app, listening, largest=LARGEST), robot.running():
+        await robot.ready()
+        yield robot, f"ws://127.0.0.1:{port}/site"
+
+
+@contextlib.asynccontextmanager
+async def operator_here(url: str, *, delay: str = "none") -> AsyncIterator[tuple[LiveOperator, str]]:
+    """An operator's site in this loop, and its URL for programs."""
+    listening = sockets.bind("127.0.0.1", 0)
+    port = listening.getsockname()[1]
+    link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
+    operator = LiveOperator(LiveOperatorConfig(MODEL, NOMINAL, url, link), Access(free=OPEN))
+    app = application(operator.routes, hosts(["127.0.0.1"], port))
+    async with sockets.serve(app, listening), operator.running():
+        yield operator, f"ws://127.0.0.1:{port}/ws"
+
+
+async def until(ready: Callable[[], Any], timeout: float = 20.0) -> None:
+    """Wait until something is so."""
+    async with asyncio.timeout(timeout):
+        while not ready():
+            await asyncio.sleep(0.005)
+
+
+@dataclass
+class Child:
+    """A `vrs` command in a process of its own."""
+
+    process: subprocess.Popen[str]
+    url: str
+    """Where it listens: the first address that it said."""
+
+    def health(self) -> dict[str, Any]:
+        """What it says of itself."""
+        base = self.url.replace("ws://", "http://").rsplit("/", 1)[0]
+        with urllib.request.urlopen(f"{base}/health", timeout=5) as answer:
+            facts: dict[str, Any] = json.load(answer)
+        return facts
+
+    def wait(self, ready: Callable[[dict[str, Any]], Any], timeout: float = 30.0) -> dict[str, Any]:
+        """Wait until its health says so."""
+        end = time.monotonic() + timeout
+        while True:
+            with contextlib.suppress(OSError):
+                facts = self.health()
+                if ready(facts):
+                    return facts
+            if time.monotonic() > end:
+                raise TimeoutError(facts if "facts" in locals() else "it doesn't answer")
+            time.sleep(0.02)
+
+    def kill(self, number: int = signal.SIGKILL) -> None:
+        """Send it a signal."""
+        os.kill(self.process.pid, number)
+
+
+@contextlib.contextmanager
+def child(*arguments: str) -> Iterator[Child]:
+    """Run a `vrs` command that says where it listens; it's ended in the end."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "interfaces.cli", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout is not None
+    guard = threading.Timer(60.0, process.kill)
+    guard.start()
+    try:
+        line = process.stdout.readline()
+        guard.cancel()
+        url = next(word.strip("()") for word in line.split() if "://" in word)
+        yield Child(process, url)
+    finally:
+        guard.cancel()
+        if process.poll() is None:
+            process.send_signal(signal.SIGCONT)
+            process.terminate()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        process.stdout.close()
+
+
+@contextlib.asynccontextmanager
+async def child_beside(*arguments: str) -> AsyncIterator[Child]:
+    """`child`, started and ended while this loop goes on."""
+    running = child(*arguments)
+    made = await asyncio.to_thread(running.__enter__)
+    try:
+        yield made
+    finally:
+        await asyncio.to_thread(running.__exit__, None, None, None)

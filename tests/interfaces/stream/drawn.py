@@ -1,0 +1,156 @@
+"""Messages of every kind, drawn by hypothesis."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import strategies as st
+
+from interfaces import messages as m
+from interfaces.stream import control as c
+from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from robots.onboard.lease import LeaseEnd, LeaseState
+from vrs import commands as v
+from vrs.model import Limits
+from vrs.receipt import Receipt, Status
+from vrs.segment import PolynomialSegment
+
+numbers = st.integers(1, 2**63 - 1)
+counts = st.integers(0, 2**63 - 1)
+epochs = st.integers(1, 2**64 - 1)
+ids = st.none() | st.integers(-(2**63), 2**63 - 1)
+times = st.floats(-1e9, 1e9)
+stamps = st.none() | times
+finite = st.floats(allow_nan=False, allow_infinity=False)
+words = st.text(max_size=40)
+names = st.text(min_size=1, max_size=40)
+small = st.integers(1, 8)
+
+
+def array_of(n):
+    return st.lists(finite, min_size=n, max_size=n).map(frozen)
+
+
+def frozen(values):
+    """A read-only array."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+arrays = small.flatmap(array_of)
+
+
+@st.composite
+def runs(draw):
+    """Segments one after the other, or with starts that rounding has moved."""
+    n, found, start = draw(small), [], draw(times)
+    for _ in range(draw(st.integers(0, 4))):
+        rows = draw(st.integers(1, 6))
+        a = frozen(draw(st.lists(finite, min_size=n * rows, max_size=n * rows))).reshape(rows, n)
+        duration = draw(st.floats(1e-12, 1e3))
+        found.append(PolynomialSegment(start, duration, a, draw(ids)))
+        start = found[-1].end if draw(st.booleans()) else draw(times)
+    return tuple(found)
+
+
+@st.composite
+def poses(draw):
+    """A pose target with a proper rotation."""
+    X = np.eye(4)
+    X[:3, :3] = np.linalg.qr(np.random.default_rng(draw(st.integers(0, 999))).normal(size=(3, 3)))[0]
+    X[:3, :3] *= np.sign(np.linalg.det(X[:3, :3]))
+    X[:3, 3] = draw(st.lists(st.floats(-10, 10), min_size=3, max_size=3))
+    return v.PoseTarget(X, draw(st.none() | words))
+
+
+targets = arrays.map(v.JointTarget) | poses()
+deviations = st.floats(0, 1e6)
+one = st.integers(1, 2**63 - 1)
+commands = st.one_of(
+    st.builds(
+        v.MotionCommand, targets, stamps, stamps, st.floats(1e-3, 1), st.sampled_from(v.Motion),
+        st.sampled_from(v.Profile), st.sampled_from(v.Insertion), deviations,
+    ),
+    st.builds(v.SteerCommand, arrays, st.none(), st.sampled_from(v.Frame), stamps, stamps),
+    st.builds(v.SteerCommand, st.none(), array_of(6), st.sampled_from(v.Frame), stamps, stamps),
+    st.builds(v.DriveCommand, finite, finite, st.floats(1e-6, 1e9), stamps, stamps),
+    st.builds(v.Retime, one, times, stamps),
+    st.builds(v.Cancel, one, stamps, stamps),
+    st.builds(v.InsertVia, one, targets, deviations, stamps, stamps),
+    st.builds(v.ScaleTime, st.floats(1e-3, 1e3), stamps, stamps),
+    st.builds(v.Stop, stamps, stamps),
+    st.builds(v.Resume, stamps, stamps),
+    st.builds(v.PositionQuery, stamps),
+    st.builds(v.ParameterChange, words, st.none() | st.booleans() | one | finite | words),
+)  # fmt: skip
+several = st.lists(one, max_size=5).map(tuple)
+receipts = st.builds(
+    Receipt, counts, st.sampled_from(Status), stamps, stamps, stamps, stamps, st.none() | arrays, words, counts,
+    finite, st.none() | one, st.booleans(), several, several,
+)  # fmt: skip
+rates = st.sampled_from([None, 60.0])
+statuses = st.sampled_from(m.FrameStatus)
+frames = st.builds(m.Frame, counts, times, times, arrays, statuses, ids)
+verdicts = st.builds(m.Verdicts, counts, counts, st.lists(st.tuples(counts, counts, ids), max_size=4).map(tuple))
+leases = st.builds(
+    c.Lease, st.sampled_from(LeaseState), st.none() | epochs, st.none() | names, st.booleans(), st.none() | one,
+    st.none() | st.sampled_from(LeaseEnd),
+)  # fmt: skip
+
+
+@st.composite
+def welcomes(draw):
+    """What a server has, of one width."""
+    n = draw(small)
+    low = draw(st.floats(-10, 0))
+    limits = Limits(*[np.full(n, x) for x in (low, low + 1, 2.0, 3.0, 4.0)])
+    named = draw(st.dictionaries(names, array_of(n), max_size=3))
+    role, rates = draw(st.sampled_from(c.Role)), draw(st.lists(st.floats(0.1, 1e3), max_size=3))
+    known = draw(times), draw(leases), tuple(rates), draw(st.booleans()), draw(words), draw(words)
+    return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(st.floats(0.1, 60)))
+
+
+plans = st.builds(PlanPart, counts, times, arrays, runs())
+entries = st.builds(Entry, numbers, times, st.none() | commands, counts)
+echoes = st.none() | st.tuples(numbers, times, times)
+messages = {
+    m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
+    m.Ask: st.builds(m.Ask, numbers, stamps),
+    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.Form), st.none() | st.floats(0.1, 1e3)),
+    m.Want: st.builds(m.Want, counts, st.none() | counts),
+    m.Outcome: st.builds(m.Outcome, numbers, st.none() | receipts, words, counts, times),
+    m.Answer: st.builds(m.Answer, frames, times),
+    m.Broadcast: st.builds(m.Broadcast, frames, verdicts),
+    m.Scene: st.builds(m.Scene, numbers, words, arrays, times, times, counts, counts, times, rates),
+    m.History: st.builds(m.History, counts, counts, runs()),
+    m.Change: st.builds(m.Change, counts, numbers, ids, counts, runs(), st.none() | counts, times, times),
+    m.Pulse: st.builds(m.Pulse, counts, times, times | st.just(-math.inf)),
+    c.Hello: st.builds(c.Hello, st.sampled_from(c.Role), names, st.none() | words, st.none() | words, numbers),
+    c.Welcome: welcomes(),
+    c.Attached: st.builds(
+        c.Attached, words, arrays, words, st.floats(0.1, 60), stamps, words, words, numbers
+    ),
+    c.Ping: st.builds(c.Ping, numbers, times),
+    c.Pong: st.builds(c.Pong, numbers, times, times, times),
+    c.Acquire: st.builds(c.Acquire, numbers),
+    c.TakeOver: st.builds(c.TakeOver, numbers),
+    c.Release: st.builds(c.Release, numbers, epochs),
+    c.Resume: st.builds(c.Resume, numbers, epochs),
+    c.Beat: st.builds(c.Beat, epochs),
+    c.Lease: leases,
+    c.Problem: st.builds(c.Problem, st.sampled_from(c.ProblemCode), words, st.none() | numbers, st.booleans()),
+    c.State: st.builds(
+        c.State, numbers, times, arrays, times, finite, times, finite, st.integers(0, 2**64 - 1), st.booleans(),
+        words, counts,
+    ),
+    Orders: st.builds(
+        Orders, epochs, numbers, times, counts, times, times, counts, st.lists(entries, max_size=3).map(tuple)
+    ),
+    Report: st.builds(
+        Report, epochs, numbers, times, echoes, counts, times, finite, arrays, times, times, words,
+        st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans,
+    ),
+}  # fmt: skip
+"""What draws each message."""

@@ -1,0 +1,253 @@
+"""Golden vectors of the protocol, for clients in any language.
+
+`python -m tests.interfaces.stream.make_vectors` writes vectors.json anew.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interfaces import messages as m
+from interfaces.link import ClockSync, RoundTrip
+from interfaces.site import Site
+from interfaces.stream import Encoding, encode
+from interfaces.stream import control as c
+from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from robots import puma560
+from robots.onboard.lease import LeaseEnd, LeaseState
+from vrs import Engine, Insertion, ManualClock, Motion, PolynomialSegment, Profile, commands
+from vrs.model import Limits, frozen_array
+from vrs.receipt import Receipt, Status
+
+PATH = Path(__file__).with_name("vectors.json")
+Q = frozen_array([0.1, 0.2, -0.3])
+Q2 = frozen_array([1 / 3, -0.5, 2.0])
+POSE = np.array([[0.0, -1.0, 0.0, 0.4], [1.0, 0.0, 0.0, 0.1], [0.0, 0.0, 1.0, -0.2], [0.0, 0.0, 0.0, 1.0]])
+
+
+def segments() -> tuple[PolynomialSegment, ...]:
+    """A hold, a parabola, and one that rounding has moved."""
+    return (
+        PolynomialSegment(2.5, 0.75, [[0.1, 0.2, -0.3]]),
+        PolynomialSegment(3.25, 0.1, [[0.1, 0.2, -0.3], [0.0, 0.0, 0.0], [1.0, -1 / 3, 0.7]], 7),
+        PolynomialSegment(math.nextafter(3.35, 4), 0.2, [[0.11, 0.19, -0.29], [0.2, -0.1, 0.1]], 7),
+    )
+
+
+def ordered() -> dict[str, commands.Command | None]:
+    """A command of each kind."""
+    joints, pose = commands.JointTarget(Q2), commands.PoseTarget(POSE, "LEFTY")
+    return {
+        "move": commands.MotionCommand(joints, 1.5, 2.0, 0.5),
+        "line": commands.MotionCommand(
+            pose, None, None, 1.0, Motion.LINE, Profile.JERK_LIMITED, Insertion.APPEND, 0.01
+        ),
+        "steer by rates": commands.SteerCommand(rates=Q, issued_at=1.5),
+        "steer by twist": commands.SteerCommand(twist=[0.1, 0, 0, 0, 0, -0.2], frame=commands.Frame.TOOL),
+        "drive": commands.DriveCommand(0.3, -0.1, 2.0),
+        "retime": commands.Retime(7, 4.0),
+        "cancel": commands.Cancel(7, execute_at=3.0),
+        "via": commands.InsertVia(7, joints, 0.05),
+        "scale": commands.ScaleTime(0.5),
+        "stop": commands.Stop(2.25),
+        "resume the plan": commands.Resume(),
+        "query": commands.PositionQuery(1.0),
+        "parameter": commands.ParameterChange("lateness", "reject"),
+        "undo": None,
+    }
+
+
+def values() -> dict[str, Any]:
+    """Messages by name."""
+    frame = m.Frame(12, 2.75, 2.5, Q, m.FrameStatus.PREDICTED)
+    false = m.Frame(9, 2.75, 2.5, Q, m.FrameStatus.FALSIFIED, 7)
+    receipt = Receipt(7, Status.POSTPONED, 1.5, 2.0, 2.25, 3.5, Q2, "late", 4, 0.5, None, False, (5, 6), (4,))
+    rejected = Receipt(8, Status.REJECTED, None, None, reason="out of limits")
+    limits = Limits([-1.0] * 3, [1.0] * 3, [2.0] * 3, [4.0] * 3, [40.0] * 3)
+    held = c.Lease(LeaseState.HELD, 2**64 - 1, "Ada", True, 3)
+    plan = PlanPart(4, 2.5, Q, segments())
+    entries = Entry(1, 2.0, ordered()["move"], 6), Entry(2, 2.0, None, 6)
+    orders = {
+        f"order: {name}": m.Order(number, order, 7_730_941_132_801)
+        for number, (name, order) in enumerate(ordered().items(), 1)
+    }
+    return {
+        "hello": c.Hello(c.Role.OPERATOR, "Ada"),
+        "hello with a token and a session": c.Hello(c.Role.ADMIN, "Ada", "s3cret", "abc"),
+        "welcome": c.Welcome(
+            "abc", c.Role.OPERATOR, "puma560", limits, {"ready": Q}, 2.5, held, (60.0, 10.0), True,
+            "xyz", "vrs 0.1.0",
+        ),
+        "attached": c.Attached("puma560", Q, "halt", 0.5, None, "xyz", "vrs 0.1.0"),
+        "ping": c.Ping(1, 123.456),
+        "pong": c.Pong(1, 123.456, 2.5, 2.5001),
+        "acquire": c.Acquire(3),
+        "take over": c.TakeOver(4),
+        "release": c.Release(5, 2**64 - 1),
+        "resume": c.Resume(6, 7_730_941_132_801),
+        "beat": c.Beat(7_730_941_132_801),
+        "lease held by the receiver": held,
+        "lease held by another": c.Lease(LeaseState.HELD, None, "Ada"),
+        "lease ending": c.Lease(LeaseState.ENDING, answers=4, ended=LeaseEnd.TAKEN_OVER),
+        "problem": c.Problem(c.ProblemCode.STALE_EPOCH, "the lease has ended", 5),
+        "state": c.State(31, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7_730_941_132_801, True, "", 2),
+        "state of a halted robot": c.State(32, 2.5, Q, 2.0, 0.0, -0.5, 0.2, 0, False, "following error", 2),
+        **orders,
+        "ask": m.Ask(9, 2.75),
+        "ask for the present": m.Ask(10, None),
+        "follow segments": m.Follow(11, m.Form.SEGMENTS),
+        "follow frames": m.Follow(11, m.Form.FRAMES, 60.0),
+        "want history": m.Want(3, 256),
+        "want edits": m.Want(3, None),
+        "outcome": m.Outcome(1, receipt, "", 0, 2.5),
+        "outcome rejected": m.Outcome(2, rejected, "", 1, 2.5),
+        "outcome refused": m.Outcome(3, None, "no lease: acquire it first", 0, 2.5),
+        "answer": m.Answer(false, 2.5),
+        "broadcast": m.Broadcast(frame, m.Verdicts(1, 8)),
+        "broadcast with false frames": m.Broadcast(frame, m.Verdicts(1, 8, ((9, 10, 7), (11, 11, None)))),
+        "scene": m.Scene(11, "puma560", Q, 0.0, 3.55, 3, 3, 2.5),
+        "scene of frames": m.Scene(11, "puma560", Q, 0.0, 3.55, 3, 3, 2.5, 60.0),
+        "history": m.History(3, 0, segments()),
+        "change": m.Change(3, 4, 7, 5, segments(), 6, 3.75, 9.0),
+        "change that drops the rest": m.Change(3, 4, 7, 5, segments()[:1], None, 3.25, 3.25),
+        "pulse": m.Pulse(4, 2.5, 2.5),
+        "pulse of a site with an offset": m.Pulse(4, 2.5, 2.25),
+        "pulse offline": m.Pulse(4, 2.5, -math.inf),
+        "orders": Orders(7_730_941_132_801, 5, 2.5, 1, 2.5, 1.0, 3, entries),
+        "orders without entries": Orders(7_730_941_132_801, 6, 2.55, 2, 2.55, 1.0),
+        "report": Report(
+            7_730_941_132_801, 3, 2.75, (5, 2.5, 2.7), 1, 2.0, 0.95, Q, 2.72, 2.0, "", ((1, receipt),), plan
+        ),
+        "report of a halted robot": Report(
+            7_730_941_132_801, 4, 2.85, None, 1, 2.0, 0.0, Q, 2.82, 2.0, "link lost"
+        ),
+    }  # fmt: skip
+
+
+def messages() -> list[dict[str, str]]:
+    """Messages in both encodings."""
+    return [
+        {
+            "name": name,
+            "json": encode(value, Encoding.JSON).decode(),
+            "msgpack": encode(value, Encoding.MSGPACK).hex(),
+        }
+        for name, value in values().items()
+    ]
+
+
+def evaluations() -> list[dict[str, Any]]:
+    """Segments, and what they are worth."""
+    found = []
+    rng = np.random.default_rng(5)
+    for degree in range(8):
+        segment = PolynomialSegment(2.5, 0.7, rng.normal(size=(degree + 1, 3)), 1)
+        at = [
+            {"u": u, "derivative": k, "value": segment.value(segment.start + u, derivative=k).tolist()}
+            for u in (0.0, 0.25, 0.5, 0.6875)
+            for k in range(4)
+        ]
+        found.append({"coefficients": segment.coefficients.tolist(), "at": at})
+    return found
+
+
+def stream() -> dict[str, Any]:
+    """A reader's session: what the server sends in answer to `follow` 1 and each `want`, and joints at the end."""
+    model = puma560.model()
+    home = model.poses["nominal"]
+    clock = ManualClock(0.0)
+    engine = Engine(model, q=home, clock=clock)
+    site, rng = Site(engine), np.random.default_rng(3)
+
+    def move(**options: Any) -> commands.MotionCommand:
+        return commands.MotionCommand(commands.JointTarget(home + rng.uniform(-0.4, 0.4, 6)), **options)
+
+    for k in range(3):
+        site.journal.execute(move(execute_at=0.5 + k, insertion=Insertion.APPEND))
+    servlet = site.servlet()
+    steps: list[dict[str, Any]] = []
+
+    def step(now: float, *requests: m.Request) -> None:
+        for request in requests:
+            servlet.receive(request, now=site.time(now))
+        sent = [encode(request, Encoding.JSON).decode() for request in requests]
+        came = [encode(reply, Encoding.JSON).decode() for reply in servlet.advance(now=site.time(now))]
+        steps.append({"now": now, "asked": sent, "messages": came})
+
+    step(0.0, m.Follow(1, m.Form.SEGMENTS))
+    step(0.05, m.Want(3, 0))
+    step(0.1, m.Want(3, None))
+    orders = [
+        move(execute_at=0.8),
+        move(execute_at=1.1, insertion=Insertion.REPLACE),
+        move(insertion=Insertion.APPEND, profile=Profile.JERK_LIMITED),
+        commands.ScaleTime(0.5),
+        move(insertion=Insertion.APPEND, execute_at=12.0),
+        move(execute_at=2.0),
+        commands.SteerCommand(rates=[0.2, 0.1, 0, 0, 0.1, 0], issued_at=0.9, execute_at=0.9),
+        commands.Stop(),
+    ]
+    for k, command in enumerate(orders):
+        now = 0.2 + 0.1 * k
+        site.time(now)
+        site.journal.execute(command)
+        step(now)
+    step(1.2)
+    t = np.linspace(-1.0, engine.timeline.end + 1.0, 60)
+    samples = [
+        {"t": x, "derivative": k, "value": engine.timeline.sample(x, derivative=k).tolist()}
+        for x in t.tolist()
+        for k in (0, 1, 2)
+    ]
+    return {"steps": steps, "samples": samples}
+
+
+def clock() -> list[dict[str, Any]]:
+    """Round trips, and what is known of the other clock after each; maxDrift 200e-6, resolution 1e-6, slew 0.05."""
+    rng, sync, found = np.random.default_rng(9), ClockSync(), []
+    t = 100.0
+    for _ in range(40):
+        there, back = (rng.exponential(0.02, 2) + 0.005).tolist()
+        received = (t + there) * (1 + 50e-6) - 97.5
+        trip = t, received, received + 0.0005, t + there + 0.0005 + back
+        sync.receive(RoundTrip(*trip))
+        estimate = sync.estimate(trip[3])
+        assert estimate is not None
+        later = trip[3] + 0.2
+        found.append(
+            {
+                "trip": list(trip),
+                "offset": estimate.offset,
+                "uncertainty": estimate.uncertainty,
+                "later": later,
+                "time": sync.to_remote(later),
+                "mapped_uncertainty": sync.uncertainty(later),
+            }
+        )
+        t += 0.5
+    return found
+
+
+def made() -> dict[str, Any]:
+    """All vectors."""
+    return {
+        "protocol": c.PROTOCOL,
+        "messages": messages(),
+        "evaluations": evaluations(),
+        "stream": stream(),
+        "clock": clock(),
+    }
+
+
+def main() -> None:
+    """Write the file."""
+    PATH.write_text(json.dumps(made(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

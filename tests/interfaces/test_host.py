@@ -1,0 +1,194 @@
+"""Both ends of a connection in virtual time: clocks that differ, robots and operators that come and go."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
+from robots import puma560
+from robots.onboard import WatchdogConfig
+from vrs import JointTarget, MotionCommand, SteerCommand
+from vrs.model import Array
+
+MODEL = puma560.model()
+LIMITS = MODEL.limits
+NOMINAL = MODEL.poses["nominal"]
+READY = MODEL.poses["ready"]
+STEP = 0.005
+
+
+class Ends:
+    """An operator's and a robot's end, and what the body was asked to do, tick by tick."""
+
+    def __init__(
+        self, delay: str = "constant:0.05", site: RobotSiteConfig | None = None, q: Array = NOMINAL
+    ) -> None:
+        self.conditions = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
+        self.config = RobotHostConfig(site=RobotSiteConfig() if site is None else site)
+        self.t = 0.0
+        self.asked: list[Array] = []
+        self.host = self.robot(q)
+        self.new_operator("first")
+
+    def robot(self, q: Array) -> RobotHost:
+        self.rate, self.ahead = 1.0 + 50e-6, 1234.5
+        return RobotHost(MODEL, q, now=self.robots(), config=self.config, seed=7)
+
+    def robots(self) -> float:
+        """What the robot's clock reads."""
+        return self.ahead + self.rate * self.t
+
+    def new_operator(self, session: str) -> None:
+        self.began, self.session = self.t, session
+        self.operator = OperatorSite(MODEL, NOMINAL, now=0.0, halted="no robot has come yet")
+        self.line = RobotLine(self.operator, self.conditions, np.random.default_rng(3))
+        self.line.connected = True
+        self.refused = self.host.hello(session, now=self.robots())
+
+    @property
+    def now(self) -> float:
+        """The session's time."""
+        return self.t - self.began
+
+    def run(self, seconds: float, *, operator: bool = True, robot: bool = True) -> None:
+        for _ in range(round(seconds / STEP)):
+            self.t += STEP
+            if operator:
+                messages = self.line.advance(now=self.now)
+                for message in messages if robot else ():
+                    self.host.receive(message, now=self.robots())
+            if robot:
+                for message in self.host.advance(now=self.robots()):
+                    if operator:
+                        self.line.receive(message, now=self.now)
+                q, qd, qdd = self.host.reference(np.array([self.robots()]))
+                self.asked.append(np.concatenate([q, qd, qdd]))
+                self.host.measured(q[0], at=self.robots(), now=self.robots())
+
+    def go(self) -> None:
+        """Meet, and let the operator command."""
+        self.run(3.0)
+        assert self.operator.resume(now=self.now) == ""
+        self.run(0.5)
+
+    def check(self) -> None:
+        """What the body was asked to do keeps the limits, and has no jumps."""
+        asked = np.array(self.asked)
+        assert (np.abs(asked[:, 1]) <= LIMITS.qd_max * (1 + 1e-9)).all()
+        assert (np.abs(asked[:, 2]) <= LIMITS.qdd_max * (1 + 1e-9)).all()
+        for (q, qd, _), (q_next, *_) in pairwise(asked):
+            assert (np.abs(q_next - q - STEP * qd) <= 0.51 * LIMITS.qdd_max * STEP**2 * 2 + 1e-9).all()
+
+
+def to(q: Array, **options: object) -> MotionCommand:
+    return MotionCommand(JointTarget(q), **options)  # type: ignore[arg-type]
+
+
+def test_they_meet_move_and_agree() -> None:
+    ends = Ends()
+    refused = ends.operator.execute(to(READY), now=0.0)
+    assert "no robot has come yet" in refused.reason
+    assert ends.operator.resume(now=0.0) != ""
+    ends.go()
+    ends.operator.execute(to(READY, execute_at=ends.now + 0.2), now=ends.now)
+    ends.run(6.0)
+    assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-12
+    site = ends.host.site
+    assert site is not None
+    assert not site.parted
+    t = np.linspace(3.0, ends.now, 100)
+    assert np.array_equal(site.engine.timeline.sample(t), ends.operator.engine.timeline.sample(t))
+    assert not ends.operator.corrections
+    assert ends.host.uncertainty <= 0.06
+    ends.check()
+
+
+def test_a_robot_that_stands_elsewhere_is_met_where_it_stands() -> None:
+    ends = Ends(q=READY)
+    ends.run(12.0)
+    assert len(ends.operator.corrections) == 1
+    assert np.abs(ends.operator.engine.timeline.sample(ends.now) - READY).max() <= 1e-9
+    assert ends.operator.resume(now=ends.now) == ""
+    ends.operator.execute(to(NOMINAL), now=ends.now)
+    ends.run(6.0)
+    assert np.abs(ends.asked[-1][0] - NOMINAL).max() <= 1e-9
+    ends.check()
+
+
+def test_a_robot_that_starts_anew_waits_for_a_resume() -> None:
+    ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig()))
+    ends.go()
+    ends.operator.execute(to(READY), now=ends.now)
+    ends.run(0.6)
+    ends.run(1.5, robot=False)
+    ends.host, ends.asked = ends.robot(NOMINAL), []
+    assert ends.host.hello("first", now=ends.robots()) == ""
+    ends.run(15.0)
+    assert ends.operator.halted
+    assert np.abs(np.array(ends.asked)[:, 0] - NOMINAL).max() == 0.0
+    assert np.abs(ends.operator.engine.timeline.sample(ends.now) - NOMINAL).max() <= 1e-9
+    assert ends.operator.resume(now=ends.now) == ""
+    ends.operator.execute(to(READY), now=ends.now)
+    ends.run(6.0)
+    assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
+    ends.check()
+
+
+@pytest.mark.parametrize("moving_for", [0.3, 0.55, 0.8, 1.1])
+def test_without_its_operator_the_robot_stops_in_time_and_takes_the_next(moving_for: float) -> None:
+    ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig(timeout=0.5)))
+    ends.go()
+    ends.operator.execute(to(READY), now=ends.now)
+    ends.run(moving_for)
+    ends.new_operator("second")
+    assert "another" in ends.refused
+    lost = len(ends.asked)
+    ends.run(2.5, operator=False)
+    asked = np.array(ends.asked[lost:])
+    site = ends.host.site
+    assert site is not None
+    assert "link loss" in site.halted
+    # Before T_loss and the lead have passed nothing brakes; afterwards only deceleration, down to rest.
+    assert np.abs(asked[-1][1:]).max() == 0.0
+    ends.new_operator("second")
+    assert ends.refused == ""
+    ends.run(15.0)
+    assert ends.operator.resume(now=ends.now) == ""
+    ends.operator.execute(to(NOMINAL), now=ends.now)
+    ends.run(6.0)
+    assert np.abs(ends.asked[-1][0] - NOMINAL).max() <= 1e-9
+    ends.check()
+
+
+def test_nothing_of_a_pause_is_made_up_for_in_a_burst() -> None:
+    ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig()))
+    ends.go()
+    for _ in range(40):
+        ends.operator.execute(SteerCommand(rates=0.3 * LIMITS.qd_max * np.array([1, 0, 0, 0, 0, 1])), now=ends.now)
+        ends.run(0.02)
+    ends.run(5.0, operator=False)
+    stood = ends.asked[-1][0]
+    for _ in range(40):
+        ends.operator.execute(SteerCommand(rates=0.3 * LIMITS.qd_max * np.array([1, 0, 0, 0, 0, 1])), now=ends.now)
+        ends.run(0.02)
+    assert np.abs(ends.asked[-1][0] - stood).max() == 0.0
+    assert ends.operator.halted
+    ends.check()
+
+
+@pytest.mark.parametrize("delay", ["thu", "constant:0.3"])
+def test_held_links_of_the_paper(delay: str) -> None:
+    ends = Ends(delay)
+    ends.run(6.0)
+    assert ends.operator.resume(now=ends.now) == ""
+    for q in (READY, NOMINAL, READY):
+        ends.operator.execute(to(q), now=ends.now)
+        ends.run(3.0)
+    ends.run(20.0)
+    assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
+    assert not ends.operator.corrections
+    ends.check()

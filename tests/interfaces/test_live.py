@@ -1,0 +1,224 @@
+"""Both sites live: real sockets, wall time, a body in a process of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from interfaces import connect
+from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.runtime.laboratory import Laboratory
+from interfaces.stream.connect import Connection
+from interfaces.stream.control import Lease
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from tests.interfaces.live_rig import (
+    HALT,
+    MODEL,
+    NOMINAL,
+    READY,
+    Rows,
+    child,
+    child_beside,
+    operator_here,
+    robot_here,
+    until,
+)
+from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
+from vrs.commands import Command
+
+LIMITS = MODEL.limits
+KILLS = int(os.environ.get("VRS_KILLS", "2"))
+"""How often an operator's process is killed in mid-motion."""
+A = np.array([0.0, 0.8, -2.4, 0.0, 0.6, 0.0])
+B = np.array([0.5, 0.6, -2.0, 0.3, 0.4, 0.6])
+
+
+def lease(robot: Connection) -> None:
+    """Have the lease of a robot that follows."""
+    assert isinstance(robot.acquire(), Lease)
+    assert robot.wait(lambda r: r.state is not None and not r.state.halted and r.state.connected, 20.0)
+
+
+def script(t: float) -> list[tuple[float, Command]]:
+    """When each command is given [s] and the command, whose time is 0.45 s later or more."""
+    return [
+        (t, MotionCommand(JointTarget(A), t, t + 0.5)),
+        (t + 0.3, MotionCommand(JointTarget(B), t + 0.3, t + 0.8, speed=0.6)),
+        (t + 0.6, MotionCommand(JointTarget(READY), t + 0.6, t + 2.5)),
+        (t + 1.0, MotionCommand(JointTarget(A), t + 1.0, t + 1.6, insertion=Insertion.SPLICE)),
+        (t + 1.8, MotionCommand(JointTarget(NOMINAL), t + 1.8, t + 2.4, insertion=Insertion.REPLACE)),
+    ]
+
+
+def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
+    delay, D = 0.2, -0.4
+
+    def play(url: str) -> tuple[list, float]:
+        with connect(url) as robot:
+            lease(robot)
+            begin = np.ceil(robot.now() + 0.3)
+            issued = []
+            for t, command in script(begin):
+                time.sleep(max(t - robot.now(), 0.0))
+                issued.append(robot.designer.issue(command, wait=5.0))
+            # Who leaves gives the lease back, and the robots stop.
+            time.sleep(max(begin + 5.0 - robot.now(), 0.0))
+            return [robot.designer.issued(i.number).receipt for i in issued], begin
+
+    async def live() -> tuple:
+        site = RobotSiteConfig(fixed_offset=D, beat=0.03)
+        async with (
+            robot_here(site=site) as (robot, url),
+            operator_here(url, delay=f"constant:{delay}") as (operator, at),
+        ):
+            receipts, begin = await asyncio.to_thread(play, at)
+            mine, theirs = operator.operator.engine, robot.host.site
+            assert theirs is not None
+            assert not theirs.parted
+            return receipts, begin, mine.timeline, theirs.engine.timeline, list(theirs.engine.receipts)
+
+    receipts, begin, virtual, real, answers = asyncio.run(live())
+    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
+    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    link = LinkConditions.symmetric(Conditions(delay=delay_profile(f"constant:{delay}")))
+    lab = Laboratory(operator, robot, link, np.random.default_rng(0))
+    for t, command in script(begin):
+        lab.schedule(t, lambda now, command=command: operator.execute(command, now=now))  # type: ignore[misc]
+    lab.run(begin + 8.0)
+    there = [r for r in robot.engine.receipts if r.command_id <= 5]
+    for seen, expected in ((receipts, operator.engine.receipts), (answers, there)):
+        assert len(seen) == len(expected) == 5
+        for one, other in zip(seen, expected, strict=True):
+            assert (one.command_id, one.status, one.reason) == (other.command_id, other.status, other.reason)
+            assert one.execute_at == other.execute_at
+            assert one.end == pytest.approx(other.end, abs=1e-9)
+            assert (one.shifted, one.superseded) == (other.shifted, other.superseded)
+    t = np.linspace(begin, begin + 8.0, 4001)
+    for timeline, other in ((virtual, operator.engine.timeline), (real, robot.engine.timeline)):
+        assert np.abs(timeline.sample(t) - other.sample(t)).max() <= 1e-9
+
+
+def test_without_its_operator_the_robot_brakes_in_time() -> None:
+    rng = np.random.default_rng(5)
+    moving: list[bool] = []
+
+    async def session() -> None:
+        site = RobotSiteConfig(beat=0.03, watchdog=HALT)
+        async with robot_here(site=site) as (robot, url):
+            rows = Rows(robot)
+            for wait in rng.uniform(0.3, 2.0, KILLS):
+                await killed(robot, rows, url, float(wait))
+            # Some instants lie between two moves.
+            assert sum(moving) >= KILLS / 2
+
+    async def killed(robot, rows: Rows, url: str, wait: float) -> None:
+        address = url.removeprefix("ws://").removesuffix("/site")
+        async with child_beside("serve", "--port", "0", "--robot-at", address) as server:
+
+            def command() -> None:
+                with connect(server.url.replace("http", "ws").replace("/view", "/ws")) as client:
+                    lease(client)
+                    for q in (A, B, READY, NOMINAL) * 3:
+                        client.designer.issue(MotionCommand(JointTarget(q), insertion=Insertion.APPEND), wait=5.0)
+                    time.sleep(wait)
+                    server.kill()
+
+            await asyncio.to_thread(command)
+            t_kill = robot.clock.now()
+            moved = robot.host.reference(np.array([t_kill])).qd
+            await until(lambda: robot.host.site is not None and robot.host.site.halted, 3.0)
+            assert "link loss" in robot.host.site.halted
+            t_halt = robot.clock.now()
+            # It's decided a lead ahead, so that it begins at T_loss.
+            assert t_halt - t_kill <= HALT.timeout + 0.02
+            await asyncio.sleep(1.5)
+            ticks, asked = rows.until(round(robot.clock.now() / 0.001))
+            q, qd = asked[:, :6], asked[:, 6:]
+            moving.append(bool(moved.any()))
+            assert np.abs(qd[-1]).max() == 0.0
+            assert (np.abs(np.diff(qd, axis=0)) <= LIMITS.qdd_max * 1e-3 * (1 + 1e-6) + 1e-9).all()
+            assert (np.abs(np.diff(q, axis=0)) <= LIMITS.qd_max * 1e-3 * (1 + 1e-6) + 1e-9).all()
+            still = ticks[np.abs(qd).max(axis=1) > 0][-1] * 1e-3
+            brake = float((LIMITS.qd_max / LIMITS.qdd_max).max())
+            assert still <= t_kill + HALT.timeout + 0.02 + 2 * brake
+            assert robot.faults == 0
+
+    asyncio.run(session())
+
+
+def test_a_robot_that_dies_is_missed_and_followed_again() -> None:
+    async def session() -> None:
+        options = "--body", "exact", "--max-age", "2", "--lead", "0.2"
+        async with (
+            child_beside("robot", "--listen", "127.0.0.1:0", *options) as first,
+            operator_here(first.url) as (operator, at),
+        ):
+
+            def begin() -> Connection:
+                client = connect(at)
+                lease(client)
+                client.designer.issue(MotionCommand(JointTarget(READY)), wait=5.0)
+                time.sleep(0.3)
+                first.kill()
+                return client
+
+            client = await asyncio.to_thread(begin)
+            died = time.monotonic()
+            with client:
+                missed = await asyncio.to_thread(client.wait, lambda r: not r.state.connected, 5.0)
+                assert missed
+                assert time.monotonic() - died <= 1.0
+                port = first.url.split(":")[2].split("/")[0]
+                async with child_beside("robot", "--listen", f"127.0.0.1:{port}", *options) as second:
+
+                    def go_on() -> None:
+                        assert client.wait(lambda r: r.state.connected and r.state.halted != "", 30.0)
+                        # It stands where it began, and moves for nobody who hasn't resumed.
+                        assert np.abs(np.array(second.health()["q"]) - NOMINAL).max() <= 1e-9
+                        refused = client.designer.issue(MotionCommand(JointTarget(A)), wait=5.0)
+                        assert "resume" in refused.receipt.reason
+                        end = time.monotonic() + 30.0
+                        while not isinstance(client.resume(), Lease) and time.monotonic() < end:
+                            time.sleep(0.2)
+                        done = client.designer.issue(MotionCommand(JointTarget(A)), wait=5.0)
+                        assert done.receipt.status == "accepted"
+                        second.wait(lambda facts: np.abs(np.array(facts["q"]) - A).max() <= 1e-6, 20.0)
+
+                    await asyncio.to_thread(go_on)
+                    assert operator.robot.connections == 2
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize("who", ["robot", "operator"])
+def test_nothing_is_made_up_for_after_a_pause(who: str) -> None:
+    with (
+        child("robot", "--listen", "127.0.0.1:0", "--body", "exact", "--max-age", "2", "--lead", "0.2") as robot,
+        child(
+            "serve", "--port", "0", "--robot-at", robot.url.removeprefix("ws://").removesuffix("/site")
+        ) as server,
+        connect(server.url.replace("http", "ws").replace("/view", "/ws")) as client,
+    ):
+        lease(client)
+        rates = 0.2 * LIMITS.qd_max * np.array([1.0, 0, 0, 0, 0, 1.0])
+        for _ in range(40):
+            client.designer.issue(SteerCommand(rates=rates))
+            time.sleep(0.02)
+        paused = robot if who == "robot" else server
+        before = np.array(robot.health()["q"])
+        paused.kill(signal.SIGSTOP)
+        for _ in range(50):
+            client.designer.issue(SteerCommand(rates=rates))
+            time.sleep(0.1)
+        paused.kill(signal.SIGCONT)
+        robot.wait(lambda facts: facts["halted"] and facts["rests"])
+        stopped = np.array(robot.health()["q"])
+        # A second at most of the motion that was under way, then nothing: no input of the pause moves it.
+        assert (np.abs(stopped - before) <= np.abs(rates) * 1.5 + 1e-6).all()
+        time.sleep(2.0)
+        assert np.abs(np.array(robot.health()["q"]) - stopped).max() <= 1e-9

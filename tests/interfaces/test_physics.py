@@ -1,0 +1,633 @@
+"""The body in a process of its own: ticks in virtual time, and a few real processes."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from interfaces.runtime.physics import Ended, Event, PhysicsConfig, PhysicsProcess, References, Silent
+from interfaces.runtime.physics_messages import (
+    ROWS_MOST,
+    Attach,
+    BodyKind,
+    Close,
+    Doing,
+    Fault,
+    FaultKind,
+    Measurement,
+    News,
+    Ready,
+    Rows,
+    Setup,
+    decode_news,
+    decode_order,
+    encode,
+)
+from interfaces.runtime.physics_process import ExactTicks
+from interfaces.runtime.row_buffer import RowBuffer
+from interfaces.runtime.tick_loop import AHEAD_MOST, PAUSE, TickLoop
+from interfaces.teleop import Reference, RobotSite
+from robots import puma560
+from tests.interfaces.test_teleop import laboratory
+from vrs import Engine, Insertion, JointTarget, MotionCommand, Timeline, WallClock
+from vrs.errors import FormatError, InvalidValueError, VrsError
+from vrs.model import Array
+
+MODEL = puma560.model()
+LIMITS = MODEL.limits
+NOMINAL = np.array(MODEL.poses["nominal"])
+TICK = 0.001
+QUICK = (Phase.explicit, Phase.reuse, Phase.generate)
+
+
+@cache
+def motion(seed: int = 0) -> Timeline:
+    """Moves one into the other, from 0.1 s on."""
+    rng, engine = np.random.default_rng(seed), Engine(MODEL, q=NOMINAL)
+    for k in range(6):
+        q = np.clip(NOMINAL + rng.uniform(-0.8, 0.8, 6), LIMITS.q_min, LIMITS.q_max)
+        engine.execute(MotionCommand(JointTarget(q), None, 0.1 + 0.5 * k, 1.0, insertion=Insertion.SPLICE))
+    return engine.timeline
+
+
+def motion_from(q: Array, target: Array | None = None) -> Timeline:
+    """One move, from 0 s on."""
+    engine = Engine(MODEL, q=q)
+    engine.execute(MotionCommand(JointTarget(q + 0.3 if target is None else target), None, 0.0, 1.0))
+    return engine.timeline
+
+
+def sampled(timeline: Timeline, first: int, count: int, late: float = 0.0) -> Reference:
+    """References for ticks from the first on."""
+    t = TICK * np.arange(first, first + count) - late
+    return Reference(*(timeline.sample(t, derivative=k) for k in range(3)))
+
+
+def rows(reference: Reference, start: int, *, run: int = 0, placed: bool = False) -> Rows:
+    return Rows(run, start, placed, np.stack(reference, axis=1).tobytes())
+
+
+def foreseen(site: RobotSite) -> Callable[[Array], Reference]:
+    return lambda t: site.reference(site.foreseen(t))
+
+
+def standing(q: Array, count: int = 1) -> Reference:
+    return Reference(np.tile(q, (count, 1)), np.zeros((count, 6)), np.zeros((count, 6)))
+
+
+class Bench:
+    """A loop with the exact body, reporting every tick, under a clock that a test moves."""
+
+    def __init__(self, body: Any = None) -> None:
+        self.loop = TickLoop(
+            ExactTicks() if body is None else body, LIMITS, tuple(NOMINAL), tick=TICK, every=1, now=0.0
+        )
+        self.now = 0.0
+        self.news: list[News] = []
+
+    def run(self, until: float) -> None:
+        """Every tick on time."""
+        while not self.loop.finished and self.loop.next_deadline() <= until + 1e-9:
+            self.now = self.loop.next_deadline() + 1e-5
+            self.loop.advance(now=self.now)
+            self.news += self.loop.take()
+
+    def pause(self, seconds: float) -> int:
+        """Nothing for a while; then how many ticks are made good at once."""
+        self.now += seconds
+        ticks = len(self.measured)
+        while not self.loop.finished and self.loop.next_deadline() <= self.now:
+            self.loop.advance(now=self.now)
+            self.news += self.loop.take()
+        return len(self.measured) - ticks
+
+    @property
+    def measured(self) -> list[Measurement]:
+        return [m for m in self.news if isinstance(m, Measurement)]
+
+    @property
+    def faults(self) -> list[Fault]:
+        return [m for m in self.news if isinstance(m, Fault)]
+
+    def check(self) -> None:
+        """From one tick that was run to the next the reference keeps the limits."""
+        q = np.array([NOMINAL, NOMINAL, *(m.q_ref for m in self.measured)])
+        qd = np.diff(q, axis=0) / TICK
+        assert (np.abs(qd) <= LIMITS.qd_max * (1 + 1e-6)).all()
+        assert (np.abs(np.diff(qd, axis=0)) <= LIMITS.qdd_max * TICK * (1 + 1e-6) + 1e-9).all()
+
+
+def test_it_follows_to_the_bit_and_holds_after_a_rest() -> None:
+    bench, timeline = Bench(), motion()
+    count = int(timeline.end / TICK) + 2
+    reference = sampled(timeline, 1, count)
+    for low in range(0, count, 150):
+        bench.loop.receive(rows(Reference(*(part[low : low + 400] for part in reference)), 1 + low))
+    bench.run(timeline.end + 1.0)
+    assert np.array_equal([m.q for m in bench.measured[:count]], reference.q)
+    assert np.array_equal([m.q for m in bench.measured[count:]], np.tile(timeline.final(), (998, 1)))
+    assert bench.faults == []
+    assert bench.measured[-1].counts.late == 0
+    assert bench.measured[-1].counts.ticks == len(bench.measured)
+    assert sum(bench.measured[-1].counts.histogram) == len(bench.measured)
+    bench.check()
+
+
+class Keeper:
+    """The rule of the buffer, in a dictionary."""
+
+    def __init__(self) -> None:
+        self.rows: dict[int, Array] = {}
+        self.starts: list[int] = []
+
+    def put(self, start: int, rows: Array) -> None:
+        self.rows = {k: row for k, row in self.rows.items() if k < start}
+        self.rows.update({start + i: row for i, row in enumerate(rows)})
+
+    def at(self, tick: int) -> Array | None:
+        before = [k for k in self.rows if k <= tick]
+        if not before:
+            return None
+        row = self.rows[max(before)]
+        if max(before) == tick:
+            return row
+        return None if row[1].any() else np.stack([row[0], 0 * row[1], 0 * row[2]])
+
+
+@given(st.lists(st.tuples(st.integers(-3, 25), st.integers(1, 12), st.booleans()), max_size=40))
+def test_later_rows_count_instead_of_earlier_ones(blocks: list[tuple[int, int, bool]]) -> None:
+    buffer, keeper, rng = RowBuffer(), Keeper(), np.random.default_rng(len(blocks))
+    for tick, (ahead, count, rests) in enumerate(blocks):
+        block = rng.uniform(-1, 1, (count, 3, 2))
+        block[-1, 1] *= not rests
+        assert buffer.put(tick + ahead, block)
+        keeper.put(tick + ahead, block)
+        expected, taken = keeper.at(tick), buffer.take(tick, 3)
+        assert (expected is None) == (taken is None)
+        if taken is not None:
+            assert 1 <= len(taken) <= 3
+            for i, row in enumerate(taken):
+                assert np.array_equal(row, keeper.at(tick + i))  # type: ignore[arg-type]
+
+
+@settings(max_examples=25, deadline=None, phases=QUICK)
+@given(st.integers(0, 5), st.integers(1, 2500))
+def test_starved_it_brakes_within_the_limits_and_waits_for_an_acknowledgement(seed: int, count: int) -> None:
+    bench, timeline = Bench(), motion(seed)
+    low = 0
+    while low < count:
+        bench.loop.receive(rows(sampled(timeline, 1 + low, min(900, count - low)), 1 + low))
+        low += 900
+    bench.run(TICK * count + 0.8)
+    bench.check()
+    if not timeline.sample(TICK * count, derivative=1).any():
+        assert bench.faults == []
+        return
+    (fault,) = bench.faults
+    assert (fault.kind, fault.tick, fault.number) == (FaultKind.STARVED, count + 1, 1)
+    at_rest = next(m for m in bench.measured if m.doing is Doing.HOLDING)
+    assert at_rest.tick == fault.rest_tick
+    assert at_rest.q_ref == fault.rest == bench.measured[-1].q_ref
+    speed = np.abs(timeline.sample(TICK * count, derivative=1))
+    assert (fault.rest_tick - count) * TICK <= (speed / LIMITS.qdd_max).max() + 2 * TICK
+    now = count + 900
+    bench.loop.receive(rows(sampled(timeline, 150, 900), now))
+    bench.run(TICK * (now + 20))
+    assert bench.measured[-1].q_ref == fault.rest
+    engine = Engine(MODEL, q=np.array(fault.rest))
+    engine.execute(MotionCommand(JointTarget(NOMINAL), None, 0.1, 0.5))
+    again = engine.timeline
+    bench.loop.receive(rows(sampled(again, 0, 900), now + 50, run=1))
+    bench.run(TICK * (now + 500))
+    assert bench.measured[-1].doing is Doing.FOLLOWING
+    assert (
+        np.abs(bench.measured[-1].q_ref - again.sample((bench.measured[-1].tick - now - 50) * TICK)).max() < 1e-12
+    )
+    assert len(bench.faults) == 1
+    bench.check()
+
+
+def test_an_acknowledgement_during_the_stop_counts_when_it_rests() -> None:
+    bench = Bench()
+    bench.loop.receive(rows(sampled(motion(), 1, 400), 1))
+    bench.run(0.41)
+    (fault,) = bench.faults
+    assert bench.measured[-1].doing is Doing.BRAKING
+    bench.loop.receive(rows(standing(np.array(fault.rest)), 420, run=1))
+    bench.run(2.0)
+    assert bench.measured[-1].doing is Doing.FOLLOWING
+    assert bench.measured[-1].q_ref == fault.rest
+    assert len(bench.faults) == 1
+
+
+@pytest.mark.parametrize("what", ["position", "speed", "late"])
+def test_a_jump_is_not_followed(what: str) -> None:
+    bench, timeline = Bench(), motion()
+    bench.loop.receive(rows(sampled(timeline, 1, 900), 1))
+    bench.run(0.4)
+    q, qd, qdd = sampled(timeline, 420, 400, late=0.03 if what == "late" else 0.0)
+    if what == "position":
+        q = q + np.array([0, 0, 1e-3, 0, 0, 0])
+    if what == "speed":
+        qd = qd + 3.2 * TICK * LIMITS.qdd_max * np.array([0, 0, 0, 1, 0, 0])
+    bench.loop.receive(rows(Reference(q, qd, qdd), 420))
+    bench.run(3.0)
+    (fault,) = bench.faults
+    assert (fault.kind, fault.tick) == (FaultKind.JUMPED, 420)
+    assert "joint" in fault.text
+    bench.check()
+    assert bench.measured[-1].q_ref == fault.rest
+
+
+def test_rows_that_come_late_count_from_the_present_tick_on() -> None:
+    bench, timeline = Bench(), motion()
+    bench.loop.receive(rows(sampled(timeline, 1, 900), 1))
+    bench.run(0.4)
+    bench.loop.receive(rows(sampled(timeline, 350, 900), 350))
+    bench.run(1.2)
+    assert bench.faults == []
+    assert np.array_equal([m.q for m in bench.measured], timeline.sample(TICK * np.arange(1, 1201)))
+
+
+@pytest.mark.parametrize(("seconds", "made_good"), [(0.04, 40), (0.3, 1), (1.0, 1)])
+def test_a_short_pause_is_made_good_and_a_long_one_is_no_burst(seconds: float, made_good: int) -> None:
+    bench, timeline = Bench(), motion()
+    for low in range(0, 4000, 1000):
+        bench.loop.receive(rows(sampled(timeline, 1 + low, 1000), 1 + low))
+    bench.run(0.4)
+    assert abs(bench.pause(seconds) - made_good) <= 1
+    bench.run(4.0)
+    bench.check()
+    counts = bench.measured[-1].counts
+    assert counts.worst == pytest.approx(seconds - TICK, abs=2e-3)
+    if seconds < PAUSE:
+        assert bench.faults == []
+        assert (counts.skipped, counts.late) == (0, pytest.approx(made_good, abs=3))
+    else:
+        (fault,) = bench.faults
+        assert fault.kind is FaultKind.PAUSED
+        assert counts.skipped == pytest.approx(1000 * seconds, abs=2)
+        assert bench.measured[-1].q_ref == fault.rest
+
+
+def test_a_pause_at_rest_is_no_fault_but_a_motion_missed_in_it_is() -> None:
+    bench, timeline = Bench(), motion()
+    bench.loop.receive(rows(standing(NOMINAL), 1))
+    bench.run(0.2)
+    bench.pause(0.5)
+    assert bench.faults == []
+    start = round(bench.now / TICK) + 100
+    bench.loop.receive(rows(sampled(timeline, 1, 1000), start))
+    bench.loop.receive(rows(sampled(timeline, 1001, 1000), start + 1000))
+    bench.loop.receive(rows(sampled(timeline, 2001, 1000), start + 2000))
+    bench.loop.receive(rows(standing(timeline.final()), start + 3000))
+    bench.pause(5.0)
+    assert [fault.kind for fault in bench.faults] == [FaultKind.JUMPED]
+    assert bench.measured[-1].q_ref == tuple(NOMINAL)
+
+
+@settings(max_examples=20, deadline=None, phases=QUICK)
+@given(st.integers(0, 5), st.integers(1, 2500), st.booleans())
+def test_without_its_parent_it_brakes_and_ends(seed: int, tick: int, asked: bool) -> None:
+    bench, timeline = Bench(), motion(seed)
+    for low in range(0, 4000, 1000):
+        bench.loop.receive(rows(sampled(timeline, 1 + low, 1000), 1 + low))
+    bench.run(TICK * tick)
+    if asked:
+        bench.loop.receive(Close())
+    else:
+        bench.loop.leave()
+    bench.run(TICK * tick + 2.0)
+    assert bench.loop.finished
+    assert not bench.loop.failed
+    assert not any(bench.measured[-1].qd)
+    assert bench.faults == []
+    bench.check()
+    speed = np.abs(timeline.sample(TICK * tick, derivative=1))
+    assert len(bench.measured) - tick <= (speed / LIMITS.qdd_max).max() / TICK + 2
+
+
+def test_what_makes_no_sense_brings_it_to_rest() -> None:
+    good = sampled(motion(), 420, 100)
+    wrong = np.array(good.q)
+    wrong[50, 2] = np.nan
+    fast = np.array(good.qd)
+    fast[99, 1] = 1.1 * LIMITS.qd_max[1]
+    for message in (
+        rows(Reference(wrong, good.qd, good.qdd), 420),
+        rows(Reference(good.q, fast, good.qdd), 420),
+        rows(good, 400 + AHEAD_MOST + 1),
+        Rows(0, 420, False, b""),
+        Rows(0, 420, False, bytes(143)),
+        Rows(0, 420, False, bytes(144 * (ROWS_MOST + 1))),
+        Setup(BodyKind.EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
+        Attach(-1.0),
+    ):
+        bench = Bench(Picky())
+        bench.loop.receive(rows(sampled(motion(), 1, 900), 1))
+        bench.run(0.4)
+        bench.loop.receive(message)
+        bench.run(2.0)
+        assert [fault.kind for fault in bench.faults] == [FaultKind.REFUSED]
+        bench.check()
+    with pytest.raises(FormatError):
+        decode_order(b"\xc1")
+    with pytest.raises(FormatError):
+        decode_news(encode(Close()))
+
+
+class Picky(ExactTicks):
+    """A body that minds its loads, and breaks when it's told to."""
+
+    broken = False
+
+    def attach(self, mass: float) -> None:
+        if mass <= 0:
+            raise InvalidValueError("mass", mass, "positive")
+
+    def step(self, prepared: Any) -> Any:
+        if self.broken:
+            raise VrsError("the arm fell off")
+        return prepared
+
+
+def test_a_body_that_fails_is_told_and_ends_it() -> None:
+    body = Picky()
+    bench = Bench(body)
+    bench.run(0.1)
+    body.broken = True
+    bench.run(0.2)
+    assert [(fault.kind, fault.text) for fault in bench.faults] == [(FaultKind.BODY, "the arm fell off")]
+    assert bench.loop.finished
+    assert bench.loop.failed
+
+
+def test_it_may_be_placed_where_it_was_measured_and_nowhere_else() -> None:
+    for away, kinds in ((0.04, []), (0.3, [FaultKind.JUMPED])):
+        bench = Bench()
+        bench.run(0.1)
+        bench.loop.receive(rows(standing(NOMINAL + away), 120, placed=True))
+        bench.run(0.2)
+        assert [fault.kind for fault in bench.faults] == kinds
+    bench = Bench()
+    bench.run(0.1)
+    bench.loop.receive(rows(standing(NOMINAL + 0.04), 120))
+    bench.run(0.2)
+    assert [fault.kind for fault in bench.faults] == [FaultKind.JUMPED]
+
+
+def late_start(late: int) -> Bench:
+    """At rest, rows come whose first are late by so many ticks; more follow in time."""
+    bench, timeline = Bench(), motion()
+    bench.run(0.4)
+    bench.loop.receive(rows(sampled(timeline, 100, 500), 400 - late + 1))
+    bench.loop.receive(rows(sampled(timeline, 120, 900), 400 - late + 21))
+    bench.run(0.6)
+    for low in range(400, int(timeline.end / TICK) + 900, 900):
+        bench.loop.receive(rows(sampled(timeline, 100 + low, 900), 400 - late + 1 + low))
+    bench.run(timeline.end + 1.0)
+    return bench
+
+
+@pytest.mark.parametrize("late", [3, 10, 60, 299])
+def test_a_motion_whose_first_rows_come_late_begins_late_and_is_on_time_after_it(late: int) -> None:
+    bench, timeline = late_start(late), motion()
+    assert bench.faults == []
+    bench.check()
+    moved = [m for m in bench.measured if 400 < m.tick <= 1500]
+    assert {m.tick - m.followed for m in moved} == {late}
+    t = TICK * (np.array([m.followed for m in moved]) - 400 + late + 99)
+    assert np.abs(np.array([m.q for m in moved]) - timeline.sample(t)).max() < 1e-9
+    assert bench.measured[-1].followed == bench.measured[-1].tick
+
+
+def test_a_motion_that_is_too_late_is_a_jump() -> None:
+    assert [fault.kind for fault in late_start(330).faults] == [FaultKind.JUMPED]
+
+
+def test_news_that_nobody_takes_stay_few_and_the_fault_is_among_them() -> None:
+    bench = Bench()
+    bench.loop.receive(rows(sampled(motion(), 1, 400), 1))
+    for k in range(1, 3000):
+        bench.loop.advance(now=TICK * k + 1e-5)
+    news = bench.loop.take()
+    assert len(news) <= 64
+    assert [type(n) for n in news if not isinstance(n, Measurement)] == [Ready, Fault]
+
+
+@pytest.mark.parametrize(("profile", "D"), [("domain", None), ("wed", None), ("none", -0.3)])
+def test_what_a_site_foresees_is_what_it_finds_after_a_stall(profile: str, D: float | None) -> None:
+    lab = laboratory(profile, 4, D=D, length=8.0)
+    references, known, moving = References(foreseen(lab.robot), now=0.0), 1, 0
+    for k in range(20):
+        now = 1.0 + 0.4 * k
+        lab.run(now)
+        first, seen = references.take(now=now)
+        following = int(now / TICK + 1e-9) + 1
+        assert first == max(known, following - 500)
+        known = following
+        t = TICK * np.arange(first, following + 500)
+        at = lab.robot.reference(lab.robot.foreseen(t))
+        assert 1 <= len(seen.q) <= len(t)
+        for part, whole in zip(seen, at, strict=True):
+            assert np.array_equal(part, whole[: len(part)])
+        assert (at.q[len(seen.q) - 1 :] == at.q[-1]).all()
+        assert len(seen.q) == len(t) or not (seen.qd[-1].any() or seen.qdd[-1].any())
+        assert np.abs(np.diff(at.q, axis=0)).max() <= 1.01 * TICK * LIMITS.qd_max.max()
+        moving += int(len(seen.q) > 1)
+    assert moving >= 5
+    expected = lab.robot.foreseen(t)
+    lab.robot.advance_play(now=now + 0.52)
+    for one, other in zip(lab.robot.play_at(t), expected, strict=True):
+        assert np.array_equal(one, other)
+
+
+def configured(**options: Any) -> PhysicsConfig:
+    return PhysicsConfig(LIMITS, NOMINAL, **({"body": BodyKind.EXACT} | options))
+
+
+def wait(physics: PhysicsProcess, clock: WallClock, until: Callable[[Event], bool], longest: float) -> list[Event]:
+    """Poll until something comes that's waited for; once more at the end, however late that is."""
+    events: list[Event] = []
+    end = clock.now() + longest
+    left = longest
+    while left > 0.0:
+        select.select([physics], [], [], min(0.05, left))
+        left = end - clock.now()
+        events += physics.poll(now=clock.now())
+        if any(map(until, events)):
+            return events
+    raise AssertionError(f"nothing such came within {longest} s: {events[-3:]}")
+
+
+@pytest.fixture(name="clock")
+def _clock() -> WallClock:
+    return WallClock(0.0)
+
+
+def ended(pid: int) -> bool:
+    """Whether a process is no more, or waits only for its parent to hear of it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+def test_a_process_follows_is_paused_and_follows_again(clock: WallClock) -> None:
+    timeline = motion()
+    with PhysicsProcess(configured(every=1), clock) as physics:
+        assert not physics.feed(standing(NOMINAL), 1)
+        ready = next(e for e in wait(physics, clock, lambda e: isinstance(e, Ready), 30.0) if isinstance(e, Ready))
+        first = ready.tick + 300
+        for low in range(0, 4000, 1000):
+            assert physics.feed(sampled(timeline, low, 1000), first + low)
+        events = wait(physics, clock, lambda e: isinstance(e, Measurement) and e.tick >= first + 400, 5.0)
+        measured = [e for e in events if isinstance(e, Measurement)]
+        ticks = np.array([m.followed for m in measured])
+        assert len(ticks) > 200
+        assert np.abs(np.array([m.q for m in measured]) - timeline.sample(TICK * (ticks - first))).max() <= 1e-9
+
+        os.kill(physics.pid, signal.SIGSTOP)
+        try:
+            events = wait(physics, clock, lambda e: isinstance(e, Silent), 2.0)
+            select.select([], [], [], 0.8)
+        finally:
+            os.kill(physics.pid, signal.SIGCONT)
+        events += wait(physics, clock, lambda e: isinstance(e, Measurement) and e.doing is Doing.HOLDING, 5.0)
+        (fault,) = (e for e in events if isinstance(e, Fault))
+        assert fault.kind is FaultKind.PAUSED
+        stopped = [e for e in events if isinstance(e, Measurement)]
+        assert stopped[-1].counts.skipped - measured[-1].counts.skipped > 700
+        assert stopped[-1].counts.ticks - measured[-1].counts.ticks < stopped[-1].tick - measured[-1].tick - 700
+        for a, b in pairwise((measured[-1], *stopped)):
+            ticks_run = b.counts.ticks - a.counts.ticks
+            assert (np.abs(np.subtract(b.q_ref, a.q_ref)) <= LIMITS.qd_max * TICK * ticks_run * 1.001).all()
+
+        physics.acknowledge(fault)
+        back = motion_from(np.array(fault.rest), NOMINAL)
+        start = stopped[-1].tick + 300
+        count = int(back.end / TICK) + 2
+        assert physics.feed(sampled(back, 0, count), start)
+        events = wait(physics, clock, lambda e: isinstance(e, Measurement) and e.tick > start + count, 5.0)
+        assert not any(isinstance(e, Fault) for e in events)
+        last = next(e for e in reversed(events) if isinstance(e, Measurement))
+        assert np.abs(last.q - NOMINAL).max() < 1e-9
+
+        # Rows that end in mid-motion, as if this process stood still.
+        assert physics.feed(sampled(motion_from(np.array(last.q)), 0, 150), last.tick + 200)
+        events = wait(physics, clock, lambda e: isinstance(e, Measurement) and e.doing is Doing.HOLDING, 5.0)
+        (fault,) = (e for e in events if isinstance(e, Fault))
+        assert (fault.kind, fault.number, fault.tick) == (FaultKind.STARVED, 2, last.tick + 350)
+        pid = physics.pid
+    assert ended(pid)
+
+
+def test_the_end_of_a_process_is_told_and_the_next_can_begin(clock: WallClock) -> None:
+    with PhysicsProcess(configured(), clock) as physics:
+        wait(physics, clock, lambda e: isinstance(e, Measurement), 30.0)
+        os.kill(physics.pid, signal.SIGKILL)
+        events = wait(physics, clock, lambda e: isinstance(e, Ended), 0.2)
+        assert events[-1] == Ended(-signal.SIGKILL)
+        assert not physics.feed(standing(NOMINAL), 1)
+        assert physics.poll(now=clock.now()) == ()
+        assert physics.next_deadline() == np.inf
+
+
+PARENT = """
+import select
+import numpy as np
+from interfaces.runtime.physics import *
+from interfaces.runtime.physics_messages import Ready
+from interfaces.teleop import Reference
+from robots import puma560
+from vrs.clock import WallClock
+model = puma560.model()
+q, clock = np.array(model.poses["nominal"]), WallClock(0.0)
+physics = PhysicsProcess(PhysicsConfig(model.limits, q, body="exact"), clock)
+while not any(isinstance(e, Ready) for e in physics.poll(now=clock.now())):
+    select.select([physics], [], [], 1.0)
+first, h = int(clock.now() / TICK) + 200, TICK * np.arange(1000)[:, None] * np.ones(6)
+for k in range(4):
+    u = h + k
+    part = Reference(q + 0.1 * (1 - np.cos(2 * u)), 0.2 * np.sin(2 * u), 0.4 * np.cos(2 * u))
+    assert physics.feed(part, first + 1000 * k)
+print(physics.pid, flush=True)
+select.select([], [], [], 60.0)
+"""
+
+
+def test_the_death_of_the_parent_ends_it() -> None:
+    home = str(Path(__file__).resolve().parents[2])
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT], stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": home}
+    )
+    try:
+        assert parent.stdout is not None
+        pid = int(parent.stdout.readline())
+        select.select([], [], [], 0.6)
+        assert not ended(pid)
+    finally:
+        parent.kill()
+        parent.communicate()
+    for _ in range(40):
+        if ended(pid):
+            break
+        select.select([], [], [], 0.05)
+    assert ended(pid)
+
+
+def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) -> None:
+    timeline = motion(1)
+    with PhysicsProcess(configured(body=BodyKind.PUMA560), clock) as physics:
+        ready = next(e for e in wait(physics, clock, lambda e: isinstance(e, Ready), 60.0) if isinstance(e, Ready))
+        with pytest.raises(InvalidValueError, match="mass"):
+            physics.attach(-1.0)
+        first = ready.tick + 300
+        for low in range(0, 2000, 1000):
+            assert physics.feed(sampled(timeline, low, 1000), first + low)
+        assert physics.attach(2.5)
+        events = wait(physics, clock, lambda e: isinstance(e, Measurement) and e.tick >= first + 1000, 10.0)
+        measured = [e for e in events if isinstance(e, Measurement) and e.tick > first + 100]
+        error = np.abs(np.array([m.q for m in measured]) - [m.q_ref for m in measured]).max()
+        assert 1e-6 < error < 0.02
+        assert all(len(m.tau) == 6 for m in measured)
+        assert physics.release()
+
+
+def test_it_refuses_what_can_not_be_sent(clock: WallClock) -> None:
+    with pytest.raises(InvalidValueError, match="joint"):
+        PhysicsConfig(LIMITS, NOMINAL + 100.0)
+    with pytest.raises(InvalidValueError, match="every"):
+        configured(every=0)
+    with PhysicsProcess(configured(), clock) as physics:
+        for bad in (Reference(*(np.zeros((3, 5)),) * 3), standing(NOMINAL, 1001), standing(NOMINAL, 0)):
+            with pytest.raises(InvalidValueError, match="reference"):
+                physics.feed(bad, 1)
+        with pytest.raises(InvalidValueError, match="reference"):
+            physics.feed(Reference(np.zeros((3, 6)), np.zeros((2, 6)), np.zeros((3, 6))), 1)
+
+
+def test_a_site_at_rest_asks_for_one_row() -> None:
+    references = References(foreseen(RobotSite(MODEL, NOMINAL, now=0.0)), now=0.0205)
+    first, reference = references.take(now=0.0205)
+    assert first == 21
+    assert np.array_equal(reference.q, NOMINAL[None])
+    assert references.take(now=0.04)[0] == 21
+    assert references.take(now=0.04)[0] == 41
+    references.restart(now=0.06)
+    assert references.take(now=0.07)[0] == 61
+    with pytest.raises(InvalidValueError, match="horizon"):
+        References(foreseen(RobotSite(MODEL, NOMINAL, now=0.0)), now=0.0, horizon=0.6)
