@@ -16,6 +16,8 @@ OURS = ("vrs", "robots", "interfaces")
 ALLOWED = {"vrs": {"vrs"}, "robots": {"vrs", "robots"}, "interfaces": {"vrs", "robots", "interfaces"}}
 STRANGE = {"examples", "tests", "benchmarks"}
 HEAVY = {"pybullet", "pybullet_data", "pybullet_utils", "roboticstoolbox", "spatialmath", "trimesh", "matplotlib"}
+NUMPY = 0.15
+"""What importing NumPy takes on a machine of usual pace [s]."""
 SOCKETS = {"socket", "socketserver", "asyncio", "ssl", "http", "urllib", "selectors"}
 CLOCKS = {"time", "datetime"}
 FILES = [path for package in OURS for path in sorted((HOME / package).rglob("*.py"))]
@@ -99,14 +101,21 @@ def test_no_file_is_over_400_lines():
 
 @pytest.mark.parametrize(("code", "most"), [("import vrs", 0.3), ("import interfaces.cli", 0.7)])
 def test_the_door_opens_quickly_and_loads_nothing_heavy(code, most):
-    probe = (
-        f"import sys, time; t = time.process_time(); {code}; t = time.process_time() - t; "
-        f"print(t, *sorted({HEAVY!r} & set(sys.modules)))"
-    )
-    best = float("inf")
-    for _ in range(5):
-        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    """Within its bar on a machine of usual pace; NumPy's own import, beside it, says how slow this one is now."""
+
+    def probe(code: str) -> tuple[float, list[str]]:
+        text = (
+            f"import sys, time; t = time.process_time(); {code}; t = time.process_time() - t; "
+            f"print(t, *sorted({HEAVY!r} & set(sys.modules)))"
+        )
+        done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
         seconds, *heavy = done.stdout.split()
+        return float(seconds), heavy
+
+    best = yardstick = float("inf")
+    for _ in range(5):
+        seconds, heavy = probe(code)
         assert heavy == []
-        best = min(best, float(seconds))
-    assert best <= most
+        best = min(best, seconds)
+        yardstick = min(yardstick, probe("import numpy")[0])
+    assert best <= most * max(1.0, yardstick / NUMPY)
