@@ -1,0 +1,1 @@
+"""VAL-II: a language for the console and for programs."""

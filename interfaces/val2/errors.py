@@ -1,0 +1,65 @@
+"""VAL's errors: what is wrong, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vrs.errors import VrsError
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where something stands in a text."""
+
+    line: int
+    """Line, from 1."""
+    column: int
+    """Column, from 1."""
+
+
+class ValError(VrsError):
+    """An error in VAL's dress: `*Undefined location* P3, step 12`."""
+
+    def __init__(
+        self,
+        what: str,
+        detail: str = "",
+        *,
+        program: str = "",
+        step: int | None = None,
+        place: Place | None = None,
+    ) -> None:
+        """Say what is wrong.
+
+        Args:
+            what: The words between the stars, such as `Undefined location`.
+            detail: Which one, or what is allowed.
+            program: Name of the program.
+            step: Step of the program, from 1.
+            place: Where it stands: within the line of the step for a program, in the file for a file.
+        """
+        self.what, self.detail = what, detail
+        self.program, self.step, self.place = program, step, place
+        super().__init__(self._spelled())
+
+    def _spelled(self) -> str:
+        where = []
+        if self.program:
+            where.append(f"program {self.program}")
+        if self.step is not None:
+            where.append(f"step {self.step}")
+        if self.place is not None:
+            line = f"line {self.place.line}, " if self.step is None else ""
+            where.append(f"{line}column {self.place.column}")
+        head = f"*{self.what}*" + (f" {self.detail}" if self.detail else "")
+        return ", ".join([head, *where])
+
+    def at(self, *, program: str = "", step: int | None = None, place: Place | None = None) -> ValError:
+        """The same error at a place, where it doesn't know its own."""
+        return ValError(
+            self.what,
+            self.detail,
+            program=self.program or program,
+            step=self.step if self.step is not None else step,
+            place=self.place if self.place is not None else place,
+        )
