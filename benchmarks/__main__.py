@@ -15,7 +15,7 @@ PARTS = (
     "sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "twins", "physics", "wire",
 )  # fmt: skip
 """Benchmarks that give results."""
-DETAILS = ("timeline", "planning", "lines", "steering", "viewers")
+DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady")
 """Benchmarks that print more about one thing."""
 
 

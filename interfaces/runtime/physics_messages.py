@@ -143,6 +143,8 @@ class TickCounts(msgspec.Struct, frozen=True):
     """Largest lateness [s]."""
     skipped: int
     """Ticks that were never run, as the process stood still."""
+    merged: int
+    """Ticks on the way onto references that came late."""
     histogram: tuple[int, ...]
     """How many in each class of `LATENESS`."""
 

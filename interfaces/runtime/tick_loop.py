@@ -4,6 +4,7 @@ A late tick is made good at once, up to `PAUSE`. After a longer pause the missed
 burst. Where the references end in mid-motion, jump or were left out, each joint brakes within its limits from the
 last reference, and the arm holds until the parent has acknowledged that. Where it rests and the first rows of a
 motion come too late, by up to `row_buffer.KEPT` ticks, it begins late, and is on time again when it rests next.
+Where it moves and rows come too late, it goes over onto them within its limits, if it isn't too far from them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from interfaces.runtime.merging import Merging
 from interfaces.runtime.physics_messages import (
     LATENESS,
     Attach,
@@ -96,7 +98,7 @@ class _Counter:
     def __init__(self, tick: float) -> None:
         self._tick = tick
         self._ticks = self._late = 0
-        self.skipped = 0
+        self.skipped = self.merged = 0
         self._worst = 0.0
         self._histogram = [0] * (len(LATENESS) + 1)
 
@@ -109,7 +111,8 @@ class _Counter:
 
     def counts(self) -> TickCounts:
         """All until now."""
-        return TickCounts(self._ticks, self._late, self._worst, self.skipped, tuple(self._histogram))
+        histogram = tuple(self._histogram)
+        return TickCounts(self._ticks, self._late, self._worst, self.skipped, self.merged, histogram)
 
 
 class TickLoop:
@@ -137,6 +140,8 @@ class TickLoop:
         self._buffer, self._ahead = RowBuffer(), deque[tuple[int, _Step]]()
         self._placing: int | None = None
         self._lag = 0
+        self._merging, self._belated = Merging(limits, tick), False
+        self._merged_at = -1
         self._brake: deque[_Step] = deque()
         self._doing = Doing.FOLLOWING
         self._faults = self._acknowledged = 0
@@ -234,6 +239,7 @@ class TickLoop:
             raise FormatError("rows", "too many blocks")
         while self._ahead and self._ahead[-1][0] >= message.start:
             self._ahead.pop()
+        self._belated = self._belated or (message.start <= self._last and any(self._at.qd))
         if message.placed:
             self._placing = message.start
         self._acknowledged = message.run
@@ -262,6 +268,11 @@ class TickLoop:
         joint = self._misplaced(step) if placing else self._jump(step)
         if placing:
             self._placing = None
+        if self._belated and not placing:
+            merged = self._merged(step)
+            if merged is not None:
+                return merged
+        self._belated = False
         if joint is None:
             return step
         later = None if placing or any(self._at.qd) else self._depart_later(k)
@@ -292,6 +303,17 @@ class TickLoop:
                 self._lag = k - start
                 return step
         return None
+
+    def _merged(self, step: _Step) -> _Step | None:
+        """On the way onto a reference whose row came late; None if the arm is there, or too far away."""
+        at, row = self._at, np.array((step.q, step.qd, step.qdd))
+        here = self._merging.there(at.q, at.qd, row)
+        if here or not self._merging.near(at.q, at.qd, row, begun=self._merged_at == self._last):
+            return None
+        self._counter.merged += 1
+        self._merged_at = self._last + 1
+        q, qd = self._merging.step(at.q, at.qd, row)
+        return self._prepared(np.array((q, qd, (np.array(qd) - at.qd) / self._tick))[None])[0]
 
     def _catch_up(self, k: int) -> None:
         """Be on time again, if the arm rests until then anyway."""
@@ -328,7 +350,7 @@ class TickLoop:
         """Begin to brake; return where the references will rest [rad]."""
         self._buffer.clear()
         self._ahead.clear()
-        self._placing, self._lag = None, 0
+        self._placing, self._lag, self._belated = None, 0, False
         stop = from_measured(0.0, self._at.q, self._at.qd, self._limits)
         ticks = math.ceil(stop.end / self._tick - _SAME) if stop.end > 0 else 0
         t = np.minimum(self._tick * np.arange(1, ticks + 1, dtype=np.float64), stop.end)

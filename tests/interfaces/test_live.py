@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,6 +34,8 @@ from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.commands import Command
 
 LIMITS = MODEL.limits
+MARGIN = 0.05
+"""By how much execution margins exceed what the way takes [s]."""
 KILLS = int(os.environ.get("VRS_KILLS", "2"))
 """How often an operator's process is killed in mid-motion."""
 A = np.array([0.0, 0.8, -2.4, 0.0, 0.6, 0.0])
@@ -70,7 +74,7 @@ def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
             time.sleep(max(begin + 5.0 - robot.now(), 0.0))
             return [robot.designer.issued(i.number).receipt for i in issued], begin
 
-    async def live() -> tuple:
+    async def live() -> tuple | None:
         site = RobotSiteConfig(fixed_offset=D, beat=0.03)
         async with (
             robot_here(site=site) as (robot, url),
@@ -79,10 +83,16 @@ def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
             receipts, begin = await asyncio.to_thread(play, at)
             mine, theirs = operator.operator.engine, robot.host.site
             assert theirs is not None
-            assert not theirs.parted
+            late = max(operator.health()["timer_late"], robot.health()["timer_late"])
+            assert not theirs.parted or late > MARGIN
+            if theirs.parted:
+                return None
             return receipts, begin, mine.timeline, theirs.engine.timeline, list(theirs.engine.receipts)
 
-    receipts, begin, virtual, real, answers = asyncio.run(live())
+    # A machine that stood still for longer than the margins says nothing.
+    made = next((made for made in (asyncio.run(live()) for _ in range(4)) if made is not None), None)
+    assert made is not None
+    receipts, begin, virtual, real, answers = made
     operator = OperatorSite(MODEL, NOMINAL, now=0.0)
     robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(f"constant:{delay}")))
@@ -119,16 +129,14 @@ def test_without_its_operator_the_robot_brakes_in_time() -> None:
     async def killed(robot, rows: Rows, url: str, wait: float) -> None:
         address = url.removeprefix("ws://").removesuffix("/site")
         async with child_beside("serve", "--port", "0", "--robot-at", address) as server:
-
-            def command() -> None:
-                with connect(server.url.replace("http", "ws").replace("/view", "/ws")) as client:
-                    lease(client)
-                    for q in (A, B, READY, NOMINAL) * 3:
-                        client.designer.issue(MotionCommand(JointTarget(q), insertion=Insertion.APPEND), wait=5.0)
-                    time.sleep(wait)
-                    server.kill()
-
-            await asyncio.to_thread(command)
+            # In a process of its own, so that it takes nothing of the robot's time.
+            killer = await asyncio.create_subprocess_exec(
+                sys.executable, str(Path(__file__).with_name("killer.py")),
+                server.url.replace("http", "ws").replace("/view", "/ws"), str(server.process.pid), str(wait),
+                stdout=asyncio.subprocess.PIPE,
+            )  # fmt: skip
+            assert killer.stdout is not None
+            assert await killer.stdout.readline() == b"killed\n"
             t_kill = robot.clock.now()
             moved = robot.host.reference(np.array([t_kill])).qd
             await until(lambda: robot.host.site is not None and robot.host.site.halted, 3.0)
@@ -147,6 +155,7 @@ def test_without_its_operator_the_robot_brakes_in_time() -> None:
             brake = float((LIMITS.qd_max / LIMITS.qdd_max).max())
             assert still <= t_kill + HALT.timeout + 0.02 + 2 * brake
             assert robot.faults == 0
+            await asyncio.wait_for(killer.wait(), 20.0)
 
     asyncio.run(session())
 

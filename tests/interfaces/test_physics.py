@@ -42,7 +42,7 @@ from interfaces.runtime.tick_loop import AHEAD_MOST, PAUSE, TickLoop
 from interfaces.teleop import Reference, RobotSite
 from robots import puma560
 from tests.interfaces.test_teleop import laboratory
-from vrs import Engine, Insertion, JointTarget, MotionCommand, Timeline, WallClock
+from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Status, Timeline, WallClock
 from vrs.errors import FormatError, InvalidValueError, VrsError
 from vrs.model import Array
 
@@ -260,6 +260,38 @@ def test_rows_that_come_late_count_from_the_present_tick_on() -> None:
     bench.run(1.2)
     assert bench.faults == []
     assert np.array_equal([m.q for m in bench.measured], timeline.sample(TICK * np.arange(1, 1201)))
+
+
+@settings(max_examples=40, deadline=None, phases=QUICK)
+@given(st.integers(0, 50), st.integers(0, 50), st.integers(200, 2500), st.integers(1, 60))
+def test_rows_of_another_motion_that_come_late_are_gone_over_to(
+    seed: int, other: int, tick: int, late: int
+) -> None:
+    timeline = motion(seed)
+    # One motion until the first of the late rows, then another.
+    clock = ManualClock(TICK * (tick - late))
+    engine = Engine(MODEL, timeline=timeline, clock=clock)
+    target = np.clip(NOMINAL + np.random.default_rng(other).uniform(-0.8, 0.8, 6), LIMITS.q_min, LIMITS.q_max)
+    assert (
+        engine.execute(MotionCommand(JointTarget(target), insertion=Insertion.REPLACE)).status
+        is not Status.REJECTED
+    )
+    bench = Bench()
+    for low in range(0, tick, 900):
+        bench.loop.receive(rows(sampled(timeline, 1 + low, 900), 1 + low))
+        bench.run(TICK * min(low + 600, tick))
+    bench.run(TICK * tick)
+    end = int(engine.timeline.end / TICK) + 2
+    for low in range(tick - late, max(end, tick) + 2, 900):
+        bench.loop.receive(rows(sampled(engine.timeline, low, 901), low))
+        bench.run(TICK * max(low + 600, tick))
+    bench.run(TICK * (end + 1500))
+    bench.check()
+    if late > 12:
+        assert [fault.kind for fault in bench.faults] in ([], [FaultKind.JUMPED])
+        return
+    assert bench.faults == []
+    assert np.abs(np.array(bench.measured[-1].q_ref) - target).max() < 1e-9
 
 
 @pytest.mark.parametrize(("seconds", "made_good"), [(0.04, 40), (0.3, 1), (1.0, 1)])

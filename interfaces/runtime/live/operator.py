@@ -16,6 +16,7 @@ from starlette.routing import BaseRoute
 from interfaces.link import LinkConditions
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.runtime.live.turning import Turning
+from interfaces.runtime.live.warm import warm
 from interfaces.site import Site
 from interfaces.stream.access import Access
 from interfaces.stream.control import Role, State
@@ -74,6 +75,7 @@ class LiveOperator:
             access: Who may do what.
         """
         self.config = config
+        warm(config.model, config.q)
         self.clock = WallClock()
         self.operator = OperatorSite(config.model, config.q, now=0.0, config=config.site, halted=NOT_MET)
         self.site = Site(self.operator.engine)

@@ -18,6 +18,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
 from interfaces.runtime.live.turning import Turning
+from interfaces.runtime.live.warm import warm
 from interfaces.runtime.physics import (
     TICK,
     Ended,
@@ -99,6 +100,7 @@ class LiveRobot:
             access: Who may come in as `Role.SITE`.
         """
         self.config, self._access = config, access
+        warm(config.model, config.q)
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
         seed = secrets.randbelow(2**32)
@@ -320,6 +322,7 @@ class LiveRobot:
             "epoch": 0 if site is None else site.epoch,
             "halted": "" if site is None else site.halted,
             "uncertainty": _finite(self.host.uncertainty),
+            "measured_at": None if measured is None else measured.followed * TICK,
             "q": None if measured is None else list(measured.q),
             "qd": None if measured is None else list(measured.qd),
             "doing": None if measured is None else str(measured.doing),
@@ -329,6 +332,7 @@ class LiveRobot:
             "faults": self.faults,
             "ticks": None if counts is None else {
                 "run": counts.ticks, "late": counts.late, "worst": counts.worst, "skipped": counts.skipped,
+                "merged": counts.merged,
             },
             "timer_late": self._turning.latest,
         }  # fmt: skip

@@ -1,0 +1,32 @@
+"""An operator who commands a robot, and kills the operator's site in the midst of it, in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+
+from interfaces import connect
+from interfaces.stream.control import Lease
+from robots.puma560.parameters import POSES
+from vrs import Insertion, JointTarget, MotionCommand
+
+TARGETS = ((0.0, 0.8, -2.4, 0.0, 0.6, 0.0), (0.5, 0.6, -2.0, 0.3, 0.4, 0.6), POSES["ready"], POSES["nominal"])
+
+
+def main(url: str, pid: int, wait: float) -> None:
+    """Command moves, and kill a process after a time [s]."""
+    with connect(url) as client:
+        assert isinstance(client.acquire(), Lease)
+        assert client.wait(lambda r: r.state is not None and not r.state.halted and r.state.connected, 20.0)
+        for q in TARGETS * 3:
+            client.designer.issue(MotionCommand(JointTarget(q), insertion=Insertion.APPEND), wait=5.0)
+        time.sleep(wait)
+        os.kill(pid, signal.SIGKILL)
+        sys.stdout.write("killed\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), float(sys.argv[3]))
