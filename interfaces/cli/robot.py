@@ -122,7 +122,7 @@ async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> 
     import asyncio
 
     from interfaces.runtime.live.process import READY
-    from interfaces.runtime.live.robot import LARGEST
+    from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
     from interfaces.stream import sockets
     from interfaces.stream.access import hosts

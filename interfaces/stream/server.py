@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from typing import Any
 
 from starlette.applications import Starlette
@@ -19,6 +20,7 @@ from interfaces.stream.codec import Encoding
 from interfaces.stream.hub import Hub
 from interfaces.stream.session import Session
 from interfaces.stream.sockets import BoundedWebSocket
+from interfaces.timer import Turning
 from vrs.clock import Clock
 
 BLOCKED = 2.0
@@ -62,8 +64,7 @@ class HubServer:
         self.hub, self.clock = hub, clock
         self._health, self._turned = health, turned
         self._clients: dict[Session, _Client] = {}
-        self._timer: asyncio.TimerHandle | None = None
-        self._kicked = self._running = False
+        self._turning = Turning(clock, self._turn, longest=math.inf)
         self._now = clock.now()
         self.cut_off = 0
         """Clients that were cut off because their sending was blocked."""
@@ -71,47 +72,34 @@ class HubServer:
     @property
     def routes(self) -> list[BaseRoute]:
         """`/ws` and `/health`."""
-        return [Route("/health", self._say_health), WebSocketRoute("/ws", _Endpoint(self))]
+        return [Route("/health", self._say_health), WebSocketRoute("/ws", Endpoint(self.serve))]
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[HubServer]:
         """Make frames and serve clients meanwhile."""
         watcher = asyncio.create_task(self._watch())
-        self._running = True
-        self.turn()
+        self._turning.start()
         try:
             yield self
         finally:
-            self._running = False
+            self._turning.stop()
             watcher.cancel()
-            if self._timer is not None:
-                self._timer.cancel()
             for session in self.hub.close():
                 if session in self._clients:
                     self._clients[session].wake.set()
 
     def kick(self) -> None:
-        """Something has come: `turn` soon."""
-        if not self._kicked and self._running:
-            self._kicked = True
-            asyncio.get_running_loop().call_soon(self.turn)
+        """Something has come: do soon what is due."""
+        self._turning.soon()
 
-    def turn(self) -> None:
+    def _turn(self, now: float) -> float | None:
         """Do what is due, and wake the writers that have something to send."""
-        self._kicked = False
-        if not self._running:
-            return
-        now = self._now = self.clock.now()
+        self._now = now
         for session in self.hub.advance(now=now):
             self._clients[session].wake.set()
         if self._turned is not None:
             self._turned()
-        if self._timer is not None:
-            self._timer.cancel()
-        deadline = self.hub.next_deadline()
-        if deadline is not None:
-            wait = max(deadline - self.clock.now(), 0.0)
-            self._timer = asyncio.get_running_loop().call_later(wait, self.turn)
+        return self.hub.next_deadline()
 
     async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection that was accepted, until it ends."""
@@ -174,20 +162,26 @@ class HubServer:
         return JSONResponse(facts | dict(self._health() if self._health is not None else {}))
 
 
-class _Endpoint:
-    """`/ws` as an ASGI application."""
+class Endpoint:
+    """A WebSocket of ours as an ASGI application: it's accepted with the encoding that the client asks for."""
 
-    def __init__(self, server: HubServer) -> None:
-        self._server = server
+    def __init__(self, serve: Callable[[Encoding, Scope, Receive, Send], Awaitable[None]]) -> None:
+        """Say who serves.
+
+        Args:
+            serve: Serves a connection that was accepted, until it ends.
+        """
+        self._serve = serve
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
         await receive()
         chosen = next((name for name in scope["subprotocols"] if name in set(Encoding)), None)
         if chosen is None:
             await send({"type": "websocket.close", "code": 1002, "reason": "no subprotocol of ours"})
             return
         await send({"type": "websocket.accept", "subprotocol": chosen})
-        await self._server.serve(Encoding(chosen), scope, receive, send)
+        await self._serve(Encoding(chosen), scope, receive, send)
 
 
 class Guard:

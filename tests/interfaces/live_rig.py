@@ -20,7 +20,8 @@ import numpy as np
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
-from interfaces.runtime.live.robot import LARGEST, LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.physics_messages import BodyKind
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts

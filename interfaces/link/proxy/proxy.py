@@ -16,8 +16,8 @@ from interfaces.link.packets import Totals
 from interfaces.link.path import Path
 from interfaces.link.proxy.address import Address
 from interfaces.link.proxy.tcp import TcpProxy, Way
-from interfaces.link.proxy.timer import Lateness
 from interfaces.link.proxy.udp import Parcel, UdpProxy
+from interfaces.timer import Lateness
 from vrs.checks import number_in
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError

@@ -13,8 +13,8 @@ import numpy as np
 from interfaces.link.conditions import Conditions, Service
 from interfaces.link.packets import PacketLog
 from interfaces.link.path import Path
-from interfaces.link.proxy.timer import Lateness, Timer
 from interfaces.link.stream import Stream
+from interfaces.timer import Lateness, Timer
 from vrs.clock import Clock
 
 SEGMENT = 1460

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from interfaces.link.channel import Channel
-from interfaces.link.proxy.timer import Lateness, Timer
+from interfaces.timer import Lateness, Timer
 from vrs.clock import Clock
 
 MAX_DATAGRAM = 65_535

@@ -15,7 +15,6 @@ from starlette.routing import BaseRoute
 
 from interfaces.link import LinkConditions
 from interfaces.runtime.live.robot_client import RobotClient
-from interfaces.runtime.live.turning import Turning
 from interfaces.runtime.live.warm import warm
 from interfaces.site import Site
 from interfaces.stream.access import Access
@@ -25,6 +24,7 @@ from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, Report, RobotLine
+from interfaces.timer import Turning
 from robots.onboard.lease import Ended, Grant, Lease
 from vrs.clock import WallClock, seconds_since_1970
 from vrs.commands import Stop
@@ -215,5 +215,5 @@ class LiveOperator:
             "behind": None if report is None or report.halted else report.measured_at - report.q_at,
             "link_loss": None if attached is None else attached.link_loss,
             "offset": None if attached is None else attached.offset,
-            "timer_late": self._turning.latest,
+            "timer_late": self._turning.lateness.worst,
         }

@@ -1,11 +1,15 @@
-"""Deadlines of sans-I/O machines on an asyncio loop."""
+"""What wakes a state machine in an asyncio loop: its deadline is there, or something came."""
 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 
 from vrs.clock import Clock
+
+LONGEST = 0.25
+"""Longest time between two turns [s], if nothing else is said."""
 
 
 class Lateness:
@@ -62,3 +66,49 @@ class Timer:
             return
         self._lateness.add(late)
         self._callback()
+
+
+class Turning:
+    """Calls `turn` when it's due and when it's asked for, never twice at once; it says when it's due next."""
+
+    def __init__(self, clock: Clock, turn: Callable[[float], float | None], *, longest: float = LONGEST) -> None:
+        """Begin with `start`.
+
+        Args:
+            clock: Whose time is given to `turn`, and in which deadlines are.
+            turn: Does what is due by a time [s]; returns when something is due next [s], or None.
+            longest: Longest time between two turns [s]; may be infinite.
+        """
+        self._clock, self._turn, self._longest = clock, turn, longest
+        self._asked = False
+        self.running = False
+        self.lateness = Lateness()
+        """How late turns began that were due; a deadline that was past already counts from when it was known."""
+        self._timer = Timer(clock, self._now, self.lateness)
+
+    def start(self) -> None:
+        """Turn from now on; where the loop runs."""
+        self.running = True
+        self.soon()
+
+    def stop(self) -> None:
+        """Turn no more."""
+        self.running = False
+        self._timer.set(None)
+
+    def soon(self) -> None:
+        """Turn as soon as the loop comes round."""
+        if self.running and not self._asked:
+            self._asked = True
+            asyncio.get_running_loop().call_soon(self._now)
+
+    def _now(self) -> None:
+        self._asked = False
+        if not self.running:
+            return
+        deadline = self._turn(self._clock.now())
+        now = self._clock.now()
+        due = now + self._longest
+        if deadline is not None:
+            due = min(max(deadline, now), due)
+        self._timer.set(due if due < math.inf else None)

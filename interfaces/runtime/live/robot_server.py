@@ -1,0 +1,180 @@
+"""The robot's end of a connection to an operator's site: one site at a time, on a socket."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from starlette.routing import BaseRoute, WebSocketRoute
+from starlette.types import Receive, Scope, Send
+
+from interfaces.stream.access import Access
+from interfaces.stream.codec import Encoding, decode, encode
+from interfaces.stream.control import PROTOCOL, Attached, Hello, Ping, Pong, Problem, ProblemCode, Role
+from interfaces.stream.errors import ProtocolError
+from interfaces.stream.server import Endpoint
+from interfaces.teleop import Orders, Report, RobotHost
+from vrs.clock import Clock
+from vrs.errors import InvalidValueError
+
+LARGEST = 1 << 20
+"""Longest message of an operator's site: thousands of commands that wait to be acknowledged [B]."""
+HELLO = 2.0
+"""Time for the first message of a connection [s]."""
+_WAITING = 64
+"""Most messages that wait to be sent; older ones are dropped, for newer ones say it all."""
+_PROBLEMS = 32
+"""So many messages that can't be taken end a connection."""
+_GONE = 1001
+_NO_ROOM = 1013
+_POLICY = 1008
+
+
+class _Connection:
+    """An operator's site on a socket."""
+
+    def __init__(self, encoding: Encoding) -> None:
+        self.encoding = encoding
+        self.waiting: deque[bytes] = deque(maxlen=_WAITING)
+        self.wake = asyncio.Event()
+        self.close: tuple[int, str] | None = None
+        self.problems = 0
+
+    def send(self, message: Report | Ping | Attached | Problem) -> None:
+        self.waiting.append(encode(message, self.encoding))
+        self.wake.set()
+
+    def end(self, code: int, reason: str) -> None:
+        self.close = code, reason
+        self.wake.set()
+
+
+class RobotServer:
+    """Joins a `RobotHost` to the operator's site that has said hello last, if it's let in."""
+
+    def __init__(
+        self,
+        host: RobotHost,
+        clock: Clock,
+        access: Access,
+        *,
+        attached: Callable[[], Attached],
+        met: Callable[[], None],
+        heard: Callable[[], None],
+    ) -> None:
+        """Serve a host.
+
+        Args:
+            host: What listens and is said hello to.
+            clock: The robot's.
+            access: Who may come in as `Role.SITE`.
+            attached: What a site is told that is let in.
+            met: Called when one has been.
+            heard: Called when a message comes that the host is given.
+        """
+        self._host, self._clock, self._access = host, clock, access
+        self._attached, self._met, self._heard = attached, met, heard
+        self._connection: _Connection | None = None
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """`/site`."""
+        return [WebSocketRoute("/site", Endpoint(self.serve))]
+
+    @property
+    def connected(self) -> bool:
+        """Whether an operator's site is there."""
+        return self._connection is not None
+
+    def send(self, messages: Iterable[Report | Ping]) -> None:
+        """Send messages to the operator's site; without one they're dropped."""
+        if self._connection is not None:
+            for message in messages:
+                self._connection.send(message)
+
+    def close(self) -> None:
+        """Say farewell to the operator's site."""
+        if self._connection is not None:
+            self._connection.end(_GONE, "the robot's site stops")
+
+    async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002
+        """Serve a connection that was accepted, until it ends."""
+        connection = _Connection(encoding)
+        writer = asyncio.create_task(self._write(connection, send))
+        try:
+            try:
+                async with asyncio.timeout(HELLO):
+                    refusal = self._greet(connection, await receive())
+            except TimeoutError:
+                refusal = Problem(ProblemCode.HELLO_LATE, f"no hello within {HELLO:g} s", fatal=True)
+            if refusal is not None:
+                connection.send(refusal)
+                connection.end(_POLICY if refusal.code is not ProblemCode.FULL else _NO_ROOM, refusal.text)
+            while connection.close is None and (message := await receive())["type"] != "websocket.disconnect":
+                self._hear(connection, _data(message))
+            await asyncio.wait([writer], timeout=1.0 if connection.close is not None else 0.0)
+        finally:
+            writer.cancel()
+            if self._connection is connection:
+                self._connection = None
+
+    def _greet(self, connection: _Connection, message: Any) -> Problem | None:
+        """Take the first message; why it can't be, or None if the operator is followed from now on."""
+        try:
+            hello = decode(_data(message), connection.encoding, allowed=Hello)
+            refused = self._access.refusal(Role.SITE, hello.token)
+            if hello.protocol != PROTOCOL:
+                return Problem(ProblemCode.VERSION, f"this is version {PROTOCOL} of the protocol", fatal=True)
+            if hello.role is not Role.SITE or refused:
+                text = refused or "only an operator's site comes here"
+                return Problem(ProblemCode.REFUSED, text, fatal=True)
+            busy = self._host.hello(hello.session or "", now=self._clock.now())
+        except ProtocolError as error:
+            return Problem(error.code, str(error), fatal=True)
+        except InvalidValueError as error:
+            return Problem(ProblemCode.OUT_OF_RANGE, str(error), fatal=True)
+        if busy:
+            return Problem(ProblemCode.FULL, busy, fatal=True)
+        if self._connection is not None:
+            self._connection.end(_POLICY, "the same site has connected again")
+        self._connection = connection
+        connection.send(self._attached())
+        self._met()
+        return None
+
+    def _hear(self, connection: _Connection, data: bytes) -> None:
+        if self._connection is not connection:
+            return
+        try:
+            message: Orders | Pong = decode(data, connection.encoding, allowed=Orders | Pong, largest=LARGEST)
+        except ProtocolError as error:
+            connection.problems += 1
+            connection.send(Problem(error.code, str(error), fatal=connection.problems >= _PROBLEMS))
+            if connection.problems >= _PROBLEMS:
+                connection.end(_POLICY, "too many messages that can't be taken")
+            return
+        self._heard()
+        self._host.receive(message, now=self._clock.now())
+
+    async def _write(self, connection: _Connection, send: Send) -> None:
+        kind = "bytes" if connection.encoding is Encoding.MSGPACK else "text"
+        with contextlib.suppress(OSError):
+            while True:
+                while connection.waiting:
+                    data = connection.waiting.popleft()
+                    await send({"type": "websocket.send", kind: data if kind == "bytes" else data.decode()})
+                if connection.close is not None:
+                    code, reason = connection.close
+                    await send({"type": "websocket.close", "code": code, "reason": reason[:100]})
+                    return
+                connection.wake.clear()
+                await connection.wake.wait()
+
+
+def _data(message: Any) -> bytes:
+    """The bytes of a frame; of none where it's a disconnect."""
+    data, text = message.get("bytes"), message.get("text")
+    return bytes(data) if data is not None else (text or "").encode()
