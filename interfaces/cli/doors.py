@@ -1,20 +1,32 @@
-"""What every command that listens shares: who may come in, and by which names."""
+"""What every command that listens shares: who may come in, by which names, and what ends it."""
 
 from __future__ import annotations
 
 import gc
 import ipaddress
+import signal
 import socket
 from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, TypeAlias
+
+import typer
 
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    import asyncio
+
     from interfaces.stream.access import Access
     from interfaces.stream.control import Role
+
+
+TokenFile: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
+]
+"""What lets other machines in: see `access_for`."""
 
 
 def version() -> str:
@@ -65,6 +77,15 @@ def names_of(host: str) -> list[str]:
     except OSError:
         found = set()
     return sorted({"127.0.0.1", "localhost", "::1", own, *found})
+
+
+def end_on_signal(ended: asyncio.Event) -> None:
+    """Let Ctrl-C and SIGTERM set an event of the running loop, and do nothing else."""
+    import asyncio
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
 
 
 def keep_quiet() -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import enum
 import json
 import math
-import signal
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from interfaces.cli.doors import end_on_signal
 
 if TYPE_CHECKING:
     from interfaces.link import Conditions, DelayProfile
@@ -142,9 +143,7 @@ async def _serve(proxy: Proxy, about: str) -> None:
     import asyncio
 
     ended = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
+    end_on_signal(ended)
     try:
         await proxy.start()
         typer.echo(f"vrs: link listens on {proxy.listening} ({about})", err=True)

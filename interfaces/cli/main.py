@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from importlib import metadata
 from typing import Annotated
 
 import typer
 
 from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
+from interfaces.cli.doors import version
 from interfaces.cli.link import link
 from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
@@ -37,7 +37,7 @@ app.command()(serve)
 
 def _version(value: bool) -> None:
     if value:
-        typer.echo(f"vrs-teleop {metadata.version('vrs-teleop')}")
+        typer.echo(version())
         raise typer.Exit
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import access_for, keep_quiet, names_of, version
-from vrs.checks import number_in
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, keep_quiet, names_of, version
+from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -62,10 +60,7 @@ def robot(
     ] = "puma560",
     friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
     pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = "nominal",
-    token_file: Annotated[
-        Path | None,
-        typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
-    ] = None,
+    token_file: TokenFile = None,
     until_eof: Annotated[
         bool, typer.Option("--until-eof", help="End when standard input does, once the robot rests.")
     ] = False,
@@ -79,23 +74,18 @@ def robot(
     from interfaces.stream.control import Role
     from interfaces.teleop import RobotHostConfig, RobotSiteConfig
     from robots import puma560
-    from robots.onboard import WatchdogConfig
+    from robots.onboard import LossPolicy, WatchdogConfig
 
     address = parse_address("--listen", listen)
     model = puma560.model()
-    if pose not in model.poses:
-        raise InvalidValueError("pose", pose, f"one of {', '.join(sorted(model.poses))}")
-    if body not in set(BodyKind):
-        raise InvalidValueError("body", body, f"one of {', '.join(BodyKind)}")
-    if link_loss not in {"halt", "hold"}:
-        raise InvalidValueError("link-loss", link_loss, "halt or hold")
+    q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], BodyKind(one_of("body", body, BodyKind))
+    policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("lead", lead, 0.01, 0.3, unit=" s")
     watchdog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
-    halts = link_loss == "halt"
-    site = RobotSiteConfig(fixed_offset=_offset(offset), beat=BEAT, watchdog=watchdog if halts else None)
-    config = LiveRobotConfig(
-        model, model.poses[pose], RobotHostConfig(site=site, lead=lead), BodyKind(body), friction, version()
+    site = RobotSiteConfig(
+        fixed_offset=_offset(offset), beat=BEAT, watchdog=watchdog if policy is LossPolicy.HALT else None
     )
+    config = LiveRobotConfig(model, q, RobotHostConfig(site=site, lead=lead), kind, friction, version())
     access = access_for(address.host, token_file, free={Role.SITE})
 
     async def main() -> str:
@@ -119,8 +109,6 @@ def _offset(text: str) -> float | None:
 
 async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
-    import asyncio
-
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
@@ -128,9 +116,7 @@ async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> 
     from interfaces.stream.access import hosts
     from interfaces.stream.server import application
 
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, robot.ended.set)
+    end_on_signal(robot.ended)
     listening = sockets.bind(host, port)
     port = listening.getsockname()[1]
     app = application(robot.routes, hosts(names_of(host), port))

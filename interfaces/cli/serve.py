@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import access_for, keep_quiet, names_of, version
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, keep_quiet, names_of, version
+from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -69,10 +69,7 @@ def serve(
     robot_token_file: Annotated[
         Path | None, typer.Option("--robot-token-file", metavar="FILE", help="Token file of that robot.")
     ] = None,
-    token_file: Annotated[
-        Path | None,
-        typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
-    ] = None,
+    token_file: TokenFile = None,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
     import uvloop
@@ -82,18 +79,18 @@ def serve(
     from interfaces.runtime.offset import QUANTILE, fixed_offset, spelled
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
+    from robots.onboard import LossPolicy
 
     if robot != "puma560":
         raise InvalidValueError("robot", robot, "puma560")
-    if link_loss not in {"halt", "hold"}:
-        raise InvalidValueError("link-loss", link_loss, "halt or hold")
+    policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     profile = delay_profile(delay)
     way = Conditions(delay=profile, loss=loss_model(loss), service=service)  # type: ignore[arg-type]
-    options = ["--offset", spelled(fixed_offset(offset, profile)), "--link-loss", link_loss, "--body", body]
+    options = ["--offset", spelled(fixed_offset(offset, profile)), "--link-loss", policy, "--body", body]
     options += ["--max-age", f"{max_age:g}"]
     # Half a round trip isn't known of the clocks, and counts as age.
     usual = 2.0 * profile.quantile(QUANTILE)
-    if link_loss == "halt" and usual > max_age:
+    if policy is LossPolicy.HALT and usual > max_age:
         typer.echo(
             f"vrs: messages will often be {usual:.2g} s old, with what isn't known of the clocks, and those older "
             f"than {max_age:g} s don't count: try --link-loss hold, or --max-age up to 2",
@@ -138,9 +135,7 @@ async def _serve(
     from robots import puma560
 
     ended = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
+    end_on_signal(ended)
     model = puma560.model()
     listening = sockets.bind(host, port)
     port = listening.getsockname()[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from interfaces.lab.claims import Paper
 from interfaces.lab.doulgeri import PAPER as DOULGERI
-from vrs.errors import InvalidValueError
+from vrs.checks import one_of
 
 PAPERS: dict[str, Paper] = {paper.name: paper for paper in (DOULGERI,)}
 """By the name that the command line uses."""
@@ -21,6 +21,4 @@ def papers(name: str) -> tuple[Paper, ...]:
     """
     if name == ALL:
         return tuple(PAPERS.values())
-    if name not in PAPERS:
-        raise InvalidValueError("paper", name, f"one of {', '.join((*PAPERS, ALL))}")
-    return (PAPERS[name],)
+    return (PAPERS[one_of("paper", name, (*PAPERS, ALL))],)

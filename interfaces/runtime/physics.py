@@ -6,7 +6,6 @@ import math
 import os
 import socket
 import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Self, TypeAlias
 
 import numpy as np
 
+from interfaces.runtime.children import module_process
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     ROWS_MOST,
@@ -41,8 +41,6 @@ from vrs.model import Array, Limits
 
 TICK = 0.001
 """Length of a tick [s]."""
-LEAD = 0.02
-"""How far ahead of the wall clock decisions are made [s], so that their rows are there in time."""
 HORIZON = 0.5
 """How far ahead of a decision its rows reach [s], if the arm doesn't rest before."""
 SILENCE = 0.2
@@ -138,7 +136,7 @@ class PhysicsProcess:
         for end in (ours, theirs):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
         self._socket = ours
-        command = [sys.executable, "-P", "-m", "interfaces.runtime.physics_process", str(theirs.fileno())]
+        command, environment = module_process("interfaces.runtime.physics_process", str(theirs.fileno()))
         try:
             self._process = subprocess.Popen(
                 command,
@@ -146,7 +144,7 @@ class PhysicsProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 start_new_session=True,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+                env=environment,
             )
         except OSError as problem:
             ours.close()

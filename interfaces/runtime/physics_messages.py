@@ -7,7 +7,7 @@ its reference is to be at that time.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import msgspec
 import numpy as np
@@ -188,6 +188,8 @@ Order: TypeAlias = Setup | Rows | Attach | Release | Close
 News: TypeAlias = Ready | Measurement | Fault
 """From the process."""
 
+M = TypeVar("M")
+
 _ORDERS: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
 _NEWS: msgspec.msgpack.Decoder[News] = msgspec.msgpack.Decoder(News)
 _ENCODER = msgspec.msgpack.Encoder()
@@ -204,10 +206,7 @@ def decode_order(data: bytes) -> Order:
     Raises:
         FormatError: If it is none.
     """
-    try:
-        return _ORDERS.decode(data)
-    except (msgspec.DecodeError, UnicodeDecodeError) as problem:
-        raise FormatError("message to the physics", str(problem)) from None
+    return _decoded(_ORDERS, data, "message to the physics")
 
 
 def decode_news(data: bytes) -> News:
@@ -216,7 +215,11 @@ def decode_news(data: bytes) -> News:
     Raises:
         FormatError: If it is none.
     """
+    return _decoded(_NEWS, data, "message from the physics")
+
+
+def _decoded(decoder: msgspec.msgpack.Decoder[M], data: bytes, what: str) -> M:
     try:
-        return _NEWS.decode(data)
+        return decoder.decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError) as problem:
-        raise FormatError("message from the physics", str(problem)) from None
+        raise FormatError(what, str(problem)) from None

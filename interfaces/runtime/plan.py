@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias
 import msgspec
 import numpy as np
 
+from vrs.checks import one_of
 from vrs.commands import Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Profile, Target
 from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
 from vrs.model import Array, RobotModel
@@ -252,9 +253,7 @@ def _target(move: _Move, model: RobotModel) -> Target:
     if move.pose is not None:
         if move.xyz is not None or move.zyz_deg is not None or move.configuration is not None:
             raise InvalidValueError("move", "pose beside other fields", "pose alone, or xyz with zyz_deg")
-        if move.pose not in model.poses:
-            raise InvalidValueError("pose", move.pose, f"one of {', '.join(sorted(model.poses))}")
-        return JointTarget(model.poses[move.pose])
+        return JointTarget(model.poses[one_of("pose", move.pose, sorted(model.poses))])
     X = _pose(move.xyz, move.zyz_deg)
     target_pose = PoseTarget(X, move.configuration)
     model.inverse_near(X, model.poses["nominal"], move.configuration)

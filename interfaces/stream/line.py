@@ -12,6 +12,7 @@ from interfaces.ports import earliest
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem
+from interfaces.stream.dialling import dial
 from interfaces.stream.errors import ProtocolError
 from vrs.clock import Clock
 from vrs.errors import VrsError
@@ -123,23 +124,13 @@ class Line:
             self._done.result(timeout=OPENING)
 
     async def _keep(self) -> None:
-        from websockets.asyncio.client import connect
         from websockets.exceptions import WebSocketException
-        from websockets.typing import Subprotocol
 
         pause = FIRST_PAUSE
         while not self._closing and self.core.phase is not Phase.CLOSED:
             try:
-                async with connect(
-                    self.url,
-                    subprotocols=[Subprotocol(self.core.encoding)],
-                    compression=None,
-                    max_size=FROM_SERVER,
-                    open_timeout=OPENING,
-                    ping_interval=None,
-                    close_timeout=1.0,
-                    proxy=None,
-                ) as socket:
+                line = dial(self.url, self.core.encoding, largest=FROM_SERVER, opening=OPENING, closing=1.0)
+                async with line as socket:
                     await self._converse(socket)
                 reason = "the connection ended"
                 pause = FIRST_PAUSE

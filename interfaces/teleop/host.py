@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from interfaces.link.clock_sync import ClockSync, ClockSyncConfig
+from interfaces.link.clock_sync import ClockSync
 from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
 from interfaces.stream.control import Ping, Pong
 from interfaces.teleop.messages import Orders, Report
@@ -130,7 +130,7 @@ class RobotHost:
         if self.site is not None:
             self._q = self.reference(np.array([now])).q[0]
         self.session, self._next, self.site = self._next, "", None
-        self._sync = ClockSync(ClockSyncConfig())
+        self._sync = ClockSync()
         self._seed = (self._seed + 1) % 2**32
         self._trips = RoundTripEstimator(self._seed, self.config.probes, start=now)
         self._count, self._first = 0, math.inf

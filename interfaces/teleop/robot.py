@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -283,15 +284,19 @@ class RobotSite:
 
     def play_at(self, t: Array) -> PlayState:
         """Where play is at ascending times up to the next deadline, by the robot's clock [s], (k,)."""
-        if not len(t) or t[0] >= self._plays[-1][0]:
-            return self._play.at(t)
-        return play_of(((since, play.at) for since, play in reversed(self._plays)), t)
+        return self._played(t, self._play.at)
 
     def foreseen(self, t: Array) -> PlayState:
         """Where play is at ascending times by the robot's clock [s], (k,), if nobody looks at it before."""
-        known = int(np.searchsorted(t, self._plays[-1][0]))
-        later = self._play.foreseen(t[known:])
-        return PlayState(*map(np.concatenate, zip(self.play_at(t[:known]), later, strict=True))) if known else later
+        return self._played(t, self._play.foreseen)
+
+    def _played(self, t: Array, newest: Callable[[Array], PlayState]) -> PlayState:
+        """Where play is at ascending times by the robot's clock [s], (k,), the newest course by that function."""
+        since = self._plays[-1][0]
+        if not len(t) or t[0] >= since:
+            return newest(t)
+        earlier = ((began, play.at) for began, play in islice(reversed(self._plays), 1, None))
+        return play_of(chain([(since, newest)], earlier), t)
 
     def reference(self, play: PlayState) -> Reference:
         """What the body follows where play is, (k, n) each."""

@@ -124,7 +124,7 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path):
         (("serve", "--host", "0.0.0.0"), "--token-file"),
         (("robot", "--listen", "0.0.0.0:8601"), "--token-file"),
         (("serve", "--robot", "r2d2"), "puma560"),
-        (("serve", "--link-loss", "pray"), "halt or hold"),
+        (("serve", "--link-loss", "pray"), "halt, hold"),
         (("serve", "--robot-at", "no:port:here"), "robot-at"),
         (("serve", "--delay", "never"), "delay"),
         (("robot", "--body", "jelly"), "puma560"),

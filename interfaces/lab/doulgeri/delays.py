@@ -14,7 +14,7 @@ from interfaces.lab.statistics import Estimate, bootstrap
 from interfaces.messages import Broadcast, Form, FrameStatus, Outcome, Reply
 from interfaces.ports import RemotePort
 from vrs import MotionCommand
-from vrs.errors import InvalidValueError
+from vrs.checks import one_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -173,9 +173,8 @@ def work(study: Study, case: str) -> object:
     """Measure a setting, or all leads."""
     if case == "leads":
         return [leads(study.seed + 300 + k, study.length) for k in range(study.runs)]
-    if case not in SETTINGS:
-        raise InvalidValueError("case", case, f"one of {', '.join(CASES)}")
-    found = [run(SETTINGS[case], study.seed + k, study.length) for k in range(study.runs)]
+    setting = SETTINGS[one_of("case", case, CASES)]
+    found = [run(setting, study.seed + k, study.length) for k in range(study.runs)]
     return [seen for seen, _ in found], found[0][1]
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
-import sys
 from collections.abc import AsyncIterator, Sequence
 
+from interfaces.runtime.children import module_process
 from vrs.errors import VrsError
 
 READY = "vrs: robot listens on "
@@ -39,13 +38,13 @@ async def local_robot(options: Sequence[str]) -> AsyncIterator[str]:
     Raises:
         RobotStartError: If it isn't ready in time.
     """
-    command = [sys.executable, "-P", "-m", "interfaces.cli", "robot", "--listen", "127.0.0.1:0", "--until-eof"]
+    command, environment = module_process("interfaces.cli", "robot", "--listen", "127.0.0.1:0", "--until-eof")
     process = await asyncio.create_subprocess_exec(
         *command,
         *options,
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+        env=environment,
         start_new_session=True,
     )
     try:

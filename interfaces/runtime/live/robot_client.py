@@ -8,12 +8,12 @@ import secrets
 from collections import deque
 from collections.abc import Callable
 
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
-from websockets.typing import Subprotocol
 
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.stream.control import Attached, Hello, Ping, Pong, Problem, Role
+from interfaces.stream.dialling import dial
 from interfaces.stream.errors import ProtocolError
 from interfaces.teleop import Orders, Report, RobotLine
 from vrs.clock import Clock
@@ -84,15 +84,7 @@ class RobotClient:
             await asyncio.sleep(AGAIN)
 
     async def _once(self) -> None:
-        async with connect(
-            self.url,
-            subprotocols=[Subprotocol(Encoding.MSGPACK.value)],
-            compression=None,
-            open_timeout=OPENING,
-            close_timeout=0.5,
-            ping_interval=None,
-            max_size=LARGEST,
-        ) as socket:
+        async with dial(self.url, Encoding.MSGPACK, largest=LARGEST, opening=OPENING, closing=0.5) as socket:
             hello = Hello(Role.SITE, "vrs serve", self._token, self._session)
             await socket.send(encode(hello, Encoding.MSGPACK))
             async with asyncio.timeout(OPENING):

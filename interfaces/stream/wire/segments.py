@@ -12,7 +12,7 @@ from msgspec import Meta
 from interfaces.stream.wire.fields import MOST_JOINTS, CommandId, Finite, Seconds, Time
 from vrs.errors import InvalidValueError
 from vrs.model import Array
-from vrs.segment import PolynomialSegment
+from vrs.segment import PolynomialSegment, known_segment
 
 MOST_SEGMENTS = 256
 """Segments of a history's part or of an edit, at most."""
@@ -79,7 +79,7 @@ def segments_of(dof: int, start: float, wires: Iterable[SegmentWire[Any]]) -> tu
         start = start if wire.start is None else wire.start
         given = wire.coefficients
         a = _packed(given, dof) if isinstance(given, bytes) else _plain(given, dof)
-        found.append(_made(start, wire.duration, a, wire.command_id))
+        found.append(known_segment(start, wire.duration, a, wire.command_id))
         start += wire.duration
     if found and not np.isfinite(np.concatenate([segment.coefficients.ravel() for segment in found])).all():
         raise InvalidValueError("coefficients", "NaN or infinity", "finite")
@@ -99,14 +99,3 @@ def _plain(data: list[list[float]], dof: int) -> Array:
     a: Array = np.array(data)
     a.flags.writeable = False
     return a
-
-
-def _made(start: float, duration: float, coefficients: Array, command_id: int | None) -> PolynomialSegment:
-    """A segment whose fields have been checked: the checks of its class take six times as long."""
-    segment = object.__new__(PolynomialSegment)
-    put = object.__setattr__
-    put(segment, "start", start)
-    put(segment, "duration", duration)
-    put(segment, "coefficients", coefficients)
-    put(segment, "command_id", command_id)
-    return segment
