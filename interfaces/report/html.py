@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from functools import lru_cache
 from html import escape
 from importlib import resources
-from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -17,7 +15,7 @@ from interfaces.report.markup import card, figures, receipts, table, tiles, word
 from interfaces.report.plots import Plot, plots
 from interfaces.report.scene import scene
 from interfaces.runtime.run import TwinRun
-from vrs.errors import FormatError
+from interfaces.view_parts import viewer_bundle
 
 
 def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> None:
@@ -54,25 +52,6 @@ def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
         viewer=_script(viewer),
         script=_script(_asset("report.js")),
     )
-
-
-@lru_cache(maxsize=1)
-def viewer_bundle() -> tuple[str, str]:
-    """Find MeshCat's viewer and its licence texts without importing MeshCat.
-
-    Raises:
-        FormatError: If it isn't installed or has no bundle.
-    """
-    spec = find_spec("meshcat")
-    if spec is None or spec.origin is None:
-        raise FormatError("meshcat", "not installed; the report's 3D view is its viewer bundle")
-    root = Path(spec.origin).parent / "viewer"
-    bundle = root / "dist" / "main.min.js"
-    if not bundle.is_file():
-        raise FormatError(str(bundle), "missing; reinstall meshcat")
-    texts = [root / "LICENSE", root / "dist" / "main.min.js.LICENSE.txt"]
-    licences = "\n\n".join(text.read_text(encoding="utf-8").strip() for text in texts if text.is_file())
-    return bundle.read_text(encoding="utf-8"), licences
 
 
 def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:

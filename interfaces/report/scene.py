@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.runtime.run import TwinRun
+from interfaces.view_parts import link_shapes
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -74,15 +75,6 @@ def revolute_chain(model: RobotModel) -> tuple[Array, Array]:
         if not np.allclose(X, np.asarray(model.links(q))[i + 1], atol=1e-9):
             raise InvalidValueError("model", model.name, "a chain of revolute joints about their z axes")
     return rest[0], A
-
-
-def link_shapes(model: RobotModel) -> tuple[LinkShape, ...]:
-    """Shapes of the model's links; none for a robot that has no shapes, which then shows as its traces."""
-    if model.name == "puma560":
-        from robots.puma560.shapes import shapes
-
-        return shapes()
-    return ()
 
 
 def markers(run: TwinRun) -> list[Json]:

@@ -27,8 +27,6 @@ MOST_CONNECTIONS = 2048
 """Connections that are open at once, of any kind."""
 FIRST_REQUEST = 5.0
 """Time for the first request of a connection [s]."""
-ABORT = "vrs.abort"
-"""Extension of a WebSocket's scope that cuts it off, with all that waits to be sent."""
 _GRACE = 1.0
 """Time for handlers to end when a server stops [s]."""
 
@@ -62,7 +60,6 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         super().handle_connect(event)
         if self.response.status_code == 101:
             self.scope["state"]["socket"] = self
-            self.scope["extensions"] = {**(self.scope.get("extensions") or {}), ABORT: self.transport.abort}  # type: ignore[dict-item]
 
     async def put(self, data: bytes, opcode: Opcode) -> None:
         """Send a whole message as one frame; that takes a third of the time that `send` does.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,15 +21,6 @@ from vrs.model import Array
 from vrs.receipt import Receipt, Status
 
 EVIL = '</script><script>window.evil = 1</script><!-- <img src=x onerror="window.evil=2"> & \u2028'
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 
 
 def curve(t: Array) -> Array:
@@ -153,26 +142,6 @@ def test_a_run_of_an_hour_still_gives_a_small_file(tmp_path: Path) -> None:
     write_report(tmp_path / "long.html", run, {})
     assert (tmp_path / "long.html").stat().st_size < 8e6
     assert scene(run)["t_end"] <= 20.0
-
-
-def chromium() -> str:
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if found is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("no Chromium: install the program chromium")
-        pytest.skip("no Chromium: install the program chromium")
-    return found
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    program = chromium()
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        instance = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        yield instance
-        instance.close()
 
 
 @pytest.fixture

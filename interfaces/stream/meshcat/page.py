@@ -15,9 +15,8 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from interfaces.report.html import viewer_bundle
 from interfaces.stream.meshcat.scene import MeshcatScene
-from interfaces.stream.sockets import ABORT
+from interfaces.view_parts import viewer_bundle
 from vrs.errors import InvalidValueError
 
 BATCHES: Final = "vrs.meshcat.1"
@@ -168,9 +167,9 @@ class _Viewer:
 
     def drop(self) -> None:
         """Let it go, with all that waits to be sent; its socket too, where the server can do that."""
-        abort = self._websocket.scope.get("extensions", {}).get(ABORT)
-        if abort is not None:
-            abort()
+        socket = self._websocket.scope.get("state", {}).get("socket")
+        if socket is not None:
+            socket.abort()
         for task in self._tasks:
             task.cancel()
 

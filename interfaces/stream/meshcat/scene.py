@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.report.scene import link_shapes
 from interfaces.stream.meshcat.commands import delete, set_object, set_property, set_transform
 from interfaces.stream.meshcat.committed import Committed, Path, Piece
 from interfaces.stream.meshcat.meshes import shaded
 from interfaces.stream.meshcat.newest import Newest, Slot
+from interfaces.view_parts import link_shapes
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array

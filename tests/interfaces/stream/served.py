@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import threading
 
 from interfaces.site import Site
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.hub import Hub, HubConfig
+from interfaces.stream.server import HubServer, application
+from interfaces.stream.sockets import bind, serve
 from robots import puma560
 from robots.onboard import Lease, LeaseConfig
+from tests.interfaces.stream.serving import Serving, beside
 from vrs import Engine, ManualClock
 from vrs.clock import WallClock
 
@@ -57,44 +58,24 @@ def make_hub(*, now: float = 0.0, stops: bool = True, epoch: int = 0, **options)
     return hub
 
 
-@contextlib.contextmanager
-def served(**options):
-    """A hub behind a port of this machine; yields it with its address."""
-    from interfaces.stream.server import HubServer, application
-    from interfaces.stream.sockets import bind, serve
+class ServingHub(Serving):
+    """A hub behind a port of this machine."""
 
-    ready, box = threading.Event(), {}
+    def __init__(self, port: int, server: HubServer) -> None:
+        super().__init__(port)
+        self.server, self.hub = server, server.hub
 
-    async def run() -> None:
-        clock = WallClock(0.0)
-        hub = make_hub(now=clock.now(), **options)
-        server = HubServer(hub, clock)
-        listening = bind()
-        port = listening.getsockname()[1]
-        app = application(server.routes, hosts(["127.0.0.1", "localhost"], port))
-        stop = asyncio.Event()
-        async with serve(app, listening), server.running():
-            box.update(hub=hub, server=server, port=port, stop=stop, loop=asyncio.get_running_loop())
-            ready.set()
-            await stop.wait()
 
-    def main() -> None:
-        try:
-            asyncio.run(run())
-        except BaseException as error:
-            box["error"] = error
-            raise
-        finally:
-            ready.set()
+@contextlib.asynccontextmanager
+async def _serving(**options):
+    clock, listening = WallClock(0.0), bind()
+    server = HubServer(make_hub(now=clock.now(), **options), clock)
+    serving = ServingHub(listening.getsockname()[1], server)
+    app = application(server.routes, hosts(["127.0.0.1", "localhost"], serving.port))
+    async with serve(app, listening), server.running():
+        yield serving
 
-    thread = threading.Thread(target=main)
-    thread.start()
-    assert ready.wait(10)
-    if "error" in box:
-        raise box["error"]
-    try:
-        yield box
-    finally:
-        box["loop"].call_soon_threadsafe(box["stop"].set)
-        thread.join(10)
-        assert not thread.is_alive()
+
+def served(**options) -> contextlib.AbstractContextManager[ServingHub]:
+    """Serve a hub on loopback."""
+    return beside(_serving(**options))

@@ -1,39 +1,41 @@
-"""A server on loopback in a thread, for tests with real sockets and browsers."""
+"""Servers on loopback in a thread, for tests with real sockets and browsers."""
 
 from __future__ import annotations
 
 import asyncio
-import socket
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import (
+    AbstractAsyncContextManager,
+    AbstractContextManager,
+    asynccontextmanager,
+    contextmanager,
+    suppress,
+)
+from typing import Any, TypeVar
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.routing import BaseRoute
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from starlette.types import Receive, Scope, Send
+
+from interfaces.stream import sockets
 
 
-class Abortable(WebSocketsSansIOProtocol):
-    """Lets the application drop a connection at once, and knows few bytes that wait."""
+class Serving:
+    """A server in the loop of another thread; made in that loop."""
 
-    def connection_made(self, transport: Any) -> None:
-        super().connection_made(transport)
-        transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 16384)
-
-    def handle_connect(self, event: Any) -> None:
-        super().handle_connect(event)
-        if hasattr(self, "scope"):
-            self.scope["extensions"]["vrs.abort"] = self.transport.abort
-
-
-class Served:
-    """A server that runs."""
-
-    def __init__(self, server: uvicorn.Server, loop: asyncio.AbstractEventLoop, port: int) -> None:
-        self.server, self.loop, self.port = server, loop, port
+    def __init__(self, port: int) -> None:
+        self.port = port
         self.url = f"http://127.0.0.1:{port}"
+        self.loop = asyncio.get_running_loop()
+        self.stop = asyncio.Event()
+        self.connections: set[Any] = set()
+        """Those that are open, as uvicorn knows them, from the first WebSocket on."""
+
+    def end(self) -> None:
+        """Let it end soon, unless it has."""
+        with suppress(RuntimeError):
+            self.loop.call_soon_threadsafe(self.stop.set)
 
     def call(self, function: Callable[..., Any], *args: Any, **named: Any) -> Any:
         """Call in the server's thread, and wait for it."""
@@ -44,30 +46,46 @@ class Served:
         return asyncio.run_coroutine_threadsafe(called(), self.loop).result(10.0)
 
 
+S = TypeVar("S", bound=Serving)
+
+
 @contextmanager
-def served(routes: Sequence[BaseRoute], port: int = 0) -> Iterator[Served]:
+def beside(context: AbstractAsyncContextManager[S]) -> Iterator[S]:
+    """Hold a server's context open in a thread of its own."""
+    entered: Future[S] = Future()
+
+    async def hold() -> None:
+        async with context as server:
+            entered.set_result(server)
+            await server.stop.wait()
+
+    with ThreadPoolExecutor(1) as pool:
+        done = pool.submit(asyncio.run, hold())
+        wait([entered, done], 10.0, FIRST_COMPLETED)
+        if not entered.done():
+            done.result(0.0)
+        server = entered.result(0.0)
+        try:
+            yield server
+        finally:
+            server.end()
+            done.result(20.0)
+
+
+@asynccontextmanager
+async def _serving(routes: Sequence[BaseRoute], port: int) -> AsyncIterator[Serving]:
+    listening = sockets.bind(port=port)
+    inner, server = Starlette(routes=list(routes)), Serving(listening.getsockname()[1])
+
+    async def noting(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "websocket":
+            server.connections = scope["state"]["socket"].connections
+        await inner(scope, receive, send)
+
+    async with sockets.serve(noting, listening):
+        yield server
+
+
+def served(routes: Sequence[BaseRoute], port: int = 0) -> AbstractContextManager[Serving]:
     """Serve routes on loopback."""
-    listener = socket.create_server(("127.0.0.1", port))
-    config = uvicorn.Config(
-        Starlette(routes=list(routes)), ws=Abortable, lifespan="off", log_level="error",
-        timeout_graceful_shutdown=1, ws_max_size=65536, ws_per_message_deflate=False,
-    )  # fmt: skip
-    server = uvicorn.Server(config)
-    loop = asyncio.new_event_loop()
-
-    def run() -> None:
-        loop.run_until_complete(server.serve([listener]))
-        loop.run_until_complete(loop.shutdown_asyncgens())
-        loop.close()
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        while not server.started and thread.is_alive():
-            thread.join(0.01)
-        yield Served(server, loop, listener.getsockname()[1])
-    finally:
-        server.should_exit = True
-        thread.join(20.0)
-        listener.close()
-        assert loop.is_closed()
+    return beside(_serving(routes, port))

@@ -17,47 +17,47 @@ from tests.interfaces.stream.served import ADMIN, HOME, served
 @pytest.mark.parametrize("encoding", ["vrs.1.msgpack", "vrs.1.json"])
 def test_the_four_interfaces(encoding):
     threads = threading.active_count()
-    with served() as box:
-        with connect(f"127.0.0.1:{box['port']}", encoding=encoding, name="tester") as robot:
+    with served() as serving:
+        with connect(f"127.0.0.1:{serving.port}", encoding=encoding, name="tester") as robot:
             assert robot.welcome.robot == "puma560"
             assert robot.acquire().yours
             assert robot.lease.holder == "tester"
             issued = robot.designer.issue(to(1), execute_in=0.05, wait=5.0)
             assert issued.receipt.status == "accepted"
-            assert robot.supervisor.ask(1e3).frame.q.tolist() == box["hub"].site.engine.joints(1e3).tolist()
+            assert robot.supervisor.ask(1e3).frame.q.tolist() == serving.hub.site.engine.joints(1e3).tolist()
             assert robot.observer.ask(0.0).frame.q.tolist() == HOME.tolist()
             viewer = robot.viewer(rate=50)
             frames = robot.viewer(rate=60, form=Form.FRAMES)
             assert viewer.wait(lambda v: len(v.history) > 5)
             assert frames.wait(lambda v: len(v.history) > 5)
-            engine = box["hub"].site.engine
+            engine = serving.hub.site.engine
             for shown in (*viewer.history, *frames.history):
                 assert np.abs(shown.q - engine.joints(shown.t)).max() < 1e-9
             viewer.pause()
             viewer.seek(0.1)
             assert viewer.next().t == 0.1
-            assert abs(robot.now() - box["server"].clock.now()) < robot.clock.uncertainty + 0.05
+            assert abs(robot.now() - serving.server.clock.now()) < robot.clock.uncertainty + 0.05
             assert robot.designer.undo(wait=5.0).refusal == ""
             viewer.close()
             assert robot.release().state == "free"
         until = time.monotonic() + 5.0
-        while box["hub"].sessions and time.monotonic() < until:
+        while serving.hub.sessions and time.monotonic() < until:
             time.sleep(0.01)
-        assert box["hub"].sessions == ()
-        assert box["hub"].seats == 0
+        assert serving.hub.sessions == ()
+        assert serving.hub.seats == 0
     assert threading.active_count() == threads
 
 
 def test_leaving_gives_the_lease_back():
-    with served() as box:
-        with connect(f"http://localhost:{box['port']}") as robot:
+    with served() as serving:
+        with connect(f"http://localhost:{serving.port}") as robot:
             robot.acquire()
-        assert box["hub"].robot.log[-1] == ("ended", 1, "released")
+        assert serving.hub.robot.log[-1] == ("ended", 1, "released")
 
 
 def test_an_admin_takes_over():
-    with served() as box:
-        url = f"ws://127.0.0.1:{box['port']}/ws"
+    with served() as serving:
+        url = f"ws://127.0.0.1:{serving.port}/ws"
         with connect(url) as one, connect(url, role="admin", token=ADMIN) as admin:
             assert one.acquire().yours
             assert admin.acquire().code is ProblemCode.LEASE
@@ -69,12 +69,12 @@ def test_an_admin_takes_over():
 
 
 def test_a_connection_that_is_cut_is_taken_up_again_and_the_lease_stays():
-    with served() as box, connect(f"127.0.0.1:{box['port']}") as robot:
+    with served() as serving, connect(f"127.0.0.1:{serving.port}") as robot:
         robot.acquire()
         viewer = robot.viewer(rate=50)
         assert viewer.wait(lambda v: v.timeline is not None)
-        for client in list(box["server"]._clients.values()):
-            box["loop"].call_soon_threadsafe(client.socket.abort)
+        for client in list(serving.server._clients.values()):
+            serving.loop.call_soon_threadsafe(client.socket.abort)
         issued = [robot.designer.issue(to(k), execute_in=1.0 + k) for k in range(3)]
         found = [robot.designer.answered(one.number, 5.0) for one in issued]
         assert [one.receipt.command_id for one in found] == [1, 2, 3]
@@ -83,8 +83,8 @@ def test_a_connection_that_is_cut_is_taken_up_again_and_the_lease_stays():
 
 
 def test_who_cannot_be_reached_and_who_is_refused():
-    with served() as box:
-        url = f"127.0.0.1:{box['port']}"
+    with served() as serving:
+        url = f"127.0.0.1:{serving.port}"
         with pytest.raises(UnreachableError, match="token"):
             connect(url, role="admin")
         with pytest.raises(UnreachableError, match="token"):

@@ -12,7 +12,6 @@ import pytest
 
 import interfaces.stream
 from tests.interfaces.stream.make_vectors import PATH
-from tests.interfaces.test_report import FLAGS, chromium
 
 MODULE = Path(interfaces.stream.__file__).parent / "static" / "vrs.js"
 VECTORS: dict[str, Any] = json.loads(PATH.read_text(encoding="utf-8"))
@@ -33,20 +32,15 @@ SAMPLES = "(samples) => samples.map(({ t, derivative }) => reader.joints(t, deri
 
 
 @pytest.fixture(scope="module")
-def page() -> Iterator[Any]:
-    program = chromium()
-    from playwright.sync_api import sync_playwright
-
+def page(browser: Any) -> Iterator[Any]:
     seen: list[str] = []
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        opened = browser.new_page()
-        opened.on("pageerror", lambda error: seen.append(str(error)))
-        source = MODULE.read_text(encoding="utf-8")
-        opened.add_script_tag(content=f"{source}\nwindow.vrs = {{ {NAMES} }};", type="module")
-        opened.wait_for_function("window.vrs !== undefined")
-        yield opened
-        browser.close()
+    opened = browser.new_page()
+    opened.on("pageerror", lambda error: seen.append(str(error)))
+    source = MODULE.read_text(encoding="utf-8")
+    opened.add_script_tag(content=f"{source}\nwindow.vrs = {{ {NAMES} }};", type="module")
+    opened.wait_for_function("window.vrs !== undefined")
+    yield opened
+    opened.close()
     assert seen == []
 
 

@@ -25,8 +25,8 @@ from tests.interfaces.stream.test_session import COMING
 PROTOCOLS = [str(encoding) for encoding in Encoding]
 
 
-def url(box, host="127.0.0.1"):
-    return f"ws://{host}:{box['port']}/ws"
+def url(serving, host="127.0.0.1"):
+    return f"ws://{host}:{serving.port}/ws"
 
 
 def read(data):
@@ -48,8 +48,8 @@ async def ended(connection, data):
     await wait(connection, "nothing")
 
 
-async def greeted(box, *, encoding=Encoding.MSGPACK, role=Role.VIEWER):
-    connection = await connect(url(box), subprotocols=[str(encoding)], compression=None, proxy=None)
+async def greeted(serving, *, encoding=Encoding.MSGPACK, role=Role.VIEWER):
+    connection = await connect(url(serving), subprotocols=[str(encoding)], compression=None, proxy=None)
     hello = encode(control.Hello(role, "peer"), encoding)
     await connection.send(hello.decode() if encoding is Encoding.JSON else hello)
     await wait(connection, "welcome")
@@ -57,41 +57,41 @@ async def greeted(box, *, encoding=Encoding.MSGPACK, role=Role.VIEWER):
 
 
 def test_both_encodings_health_and_frames():
-    async def talk(box):
+    async def talk(serving):
         for encoding in Encoding:
-            connection = await greeted(box, encoding=encoding)
+            connection = await greeted(serving, encoding=encoding)
             follow = encode(Follow(1, Form.FRAMES, 60.0), encoding)
             await connection.send(follow.decode() if encoding is Encoding.JSON else follow)
             first = await wait(connection, "broadcast")
             assert (await wait(connection, "broadcast")).frame.number > first.frame.number
             await connection.close()
 
-    with served() as box:
-        asyncio.run(talk(box))
-        with urllib.request.urlopen(f"http://localhost:{box['port']}/health", timeout=5) as answer:
+    with served() as serving:
+        asyncio.run(talk(serving))
+        with urllib.request.urlopen(f"http://localhost:{serving.port}/health", timeout=5) as answer:
             health = json.load(answer)
         assert (health["ok"], health["robot"], health["lease"]) == (True, "puma560", "free")
 
 
 def test_other_hosts_other_pages_and_other_protocols_are_refused():
-    async def refused(box, **options):
+    async def refused(serving, **options):
         with pytest.raises(InvalidStatus) as caught:
-            await connect(url(box), compression=None, proxy=None, **options)
+            await connect(url(serving), compression=None, proxy=None, **options)
         return caught.value.response.status_code
 
-    async def talk(box):
-        assert await refused(box, subprotocols=PROTOCOLS, origin="http://evil.example") == 403
-        assert await refused(box, subprotocols=PROTOCOLS, origin=f"http://localhost:{box['port'] + 1}") == 403
-        assert await refused(box, subprotocols=["other"]) == 403
-        assert await refused(box) == 403
-        own = f"http://localhost:{box['port']}"
-        async with connect(url(box), subprotocols=PROTOCOLS, origin=own, proxy=None) as connection:
+    async def talk(serving):
+        assert await refused(serving, subprotocols=PROTOCOLS, origin="http://evil.example") == 403
+        assert await refused(serving, subprotocols=PROTOCOLS, origin=f"http://localhost:{serving.port + 1}") == 403
+        assert await refused(serving, subprotocols=["other"]) == 403
+        assert await refused(serving) == 403
+        own = f"http://localhost:{serving.port}"
+        async with connect(url(serving), subprotocols=PROTOCOLS, origin=own, proxy=None) as connection:
             assert connection.subprotocol in PROTOCOLS
 
-    with served() as box:
-        asyncio.run(talk(box))
+    with served() as serving:
+        asyncio.run(talk(serving))
         for header, value in (("Host", "evil.example"), ("Origin", "http://evil.example")):
-            request = urllib.request.Request(f"http://127.0.0.1:{box['port']}/health", headers={header: value})
+            request = urllib.request.Request(f"http://127.0.0.1:{serving.port}/health", headers={header: value})
             with pytest.raises(urllib.error.HTTPError) as caught:
                 urllib.request.urlopen(request, timeout=5)
             assert caught.value.code == 403
@@ -99,8 +99,8 @@ def test_other_hosts_other_pages_and_other_protocols_are_refused():
 
 
 def test_too_large_a_message_closes_the_connection_before_it_is_read():
-    async def talk(box):
-        connection, other = await greeted(box), await greeted(box)
+    async def talk(serving):
+        connection, other = await greeted(serving), await greeted(serving)
         with pytest.raises(ConnectionClosed) as caught:
             await ended(connection, b"\xc1" * 65537)
         assert caught.value.rcvd.code == 1009
@@ -108,14 +108,14 @@ def test_too_large_a_message_closes_the_connection_before_it_is_read():
         assert (await wait(other, "pong")).number == 1
         await other.close()
 
-    with served() as box:
-        asyncio.run(talk(box))
+    with served() as serving:
+        asyncio.run(talk(serving))
 
 
-def handshake(box, encoding):
+def handshake(serving, encoding):
     key = base64.b64encode(os.urandom(16)).decode()
     return (
-        f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{box['port']}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{serving.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
         f"Sec-WebSocket-Protocol: {encoding}\r\n\r\n"
     ).encode()
@@ -128,12 +128,12 @@ def frame(message, encoding):
     return (b"\x81" if encoding is Encoding.JSON else b"\x82") + size + bytes(4) + data
 
 
-def stuck(box):
+def stuck(serving):
     """A client that follows at 1000 Hz and reads nothing, with a small buffer."""
     connection = socket.socket()
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-    connection.connect(("127.0.0.1", box["port"]))
-    connection.sendall(handshake(box, Encoding.JSON))
+    connection.connect(("127.0.0.1", serving.port))
+    connection.sendall(handshake(serving, Encoding.JSON))
     while b"\r\n\r\n" not in connection.recv(4096, socket.MSG_PEEK):
         time.sleep(0.01)
     for message in (control.Hello(Role.VIEWER, "stuck"), Follow(1, Form.FRAMES, 1000.0)):
@@ -142,29 +142,29 @@ def stuck(box):
 
 
 def test_who_reads_nothing_is_cut_off_and_the_others_get_their_frames():
-    async def talk(box):
-        connection = await greeted(box)
+    async def talk(serving):
+        connection = await greeted(serving)
         await connection.send(encode(Follow(1, Form.FRAMES, 60.0), Encoding.MSGPACK))
         first = (await wait(connection, "broadcast")).frame.number
         frames, until = 0, time.monotonic() + 20.0
-        while not box["server"].cut_off and time.monotonic() < until:
+        while not serving.server.cut_off and time.monotonic() < until:
             last = (await wait(connection, "broadcast")).frame.number
             frames += 1
         await connection.close()
         return frames / (last - first)
 
-    with served(rates=(1000.0, 60.0)) as box:
-        lazy = stuck(box)
-        share = asyncio.run(talk(box))
-        assert box["server"].cut_off == 1
+    with served(rates=(1000.0, 60.0)) as serving:
+        lazy = stuck(serving)
+        share = asyncio.run(talk(serving))
+        assert serving.server.cut_off == 1
         assert share > 0.9
         lazy.close()
 
 
 def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
-    async def one(box, k):
-        reader, writer = await asyncio.open_connection("127.0.0.1", box["port"])
-        writer.write(handshake(box, Encoding.MSGPACK))
+    async def one(serving, k):
+        reader, writer = await asyncio.open_connection("127.0.0.1", serving.port)
+        writer.write(handshake(serving, Encoding.MSGPACK))
         await reader.readuntil(b"\r\n\r\n")
         writer.write(frame(control.Hello(Role.VIEWER, "peer"), Encoding.MSGPACK))
         writer.write(frame(Follow(1, Form.FRAMES, 60.0), Encoding.MSGPACK))
@@ -175,26 +175,26 @@ def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
         writer.transport.abort()
         await asyncio.sleep(0)
 
-    async def churn(box, count):
+    async def churn(serving, count):
         for k in range(0, count, 20):
-            await asyncio.gather(*(one(box, k + i) for i in range(20)))
+            await asyncio.gather(*(one(serving, k + i) for i in range(20)))
 
-    def left(box):
+    def left(serving):
         until = time.monotonic() + 10.0
         while time.monotonic() < until:
-            tasks = len(asyncio.all_tasks(box["loop"]))
-            if (box["hub"].sessions, box["hub"].seats) == ((), 0):
+            tasks = len(asyncio.all_tasks(serving.loop))
+            if (serving.hub.sessions, serving.hub.seats) == ((), 0):
                 break
             time.sleep(0.05)
-        assert (box["hub"].sessions, box["hub"].seats) == ((), 0)
+        assert (serving.hub.sessions, serving.hub.seats) == ((), 0)
         time.sleep(0.2)
         return len(os.listdir("/proc/self/fd")), tasks
 
-    with served() as box:
-        asyncio.run(churn(box, 40))
-        before = left(box)
-        asyncio.run(churn(box, 1000))
-        after = left(box)
+    with served() as serving:
+        asyncio.run(churn(serving, 40))
+        before = left(serving)
+        asyncio.run(churn(serving, 1000))
+        after = left(serving)
         assert after[0] <= before[0] + 1
         assert after[1] <= before[1] + 2
 
@@ -203,7 +203,7 @@ def test_an_idle_connection_is_cut_off(monkeypatch):
     from interfaces.stream import sockets
 
     monkeypatch.setattr(sockets, "FIRST_REQUEST", 0.2)
-    with served() as box, socket.create_connection(("127.0.0.1", box["port"]), timeout=5) as connection:
+    with served() as serving, socket.create_connection(("127.0.0.1", serving.port), timeout=5) as connection:
         assert connection.recv(1) == b""
 
 
@@ -217,8 +217,8 @@ def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
             raise VrsError("planted")
         receive(self, data, now=now)
 
-    async def talk(box):
-        connection, other = await greeted(box), await greeted(box)
+    async def talk(serving):
+        connection, other = await greeted(serving), await greeted(serving)
         with pytest.raises(ConnectionClosed):
             await ended(connection, b"\xc1")
         await other.send(encode(control.Ping(1, 0.0), Encoding.MSGPACK))
@@ -226,21 +226,21 @@ def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
         await other.close()
 
     monkeypatch.setattr(Session, "receive", faulty)
-    with served() as box:
-        asyncio.run(talk(box))
+    with served() as serving:
+        asyncio.run(talk(serving))
     assert "planted" in caplog.text
 
 
 def test_the_end_is_told_and_leaves_nothing_open():
-    async def talk(box):
-        connection = await greeted(box)
-        box["loop"].call_soon_threadsafe(box["stop"].set)
+    async def talk(serving):
+        connection = await greeted(serving)
+        serving.end()
         with pytest.raises(ConnectionClosed) as caught:
             await wait(connection, "nothing")
         return caught.value.rcvd.code
 
-    with served() as box:
-        port = box["port"]
-        assert asyncio.run(talk(box)) == 1012
+    with served() as serving:
+        port = serving.port
+        assert asyncio.run(talk(serving)) == 1012
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.1", port), timeout=2)

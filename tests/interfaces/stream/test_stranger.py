@@ -111,8 +111,8 @@ class Stranger:
 @pytest.fixture
 def stranger() -> Any:
     with (
-        served() as box,
-        connect(f"ws://127.0.0.1:{box['port']}/ws", subprotocols=["vrs.1.msgpack"]) as socket,
+        served() as serving,
+        connect(f"ws://127.0.0.1:{serving.port}/ws", subprotocols=["vrs.1.msgpack"]) as socket,
     ):
         yield Stranger(socket)
 

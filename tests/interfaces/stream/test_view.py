@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -19,22 +17,13 @@ from websockets.sync.client import connect
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.page import BATCHES, PATIENCE, UNAUTHORISED, routes
 from robots import puma560
-from tests.interfaces.stream.serving import Served, served
+from tests.interfaces.stream.serving import Serving, served
 from tests.interfaces.stream.test_meshcat import Shapeless
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Timeline
 from vrs.model import Array
 
 MODEL = puma560.model()
 NOMINAL = MODEL.poses["nominal"]
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 
 
 def plan() -> Timeline:
@@ -51,14 +40,14 @@ def made() -> MeshcatScene:
 
 
 @pytest.fixture
-def server(made: MeshcatScene) -> Iterator[Served]:
+def server(made: MeshcatScene) -> Iterator[Serving]:
     with served(routes(made)) as running:
         show(running, made, NOMINAL, NOMINAL)
         yield running
     assert made.viewers == 0
 
 
-def show(server: Served, scene: MeshcatScene, virtual: Array, real: Array | None, **named: Any) -> None:
+def show(server: Serving, scene: MeshcatScene, virtual: Array, real: Array | None, **named: Any) -> None:
     """Show both robots, and the path without its usual pauses."""
     scene._due = -np.inf
     links = None if real is None else MODEL.links(real)
@@ -78,7 +67,7 @@ def until(holds: Callable[[], bool], patience: float = 15.0) -> None:
 
 
 @contextmanager
-def viewer(server: Served, **named: Any) -> Iterator[Any]:
+def viewer(server: Serving, **named: Any) -> Iterator[Any]:
     url = f"ws://127.0.0.1:{server.port}/meshcat"
     with connect(url, max_size=2**24, open_timeout=10, close_timeout=1, **named) as websocket:
         yield websocket
@@ -94,28 +83,13 @@ def first_scene(websocket: Any) -> list[dict[str, Any]]:
         return commands
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if program is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("no Chromium: install the program chromium")
-        pytest.skip("no Chromium: install the program chromium")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        instance = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        yield instance
-        instance.close()
-
-
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Any]:
     """Opens the page; at the end no error may have been seen that wasn't expected, nor a request to elsewhere."""
     seen: list[str] = []
     contexts = []
 
-    def start(server: Served, width: int = 480, scheme: str = "light", live: bool = True) -> Any:
+    def start(server: Serving, width: int = 480, scheme: str = "light", live: bool = True) -> Any:
         context = browser.new_context(viewport={"width": width, "height": 420}, color_scheme=scheme)
         contexts.append(context)
         page = context.new_page()
@@ -167,7 +141,7 @@ def shares(page: Any) -> dict[str, float]:
 
 
 def test_the_page_shows_both_robots_where_they_are_and_the_path(
-    server: Served, made: MeshcatScene, open_page: Any
+    server: Serving, made: MeshcatScene, open_page: Any
 ) -> None:
     page = open_page(server)
     timeline = plan()
@@ -195,7 +169,7 @@ def test_the_page_shows_both_robots_where_they_are_and_the_path(
     assert shares(page)["real"] > 0.01
 
 
-def test_one_who_comes_late_sees_the_same(server: Served, made: MeshcatScene, open_page: Any) -> None:
+def test_one_who_comes_late_sees_the_same(server: Serving, made: MeshcatScene, open_page: Any) -> None:
     early = open_page(server)
     timeline = plan()
     for t in np.linspace(0.0, 1.3, 40):
@@ -214,7 +188,7 @@ def test_one_who_comes_late_sees_the_same(server: Served, made: MeshcatScene, op
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1100, "dark"), (390, "light")])
-def test_the_page_fits_its_window(server: Served, open_page: Any, width: int, scheme: str) -> None:
+def test_the_page_fits_its_window(server: Serving, open_page: Any, width: int, scheme: str) -> None:
     page = open_page(server, width, scheme)
     assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
         width,
@@ -277,7 +251,7 @@ def test_a_token_is_asked_for_where_one_is_needed(made: MeshcatScene, open_page:
                 assert websocket.close_code == UNAUTHORISED
 
 
-def test_meshcats_own_page_may_connect_too(server: Served, made: MeshcatScene) -> None:
+def test_meshcats_own_page_may_connect_too(server: Serving, made: MeshcatScene) -> None:
     with viewer(server) as websocket:
         commands = first_scene(websocket)
         assert {command["type"] for command in commands} >= {"delete", "set_object", "set_transform"}
@@ -286,7 +260,7 @@ def test_meshcats_own_page_may_connect_too(server: Served, made: MeshcatScene) -
         assert paths == {f"/vrs/virtual/body/{i}" for i in range(1, 7)}
 
 
-def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Served, made: MeshcatScene) -> None:
+def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Serving, made: MeshcatScene) -> None:
     stalled = socket.socket()
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     stalled.connect(("127.0.0.1", server.port))
@@ -310,7 +284,7 @@ def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Served, mad
             time.sleep(0.02)
         assert np.median(delays) < 0.05
         # Cut off with all that waited for it, not only forgotten.
-        until(lambda: server.call(lambda: len(server.server.server_state.connections)) == 1)
+        until(lambda: server.call(lambda: len(server.connections)) == 1)
         stalled.settimeout(5.0)
         left = 0
         with suppress(ConnectionResetError):
@@ -319,7 +293,7 @@ def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Served, mad
         assert left < 256_000
 
 
-def test_pages_of_others_are_turned_away(server: Served) -> None:
+def test_pages_of_others_are_turned_away(server: Serving) -> None:
     for origin in ("http://evil.example", f"http://127.0.0.1:{server.port + 1}", "null"):
         with pytest.raises(InvalidStatus), viewer(server, origin=origin):
             pass
@@ -335,7 +309,7 @@ def flood(websocket: Any) -> None:
         websocket.recv(timeout=5.0)
 
 
-def test_one_who_says_too_much_is_closed_and_beats_are_answered(server: Served) -> None:
+def test_one_who_says_too_much_is_closed_and_beats_are_answered(server: Serving) -> None:
     with viewer(server) as websocket:
         first_scene(websocket)
         websocket.send("beat")
@@ -345,7 +319,7 @@ def test_one_who_says_too_much_is_closed_and_beats_are_answered(server: Served) 
         assert websocket.close_code == 1008
 
 
-def test_many_come_and_go_and_nothing_stays(server: Served, made: MeshcatScene) -> None:
+def test_many_come_and_go_and_nothing_stays(server: Serving, made: MeshcatScene) -> None:
     import asyncio
 
     def tasks() -> int:
@@ -360,7 +334,7 @@ def test_many_come_and_go_and_nothing_stays(server: Served, made: MeshcatScene) 
     until(lambda: bool(server.call(tasks) <= before))
 
 
-def test_files_are_served_with_care(server: Served) -> None:
+def test_files_are_served_with_care(server: Serving) -> None:
     import urllib.error
     import urllib.request
 
