@@ -2,10 +2,51 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
-from vrs.commands import finite
+import numpy as np
+from numpy.typing import ArrayLike
+
 from vrs.errors import InvalidValueError
+from vrs.model import Array, frozen_array
+
+
+def finite(name: str, value: object, allowed: str = "a finite number") -> float:
+    """Return value as a float.
+
+    Raises:
+        InvalidValueError: If value is not a real number, or NaN or infinite.
+    """
+    if type(value) is float and math.isfinite(value):
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise InvalidValueError(name, value, allowed)
+    try:
+        number = float(value)
+    except OverflowError:
+        raise InvalidValueError(name, value, allowed) from None
+    if not math.isfinite(number):
+        raise InvalidValueError(name, value, allowed)
+    return number
+
+
+def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...] | None, allowed: str) -> Array:
+    """Copy value into a read-only array of finite numbers of the given shape.
+
+    Raises:
+        InvalidValueError: If it holds anything else.
+    """
+    try:
+        raw = np.asarray(value)
+    except ValueError:
+        raise InvalidValueError(name, value, allowed) from None
+    if raw.dtype.kind not in "iuf" or (shape is not None and raw.shape != shape):
+        raise InvalidValueError(name, value, allowed)
+    array = frozen_array(raw)
+    if not np.isfinite(array).all():
+        raise InvalidValueError(name, value, allowed)
+    return array
 
 
 def number_in(name: str, value: object, low: float, high: float, what: str = "a number", unit: str = "") -> float:

@@ -6,15 +6,22 @@ Stamps are seconds on the timeline of the engine that receives the command.
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass
+from math import inf
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError
-from vrs.model import Array, frozen_array
+from vrs.model import Array
+
+__all__ = [
+    "Cancel", "Command", "DriveCommand", "Frame", "InsertVia", "Insertion", "JointTarget", "Lateness", "Motion",
+    "MotionCommand", "ParameterChange", "PlanEdit", "PoseTarget", "Position", "PositionQuery", "Profile", "Resume",
+    "Retime", "ScaleTime", "SteerCommand", "Stop", "Target", "finite", "finite_array",
+]  # fmt: skip
 
 
 class Motion(enum.StrEnum):
@@ -65,43 +72,6 @@ class Frame(enum.StrEnum):
 _Kind = TypeVar("_Kind", bound=enum.StrEnum)
 
 
-def finite(name: str, value: object, allowed: str = "a finite number") -> float:
-    """Return value as a float.
-
-    Raises:
-        InvalidValueError: If value is not a real number, or NaN or infinite.
-    """
-    if type(value) is float and math.isfinite(value):
-        return value
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InvalidValueError(name, value, allowed)
-    try:
-        number = float(value)
-    except OverflowError:
-        raise InvalidValueError(name, value, allowed) from None
-    if not math.isfinite(number):
-        raise InvalidValueError(name, value, allowed)
-    return number
-
-
-def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...] | None, allowed: str) -> Array:
-    """Copy value into a read-only array of finite numbers of the given shape.
-
-    Raises:
-        InvalidValueError: If it holds anything else.
-    """
-    try:
-        raw = np.asarray(value)
-    except ValueError:
-        raise InvalidValueError(name, value, allowed) from None
-    if raw.dtype.kind not in "iuf" or (shape is not None and raw.shape != shape):
-        raise InvalidValueError(name, value, allowed)
-    array = frozen_array(raw)
-    if not np.isfinite(array).all():
-        raise InvalidValueError(name, value, allowed)
-    return array
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTarget:
     """A target in joint space."""
@@ -132,12 +102,7 @@ class PoseTarget:
     """Asked-for arm configuration, as `LEFTY BELOW FLIP` or a part of it; None keeps the arm's own."""
 
     def __init__(self, X: ArrayLike, configuration: str | None = None) -> None:
-        allowed = "a homogeneous transform of shape (4, 4) with a rotation matrix orthonormal to 1e-6"
-        array = finite_array("target X", X, (4, 4), allowed)
-        R = array[:3, :3]
-        proper = np.abs(R @ R.T - np.eye(3)).max() <= 1e-6 and np.linalg.det(R) > 0
-        if not proper or not np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
-            raise InvalidValueError("target X", X, allowed)
+        array = _transform("target X", X)
         if configuration is not None and not isinstance(configuration, str):
             raise InvalidValueError("configuration", configuration, "None or the words of a configuration")
         object.__setattr__(self, "X", array)
@@ -155,7 +120,7 @@ class PoseTarget:
 Target: TypeAlias = JointTarget | PoseTarget
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MotionCommand:
     """Move to a target: (p, t, v) of eq. (1), Doulgeri, Zikos, Delopoulos."""
 
@@ -174,19 +139,42 @@ class MotionCommand:
     profile: Profile = Profile.PARABOLIC
     insertion: Insertion = Insertion.SPLICE
     deviation: float = 0.0
-    """How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops."""
+    """How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops.
+
+    Infinity is a continuous path: the move begins where the one before it begins to brake, or so late that it's at
+    its speed when that one ends. Such moves take half of the acceleration, so that any two can overlap.
+    """
+    pace: float = 1.0
+    """Planned as at 1, a move takes 1/pace times as long on the same path, roundings included; in [0.001, 1]."""
+    acceleration: float = 1.0
+    """Share of the limits of acceleration and jerk that the move takes, in [0.01, 1]."""
+    tool: Array | None = None
+    """What goes straight and keeps the deviation: a frame in the last link's, (4, 4). Targets stay that link's."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.target, (JointTarget, PoseTarget)):
             raise InvalidValueError("target", self.target, "a JointTarget or a PoseTarget")
         _check_stamps(self)
-        speed = finite("speed", self.speed, "a number in (0, 1]")
-        if not 1e-3 <= speed <= 1:
-            raise InvalidValueError("speed", self.speed, "a number in (0, 1], at least 0.001 so that it arrives")
-        object.__setattr__(self, "speed", speed)
-        object.__setattr__(self, "deviation", _deviation(self.deviation))
+        for name, least in (("speed", 1e-3), ("pace", 1e-3), ("acceleration", 1e-2)):
+            share = finite(name, getattr(self, name), "a number in (0, 1]")
+            if not least <= share <= 1:
+                raise InvalidValueError(name, share, f"a number in (0, 1], at least {least:g} so that it arrives")
+            object.__setattr__(self, name, share)
+        object.__setattr__(self, "deviation", _deviation(self.deviation, endless=True))
+        if self.tool is not None:
+            object.__setattr__(self, "tool", _transform("tool", self.tool))
         for name, kind in (("motion", Motion), ("profile", Profile), ("insertion", Insertion)):
             object.__setattr__(self, name, _word(name, getattr(self, name), kind))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, MotionCommand) and self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    def _values(self) -> tuple[object, ...]:
+        tool = None if self.tool is None else tuple(self.tool.ravel().tolist())
+        return (*(getattr(self, name) for name in self.__slots__ if name != "tool"), tool)
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,11 +349,23 @@ def _check_id(command_id: object) -> None:
         raise InvalidValueError("command_id", command_id, "a command's id, an integer from 1")
 
 
-def _deviation(value: object) -> float:
+def _deviation(value: object, *, endless: bool = False) -> float:
+    if endless and isinstance(value, float) and value == inf:
+        return inf
     deviation = finite("deviation", value, "metres ≥ 0")
     if deviation < 0:
         raise InvalidValueError("deviation", value, "metres ≥ 0")
     return deviation
+
+
+def _transform(name: str, value: ArrayLike) -> Array:
+    allowed = "a homogeneous transform of shape (4, 4) with a rotation matrix orthonormal to 1e-6"
+    array = finite_array(name, value, (4, 4), allowed)
+    R = array[:3, :3]
+    proper = np.abs(R @ R.T - np.eye(3)).max() <= 1e-6 and np.linalg.det(R) > 0
+    if not proper or not np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
+        raise InvalidValueError(name, value, allowed)
+    return array
 
 
 def _word(name: str, value: object, kind: type[_Kind]) -> _Kind:

@@ -150,8 +150,17 @@ def gap_at(timeline: Timeline, t: float, how: Insertion) -> tuple[Gap, tuple[int
     return Gap(t, t, timeline.state_before(t), tail), dropped
 
 
-def move_before(timeline: Timeline, t: float, earliest: float) -> tuple[Plan, float, int] | None:
-    """The move that ends at rest at t, as far as it begins at `earliest` or later; when, and its command."""
+def move_before(
+    timeline: Timeline, t: float, earliest: float, *, cut: bool = False
+) -> tuple[Plan, float, int] | None:
+    """The move that ends at t, as far as it begins at `earliest` or later; when, and its command.
+
+    Args:
+        timeline: What is scheduled.
+        t: When the move ends [s].
+        earliest: When the first of its segments begins [s].
+        cut: Whether a segment that is under way at the earliest time counts too.
+    """
     index = len(timeline) if t >= timeline.end else timeline.index_at(t)
     last = index - 1
     if last < 0 or timeline.start_of(index) != t or timeline.owner_of(last) == HOLD:
@@ -159,10 +168,9 @@ def move_before(timeline: Timeline, t: float, earliest: float) -> tuple[Plan, fl
     owner, low = timeline.owner_of(last), last
     while low > 0 and timeline.owner_of(low - 1) == owner and last - low < _ROUNDED_MOST:
         low -= 1
-    segments = [timeline.segment(i) for i in range(low, index) if timeline.start_of(i) >= earliest]
-    state = timeline.state_before(t)
-    # A smooth move that was cut a moment after its start has no speed yet, but an acceleration.
-    if not segments or state.qd.any() or state.qdd.any():
+    run = range(low, index)
+    segments = [timeline.segment(i) for i in run if timeline.start_of(i + 1 if cut else i) >= earliest]
+    if not segments:
         return None
     plan = stacked([s.duration for s in segments], [s.coefficients for s in segments], timeline.dof)
     return plan, segments[0].start, owner

@@ -7,18 +7,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from math import inf
 from operator import add
 from typing import NamedTuple
 
-from vrs import planning
-from vrs.analyzer import solve
-from vrs.chunk import HOLD, State
+from vrs.chunk import HOLD
 from vrs.commands import (
     Insertion,
-    JointTarget,
     Lateness,
-    Motion,
     MotionCommand,
     PlanEdit,
     Profile,
@@ -30,16 +25,14 @@ from vrs.insertion import (
     Edit,
     JoinPlanner,
     MovePlanner,
-    fill,
-    gap_at,
     insert,
     joined,
     lengthened,
-    move_before,
     piece,
 )
 from vrs.ledger import ARRIVED, Change, Entry, Ledger
-from vrs.model import Array, Limits, RobotModel, frozen_array
+from vrs.model import Limits, RobotModel, frozen_array
+from vrs.moves import join, move
 from vrs.planning import Plan
 from vrs.planning.plan import end_position
 from vrs.receipt import Names, Receipt, Status
@@ -132,7 +125,7 @@ class Scheduler:
         planner, joiner = self.planner(command), self.joiner(command)
         try:
             if command.deviation > 0:
-                edit = self._rounded(command, t, command_id, now)
+                edit = self._passing(command, t, command_id, now)
             else:
                 edit = insert(self.timeline, t, command.insertion, command_id, planner, joiner)
         except REFUSALS as error:
@@ -148,41 +141,10 @@ class Scheduler:
         )  # fmt: skip
         return self.accept(receipt, command, edit, t, appended=appended)
 
-    def _rounded(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit:
-        """Insert a move that begins before the one that ends at t is over, and passes its target at a distance."""
-        from vrs.planning import rounding
+    def _passing(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit:
+        from vrs.passing import passing
 
-        gap, dropped = gap_at(self.timeline, t, command.insertion)
-        planner, joiner = self.planner(command), self.joiner(command)
-        found = move_before(self.timeline, t, -inf if now is None else now)
-        if found is None:
-            made = fill(self.timeline, gap, command_id, planner, joiner, dropped)
-            return made._replace(notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
-        first, begin, passed_by = found
-        _, target, _ = planner(gap.state)
-        onward = replace(command, target=JointTarget(target))
-        before = self.ledger.command(passed_by)
-        mixed = ""
-        if command.profile is Profile.JERK_LIMITED and not self.smooth(passed_by):
-            mixed = "rounded with a move of parabolas"
-
-        def plans(limits: Limits) -> tuple[Plan, Plan, str]:
-            second, _, note = self.planner(onward, limits)(gap.state)
-            if limits is self.limits or before is None:
-                return first, second, joined(note, mixed)
-            again = replace(before, target=JointTarget(gap.state.q))
-            slow, _, more = self.planner(again, limits)(self.timeline.state_before(begin))
-            return slow, second, joined(more, note, mixed)
-
-        way = rounding.rounded(plans, command.deviation, self.model, self.limits, command.profile)
-        if way.first is first:
-            start, rest = max(t - way.delta, begin), rounding.later(way.whole, way.first.duration - way.delta)
-        else:
-            start, rest = begin, way.whole
-        if start < t and dropped is not None:
-            dropped = (passed_by, *dropped)
-        gap = gap._replace(cut=start, start=start)
-        return fill(self.timeline, gap, command_id, lambda _: (rest, target, way.note), joiner, dropped)
+        return passing(self, command, t, command_id, now)
 
     def moment(self, command: PlanEdit | SteerCommand, now: float | None, soonest: float) -> Moment:
         """When an edit acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
@@ -210,11 +172,11 @@ class Scheduler:
 
     def planner(self, command: MotionCommand, limits: Limits | None = None) -> MovePlanner:
         """Plan a command's move, under the limits in force now or others."""
-        return partial(_move, command, self.model, self.limits if limits is None else limits)
+        return partial(move, command, self.model, self.limits if limits is None else limits)
 
     def joiner(self, command: MotionCommand) -> JoinPlanner:
         """Plan a joining move at a command's speed and by its profile."""
-        return partial(_join, command, self.limits)
+        return partial(join, command, self.limits)
 
     def stop_at(self, t: float) -> tuple[Plan, str]:
         """Plan a stop of each joint at t [s], jerk-limited where the motion is; and what must be said of it."""
@@ -351,28 +313,6 @@ class Scheduler:
         self.profiles[last.command_id] = self.profile(owner_before(self.timeline, now))
         self.timeline = self.timeline.edited(now, [piece(stop, last.command_id)])
         return self.ledger.break_off(Change(version, last.command_id, now, None), note)
-
-
-def _move(command: MotionCommand, model: RobotModel, limits: Limits, state: State) -> tuple[Plan, Array, str]:
-    speed, profile, target = command.speed, command.profile, command.target
-    if command.motion is Motion.LINE:
-        from vrs.planning.line import line
-
-        if isinstance(target, JointTarget):
-            model.limits.check(target.q)
-            X = model.forward(target.q)
-            plan, note = line(state, X, speed, profile, model, limits, q_goal=target.q)
-            return plan, target.q, note
-        plan, note = line(state, target.X, speed, profile, model, limits, configuration=target.configuration)
-        return plan, end_position(plan) if len(plan) else state.q, note
-    # The arm solution is chosen from where the arm will be at the final execution time.
-    q = solve(target, model, state.q)
-    plan, note = planning.move(state, q, speed, profile, limits)
-    return plan, q, note
-
-
-def _join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tuple[Plan, str]:
-    return planning.run_up(q, goal, command.speed, command.profile, limits)
 
 
 def _names(ledger: Ledger, timeline: Timeline, index: int, t: float) -> tuple[int, ...]:

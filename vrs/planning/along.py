@@ -12,7 +12,7 @@ from vrs.errors import PlanningError
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning.fit import fit_parts
 from vrs.planning.path import Path
-from vrs.planning.plan import Plan, violation
+from vrs.planning.plan import Plan, slowed, violation
 from vrs.planning.time_law import Law, fastest, few_knots, parabolas, smoothed
 
 TOLERANCE: Final = 1e-10
@@ -304,12 +304,6 @@ def split(law: Law, edges: Array) -> Law:
     s = law.value(part, u)
     factorials = np.array([1.0, 1.0, 2.0, 6.0])
     return Law(h, (s / factorials[:, None]).T, law.smooth)
-
-
-def slowed(plan: Plan, factor: float) -> Plan:
-    """The same path, every speed divided by a factor."""
-    powers = factor ** -np.arange(float(plan.coefficients.shape[1]))
-    return Plan(plan.durations * factor, plan.coefficients * powers[:, None])
 
 
 def _peak(plan: Plan, bounds: tuple[Array, ...]) -> float:

@@ -24,6 +24,7 @@ from vrs.planning.joining import courses, smooth_stop
 from vrs.planning.obstacles import SINGULAR, condition, obstacle
 from vrs.planning.path import RESOLVED, Path, trace
 from vrs.planning.plan import Plan, empty, end_state, violation
+from vrs.tooled import bare
 
 NEGLIGIBLE: Final = 1e-12
 """A way [m] and a turn [rad] below which there's nothing to move."""
@@ -210,7 +211,7 @@ def _snapped(q: Array, model: RobotModel) -> Array:
     step = 1e-6
     for _ in range(3):
         trials = np.concatenate([q[None], q + step * np.eye(len(q)), q - step * np.eye(len(q))])
-        J = model.jacobian(trials)
+        J = bare(model).jacobian(trials)
         J[:, :3] /= model.characteristic_length
         U, _, Vt = np.linalg.svd(J[0])
         least = np.einsum("i,kij,j->k", U[:, len(q) - 1], J, Vt[-1])

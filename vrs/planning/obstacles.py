@@ -8,6 +8,7 @@ import numpy as np
 
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning.path import Path, stuck
+from vrs.tooled import bare
 
 SINGULAR: Final = 100.0
 """Condition number, linear rows of the Jacobian divided by the model's length, above which a path is refused."""
@@ -21,7 +22,7 @@ def condition(model: RobotModel, q: Array) -> Array:
 
     Numbers below half of SINGULAR may be given as an upper bound.
     """
-    J = model.jacobian(q)
+    J = bare(model).jacobian(q)
     J[:, :3] /= model.characteristic_length
     if J.shape[1] != J.shape[2]:
         return _exact(J)

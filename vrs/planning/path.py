@@ -11,6 +11,7 @@ import numpy as np
 from vrs.errors import PlanningError, UnresolvedError
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.planning.course import Course
+from vrs.tooled import bare
 
 ORDER: Final = 16
 """Degree of the series."""
@@ -209,6 +210,6 @@ def _beyond(
 
 def stuck(model: RobotModel, q: Array) -> int:
     """Return the joint, from 0, that the singularity at or near q, (n,), makes turn fast; of several the first."""
-    J = model.jacobian(q) / np.repeat([model.characteristic_length, 1.0], 3)[:, None]
+    J = bare(model).jacobian(q) / np.repeat([model.characteristic_length, 1.0], 3)[:, None]
     turning_fast = np.abs(np.linalg.svd(J)[2][-1])
     return int(np.argmax(turning_fast > 0.7 * turning_fast.max()))

@@ -26,6 +26,7 @@ __all__ = [
     "integrate",
     "packed",
     "parabolas",
+    "slowed",
     "stacked",
     "violation",
 ]
@@ -116,6 +117,12 @@ def stacked(durations: Sequence[float], rows: Sequence[Array], n: int) -> Plan:
 def empty(n: int) -> Plan:
     """A plan that stays where it is."""
     return Plan(np.empty(0), np.empty((0, 1, n)))
+
+
+def slowed(plan: Plan, factor: float) -> Plan:
+    """The same path, every speed divided by a factor."""
+    powers = factor ** -np.arange(float(plan.coefficients.shape[1]))
+    return Plan(plan.durations * factor, plan.coefficients * powers[:, None], plan.orders)
 
 
 def integrate(state: State, durations: Array, control: Array, order: int) -> Plan:

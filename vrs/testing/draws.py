@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import log
+from math import inf, log
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -150,8 +150,7 @@ class Draws:
         moved = np.array(X)
         moved[:3, 3] += reach * self.vector(-np.ones(3), np.ones(3))
         angle = min(reach, 1.0) * (2.0 * self._source.share() - 1.0)
-        c, s = np.cos(angle), np.sin(angle)
-        moved[:3, :3] = moved[:3, :3] @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        moved[:3, :3] = moved[:3, :3] @ _turn(angle)
         return PoseTarget(moved)
 
     def time(self, watch: Watch) -> float:
@@ -204,8 +203,24 @@ class Draws:
             insertion=self.one_of(
                 Insertion.SPLICE, Insertion.APPEND, Insertion.SPLICE, Insertion.APPEND, Insertion.REPLACE
             ),
-            deviation=self.exponential(0.1) if self.chance(0.2) else 0.0,
+            deviation=self.deviation(),
+            pace=self.one_of(0.5, 0.25, 0.05 + 0.95 * self._source.share()) if self.chance(0.2) else 1.0,
+            acceleration=0.01 + 0.99 * self._source.share() if self.chance(0.15) else 1.0,
+            tool=self.tool() if self.chance(0.3) else None,
         )
+
+    def deviation(self) -> float:
+        """How far from the end of the move before it a move may stay [m]."""
+        how = self._source.pick(20)
+        return inf if how >= 16 else self.exponential(0.1) if how >= 12 else 0.0
+
+    def tool(self) -> Array:
+        """A frame up to 0.3 m from the last link, (4, 4)."""
+        a, b = (2.0 * self.vector(np.zeros(2), np.ones(2)) - 1.0) * np.pi
+        X = np.eye(4)
+        X[:3, :3] = _turn(a) @ _turn(b)[:, [2, 0, 1]][[2, 0, 1]]
+        X[:3, 3] = 0.3 * self.vector(-np.ones(3), np.ones(3)) * self.one_of(1.0, 0.0, 0.1)
+        return X
 
     def steer(self, watch: Watch) -> SteerCommand:
         """A steering input, fresh most of the time."""
@@ -310,6 +325,12 @@ class Draws:
         if self._before == "steer":
             return 0.05 * self._source.share()
         return self.exponential(0.3)
+
+
+def _turn(angle: float) -> Array:
+    """Rotation about z, (3, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def lines_are_planned(model: RobotModel) -> bool:

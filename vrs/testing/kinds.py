@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from vrs.commands import Command, InsertVia, Motion, MotionCommand, PoseTarget, SteerCommand
 
 
@@ -11,7 +13,11 @@ def kinds_of(command: Command) -> tuple[str, ...]:
         kinds = [f"move: {command.insertion}", f"move: {command.profile}"]
         kinds += ["move: line"] if command.motion is Motion.LINE else []
         kinds += ["move: pose"] if isinstance(command.target, PoseTarget) else []
-        kinds += ["move: rounded"] if command.deviation > 0 else []
+        kinds += ["move: rounded"] if 0 < command.deviation < inf else []
+        kinds += ["move: continuous"] if command.deviation == inf else []
+        kinds += ["move: pace"] if command.pace < 1 else []
+        kinds += ["move: acceleration"] if command.acceleration < 1 else []
+        kinds += ["move: tool"] if command.tool is not None else []
         return tuple(kinds)
     if isinstance(command, SteerCommand):
         return ("steer: rates" if command.twist is None else f"steer: twist in {command.frame}",)

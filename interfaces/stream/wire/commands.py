@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias
+from math import inf
+from typing import Annotated, Any, Literal, TypeAlias
 
+import numpy as np
 from msgspec import Meta
 
 from interfaces.stream.wire.fields import (
@@ -30,7 +32,13 @@ from vrs.receipt import Receipt, Status
 
 _Row = Annotated[list[Annotated[float, Meta(ge=-1e6, le=1e6)]], Meta(min_length=4, max_length=4)]
 """Of a pose: whether it's one can be found out without an overflow."""
+_Pose = Annotated[list[_Row], Meta(min_length=4, max_length=4)]
 _Distance = Annotated[float, Meta(ge=0, le=1e6)]
+_Share = Annotated[float, Meta(ge=1e-3, le=1)]
+_PLAIN = frozenset(("pace", "acceleration"))
+"""Fields of moves that most moves leave at 1."""
+ENDLESS = "inf"
+"""Infinity, of which JSON knows nothing."""
 
 
 class JointsWire(Message, frozen=True, omit_defaults=True, gc=False, tag="joints"):
@@ -46,7 +54,7 @@ class JointsWire(Message, frozen=True, omit_defaults=True, gc=False, tag="joints
 class PoseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="pose"):
     """`PoseTarget`."""
 
-    X: Annotated[list[_Row], Meta(min_length=4, max_length=4)]
+    X: _Pose
     configuration: Word | None = None
 
     def read(self) -> PoseTarget:
@@ -63,15 +71,16 @@ class AimedWire(Message, frozen=True, omit_defaults=True, gc=False):
     @classmethod
     def of(cls, value: Any, packed: bool) -> AimedWire:
         """See `Message.of`."""
-        fields = [getattr(value, name) for name in cls.__struct_fields__]
-        return cls(
-            *[
-                (JointsWire if isinstance(field, JointTarget) else PoseWire).of(field, packed)
-                if isinstance(field, JointTarget | PoseTarget)
-                else field
-                for field in fields
-            ]
-        )
+        return cls(*[_field(getattr(value, name), packed) for name in cls.__struct_fields__])
+
+
+def _field(field: Any, packed: bool) -> Any:
+    """The wire form of a field of a command with a target."""
+    if isinstance(field, JointTarget | PoseTarget):
+        return (JointsWire if isinstance(field, JointTarget) else PoseWire).of(field, packed)
+    if isinstance(field, np.ndarray):
+        return field.tolist()
+    return ENDLESS if isinstance(field, float) and field == inf else field
 
 
 class MoveWire(AimedWire, frozen=True, omit_defaults=True, gc=False, tag="move"):
@@ -80,16 +89,28 @@ class MoveWire(AimedWire, frozen=True, omit_defaults=True, gc=False, tag="move")
     target: TargetWire
     issued_at: Time | None = None
     execute_at: Time | None = None
-    speed: Annotated[float, Meta(ge=1e-3, le=1)] = 1.0
+    speed: _Share = 1.0
     motion: Motion = Motion.JOINT
     profile: Profile = Profile.PARABOLIC
     insertion: Insertion = Insertion.SPLICE
-    deviation: _Distance = 0.0
+    deviation: _Distance | Literal["inf"] = 0.0
+    pace: _Share = 1.0
+    acceleration: Annotated[float, Meta(ge=1e-2, le=1)] = 1.0
+    tool: _Pose | None = None
+
+    @classmethod
+    def of(cls, value: Any, packed: bool) -> MoveWire:
+        """See `Message.of`."""
+        fields = {name: _field(getattr(value, name), packed) for name in cls.__struct_fields__}
+        # Defaults are left out where they're the very same object, which a float seldom is.
+        return cls(**{name: field for name, field in fields.items() if name not in _PLAIN or field != 1.0})
 
     def read(self) -> commands.MotionCommand:
         """The command."""
-        how = self.speed, self.motion, self.profile, self.insertion, self.deviation
-        return commands.MotionCommand(self.target.read(), self.issued_at, self.execute_at, *how)
+        deviation = inf if self.deviation == ENDLESS else float(self.deviation)
+        how = self.speed, self.motion, self.profile, self.insertion, deviation, self.pace, self.acceleration
+        tool = None if self.tool is None else np.array(self.tool)
+        return commands.MotionCommand(self.target.read(), self.issued_at, self.execute_at, *how, tool)
 
 
 class SteerWire(Message, frozen=True, omit_defaults=True, gc=False, tag="steer"):

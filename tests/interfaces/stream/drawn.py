@@ -67,11 +67,13 @@ def poses(draw):
 
 targets = arrays.map(v.JointTarget) | poses()
 deviations = st.floats(0, 1e6)
+shares = st.floats(1e-3, 1)
 one = st.integers(1, 2**63 - 1)
 commands = st.one_of(
     st.builds(
-        v.MotionCommand, targets, stamps, stamps, st.floats(1e-3, 1), st.sampled_from(v.Motion),
-        st.sampled_from(v.Profile), st.sampled_from(v.Insertion), deviations,
+        v.MotionCommand, targets, stamps, stamps, shares, st.sampled_from(v.Motion), st.sampled_from(v.Profile),
+        st.sampled_from(v.Insertion), deviations | st.just(math.inf), shares, st.floats(1e-2, 1),
+        st.none() | poses().map(lambda pose: pose.X),
     ),
     st.builds(v.SteerCommand, arrays, st.none(), st.sampled_from(v.Frame), stamps, stamps),
     st.builds(v.SteerCommand, st.none(), array_of(6), st.sampled_from(v.Frame), stamps, stamps),

@@ -59,6 +59,9 @@ def ordered() -> dict[str, commands.Command | None]:
         "query": commands.PositionQuery(1.0),
         "parameter": commands.ParameterChange("lateness", "reject"),
         "undo": None,
+        "continuous": commands.MotionCommand(
+            joints, motion=Motion.LINE, deviation=np.inf, pace=0.25, acceleration=0.5, tool=POSE
+        ),
     }
 
 

@@ -1,0 +1,167 @@
+"""A move that begins before the one before it is over, so that the arm doesn't stop between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from vrs.chunk import State
+from vrs.commands import JointTarget, Motion, MotionCommand, Profile
+from vrs.insertion import Edit, Gap, fill, gap_at, joined, move_before
+from vrs.model import Array, Limits, RobotModel
+from vrs.moves import eased
+from vrs.planning import Plan, rounding
+from vrs.planning.continuous import braking, continuous, starting
+from vrs.planning.plan import slowed
+from vrs.tooled import tooled
+
+if TYPE_CHECKING:
+    from vrs.scheduler import Scheduler
+
+STOPS = "stops at the via: no overlap keeps the limits"
+
+
+class _Way(NamedTuple):
+    """A move that passes the end of the one before it."""
+
+    start: float
+    """When it begins [s]."""
+    plan: Plan
+    note: str
+
+
+def passing(plan: Scheduler, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit:
+    """Insert a move that begins before the one that ends at t is over, and passes its target at a distance.
+
+    Args:
+        plan: What is scheduled.
+        command: The command, its deviation above 0.
+        t: Where it would begin if it stopped [s].
+        command_id: Of the command.
+        now: Present time [s]; None offline.
+
+    Raises:
+        PlanningError: If it can't be planned.
+    """
+    gap, dropped = gap_at(plan.timeline, t, command.insertion)
+    planner, joiner = plan.planner(command), plan.joiner(command)
+    found = move_before(plan.timeline, t, -inf if now is None else now, cut=command.deviation == inf)
+    # A smooth move that was cut a moment after its start has no speed yet, but an acceleration.
+    moving = gap.state.qd.any() or (gap.state.qdd.any() and found is not None and plan.smooth(found[2]))
+    if found is None or moving:
+        made = fill(plan.timeline, gap, command_id, planner, joiner, dropped)
+        if command.deviation == inf:
+            return made
+        return made._replace(notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
+    first, begin, passed_by = found
+    rest = np.zeros_like(gap.state.q)
+    gap = gap._replace(state=State(gap.state.q, rest, rest))
+    second, target, note = planner(gap.state)
+    passer = _Passer(plan, command, gap, t, passed_by, now)
+    if command.deviation == inf:
+        way = passer.continuous(first, second, begin, note)
+    else:
+        way = passer.rounded(first, begin, replace(command, target=JointTarget(target)))
+    if way.start < t and dropped is not None:
+        dropped = (passed_by, *dropped)
+    gap = gap._replace(cut=way.start, start=way.start)
+    return fill(plan.timeline, gap, command_id, lambda _: (way.plan, target, way.note), joiner, dropped)
+
+
+class _Passer:
+    """One command that passes the end of another; times are those of its pace, as if at 1."""
+
+    def __init__(
+        self, plan: Scheduler, command: MotionCommand, gap: Gap, t: float, passed_by: int, now: float | None
+    ) -> None:
+        self.plan, self.command, self.gap, self.t = plan, command, gap, t
+        self.passed_by, self.now = passed_by, now
+        self.before = plan.ledger.command(passed_by)
+        self.jerky = command.profile is Profile.JERK_LIMITED
+        self.mixed = ""
+        if self.jerky and not plan.smooth(passed_by):
+            self.mixed = "rounded with a move of parabolas"
+
+    def at_full_pace(self, plan: Plan) -> Plan:
+        """A plan as it is where time runs 1/pace times as fast."""
+        return plan if self.command.pace == 1.0 or not len(plan) else slowed(plan, self.command.pace)
+
+    def at_pace(self, plan: Plan) -> Plan:
+        """The other way round."""
+        return plan if self.command.pace == 1.0 or not len(plan) else slowed(plan, 1.0 / self.command.pace)
+
+    def slower_first(self, limits: Limits, begin: float) -> tuple[Plan, str] | None:
+        """The move before, planned anew within other limits; None where it isn't known."""
+        if self.before is None:
+            return None
+        again = replace(self.before, target=JointTarget(self.gap.state.q))
+        slow, _, note = self.plan.planner(again, limits)(self.plan.timeline.state_before(begin))
+        return self.at_full_pace(slow), note
+
+    def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> _Way:
+        """Overlap as far as the deviation and the limits allow."""
+        plan, command, pace = self.plan, self.command, self.command.pace
+        quick = self.at_full_pace(first)
+
+        def plans(limits: Limits) -> tuple[Plan, Plan, str]:
+            second, _, note = plan.planner(onward, limits)(self.gap.state)
+            second = self.at_full_pace(second)
+            again = None if limits is plan.limits else self.slower_first(limits, begin)
+            slow, more = (quick, "") if again is None else again
+            return slow, second, joined(more, note, self.mixed)
+
+        model = tooled(plan.model, command.tool)
+        way = rounding.rounded(plans, command.deviation, model, plan.limits, command.profile)
+        if way.first is not quick:
+            return _Way(begin, self.at_pace(way.whole), way.note)
+        start = max(self.t - way.delta / pace, begin)
+        rest = rounding.later(way.whole, way.first.duration - way.delta)
+        return _Way(start, self.at_pace(rest), way.note)
+
+    def continuous(self, first: Plan, second: Plan, begin: float, note: str) -> _Way:
+        """Begin where the move before begins to brake; where both can't have their acceleration, it gets half."""
+        t, command, pace, limits = self.t, self.command, self.command.pace, self.plan.limits
+        quick, onward = self.at_full_pace(first), self.at_full_pace(second)
+        notes = joined(note, self.mixed)
+        if not len(second):
+            return _Way(t, second, notes)
+        ready = starting(onward, limits, _straight(command, self.plan.model))
+        known = _straight(self.before, self.plan.model)
+        most = inf if self.now is None else (t - self.now) * pace
+        found = continuous(quick, onward, most, (braking(quick, limits, known), ready), limits, jerk=self.jerky)
+        if found.delta > 0.0:
+            return self._at(max(t - found.delta / pace, begin), found.plan, found.delta, notes)
+        again = None
+        if self.before is not None and self.before.deviation < inf and (self.now is None or begin >= self.now):
+            again = self.slower_first(eased(limits, 0.5), begin)
+        if again is not None:
+            slow, more = again
+            found = continuous(slow, onward, inf, (braking(slow, limits, known), ready), limits, jerk=self.jerky)
+            if found.delta > 0.0:
+                lead = _until(slow, slow.duration - found.delta)
+                return self._at(begin, lead.then(found.plan), found.delta, joined(more, notes))
+        return _Way(t, second, joined(notes, STOPS))
+
+    def _at(self, start: float, plan: Plan, delta: float, notes: str) -> _Way:
+        passed = f"begins {delta / self.command.pace:.3g} s before command {self.passed_by} is over"
+        return _Way(start, self.at_pace(plan), joined(notes, passed))
+
+
+def _straight(command: MotionCommand | None, model: RobotModel) -> RobotModel | None:
+    """Whose tool goes straight in a command; None where the joints do."""
+    if command is None or command.motion is not Motion.LINE:
+        return None
+    return tooled(model, command.tool)
+
+
+def _until(plan: Plan, t: float) -> Plan:
+    """What of a plan comes before t [s]."""
+    ends: Array = np.cumsum(plan.durations)
+    k = min(int(np.searchsorted(ends, t)), len(plan) - 1)
+    h = np.array(plan.durations[: k + 1])
+    h[k] -= ends[k] - t
+    keep = k + 1 if h[k] > 0.0 else k
+    return Plan(h[:keep], plan.coefficients[:keep])
