@@ -69,8 +69,13 @@ def demo(
     model = puma560.model()
     plan = default_plan(model) if commands is None else read_plan(commands, model)
     prepare(out)
-    run, attributions, offsets = _run(plan, model, profile, seed, D, order)
-    _finish(summarize(run, attributions, offsets), run, out, as_json=as_json)
+    run, attributions, offsets = explained(plan, None, model, profile, seed, D, order)
+    summary = summarize(run, attributions, offsets)
+    text = write(summary, run, out)
+    if as_json:
+        typer.echo(text, nl=False)
+    else:
+        show(summary, out)
 
 
 def prepare(out: Path) -> None:
@@ -87,9 +92,26 @@ def prepare(out: Path) -> None:
         raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
 
 
-def _run(
-    plan: Plan, model: RobotModel, profile: DelayProfile, seed: int, D: float | None, service: Service
+def explained(
+    plan: Plan,
+    whole: TwinRun | None,
+    model: RobotModel,
+    profile: DelayProfile,
+    seed: int,
+    D: float | None,
+    service: Service,
 ) -> tuple[TwinRun, tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
+    """Run a plan on both twins, and again under other conditions, for what made them differ.
+
+    Args:
+        plan: What the operator does.
+        whole: The run itself, where it has been made.
+        model: The robot.
+        profile: The link's delay.
+        seed: Seed of the link.
+        D: The offset [s]; None adapts it.
+        service: Order of delivery on the link.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
@@ -97,7 +119,7 @@ def _run(
     from interfaces.runtime.offset import FIXED, fixed_offset, spelled
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with Progress(*columns, console=Console(stderr=True), redirect_stdout=False) as bar:
 
         def shown(name: str) -> Callable[[float], None]:
             task = bar.add_task(f"{name:30}", total=_length(plan))
@@ -107,8 +129,12 @@ def _run(
         for off in range(len(CAUSES) + 1):
             name = f"without {CAUSES[off - 1].replace('_', ' ')}" if off else "both twins"
             causes = frozenset(CAUSES[:off])
-            run = run_without(
-                causes, plan, model, profile, seed=seed, offset=D, service=service, progress=shown(name)
+            run = (
+                run_without(
+                    causes, plan, model, profile, seed=seed, offset=D, service=service, progress=shown(name)
+                )
+                if whole is None or off
+                else whole
             )
             stages.append((run, measures(run)))
         for other in (None, fixed_offset(FIXED, profile) if D is None else D):
@@ -122,10 +148,16 @@ def _run(
 
 def _length(plan: Plan) -> float:
     """A guess at how long the run will be [s]; the bar is corrected at the end."""
-    return max(motion.command.execute_at or motion.registered_at for motion in plan.motions) + 8.0
+    times = (motion.command.execute_at or motion.registered_at for motion in plan.motions)
+    return max(times, default=0.0) + 8.0
 
 
-def _finish(summary: dict[str, Any], run: TwinRun, out: Path, *, as_json: bool) -> None:
+def write(summary: dict[str, Any], run: TwinRun, out: Path) -> str:
+    """Write `report.html` and `summary.json`; the latter's text.
+
+    Raises:
+        FormatError: If they can't be written.
+    """
     from interfaces.report.html import write_report
     from interfaces.report.summary import to_json
 
@@ -135,18 +167,16 @@ def _finish(summary: dict[str, Any], run: TwinRun, out: Path, *, as_json: bool) 
         write_report(out / "report.html", run, summary)
     except OSError as error:
         raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
-    if as_json:
-        typer.echo(text, nl=False)
-    else:
-        _show(summary, out)
+    return text
 
 
-def _show(summary: dict[str, Any], out: Path) -> None:
+def show(summary: dict[str, Any], out: Path, *, err: bool = False) -> None:
+    """Show a summary's tables, on standard error if asked for."""
     from rich.console import Console
 
     from interfaces.report.tables import attribution_table, error_table, offset_table, time_lines
 
-    console = Console()
+    console = Console(stderr=err)
     console.print(error_table(summary))
     if summary["attribution"]:
         console.print(attribution_table(summary))
@@ -154,4 +184,4 @@ def _show(summary: dict[str, Any], out: Path) -> None:
         console.print(offset_table(summary))
     for line in time_lines(summary):
         console.print(line, highlight=False)
-    typer.echo(f"Wrote {out / 'report.html'} and {out / 'summary.json'}")
+    typer.echo(f"Wrote {out / 'report.html'} and {out / 'summary.json'}", err=err)

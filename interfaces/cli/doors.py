@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import gc
 import ipaddress
+import os
 import signal
 import socket
+import sys
 from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
@@ -77,6 +79,20 @@ def names_of(host: str) -> list[str]:
     except OSError:
         found = set()
     return sorted({"127.0.0.1", "localhost", "::1", own, *found})
+
+
+def end_with_input(ended: asyncio.Event) -> None:
+    """Set an event of the running loop when standard input ends."""
+    import asyncio
+
+    loop, source = asyncio.get_running_loop(), sys.stdin.fileno()
+
+    def look() -> None:
+        if not os.read(source, 4096):
+            loop.remove_reader(source)
+            ended.set()
+
+    loop.add_reader(source, look)
 
 
 def end_on_signal(ended: asyncio.Event) -> None:

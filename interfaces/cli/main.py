@@ -8,12 +8,15 @@ from typing import Annotated
 
 import typer
 
+from interfaces.cli.check import check
+from interfaces.cli.console import console
 from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
 from interfaces.cli.doors import version
 from interfaces.cli.link import link
 from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
+from interfaces.cli.run import run
 from interfaces.cli.serve import serve
 from vrs.errors import VrsError
 
@@ -27,11 +30,14 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+app.command()(check)
+app.command()(console)
 app.command()(demo)
 app.command()(doctor)
 app.command()(link)
 app.command()(reproduce)
 app.command()(robot)
+app.command()(run)
 app.command()(serve)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, keep_quiet, names_of, version
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of, version
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
@@ -128,22 +128,7 @@ async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> 
             typer.echo(f"{READY}ws://{host}:{port}/site ({robot.config.model.name}, {robot.config.body})")
             sys.stdout.flush()
         if until_eof:
-            _end_with_input(robot)
+            end_with_input(robot.ended)
         await robot.ended.wait()
         await robot.rest()
     return robot.problem
-
-
-def _end_with_input(robot: LiveRobot) -> None:
-    """Let the robot end when standard input does."""
-    import asyncio
-    import os
-
-    loop, source = asyncio.get_running_loop(), sys.stdin.fileno()
-
-    def look() -> None:
-        if not os.read(source, 4096):
-            loop.remove_reader(source)
-            robot.ended.set()
-
-    loop.add_reader(source, look)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, keep_quiet, names_of, version
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of, version
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
@@ -70,6 +72,20 @@ def serve(
         Path | None, typer.Option("--robot-token-file", metavar="FILE", help="Token file of that robot.")
     ] = None,
     token_file: TokenFile = None,
+    val_port: Annotated[
+        int | None,
+        typer.Option(
+            "--val-port",
+            min=0,
+            max=65535,
+            metavar="N",
+            help="VAL-II's monitor on plain TCP, on loopback only; 0 for any port that's free.",
+        ),
+    ] = None,
+    val_files: Annotated[
+        Path, typer.Option("--val-files", metavar="DIR", help="Where that monitor's LOAD and STORE find files.")
+    ] = Path(),
+    until_eof: Annotated[bool, typer.Option("--until-eof", help="End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
     import uvloop
@@ -98,12 +114,15 @@ def serve(
         )
     at = None if robot_at is None else parse_address("--robot-at", robot_at)
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
+    if not val_files.is_dir():
+        raise InvalidValueError("val-files", str(val_files), "a directory")
     access = access_for(host, token_file, free=OPEN)
+    own = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
+    doors = _Doors(host, port, val_port, val_files, own, until_eof)
     uvloop.run(
         _serve(
             access,
-            host,
-            port,
+            doors,
             LinkConditions.symmetric(way),
             seed,
             None if at is None else f"ws://{at}/site",
@@ -113,10 +132,23 @@ def serve(
     )
 
 
+@dataclass(frozen=True, slots=True)
+class _Doors:
+    """Where it listens."""
+
+    host: str
+    port: int
+    val_port: int | None
+    """Of the monitor; None for none."""
+    val_files: Path
+    own_token: str | None = field(repr=False)
+    """By which the monitor is an operator."""
+    until_eof: bool
+
+
 async def _serve(
     access: Access,
-    host: str,
-    port: int,
+    doors: _Doors,
     conditions: LinkConditions,
     seed: int,
     robot_at: str | None,
@@ -132,15 +164,20 @@ async def _serve(
     from interfaces.stream import sockets
     from interfaces.stream.access import hosts
     from interfaces.stream.server import application
+    from interfaces.val2.served import HOST, ServedVal
     from robots import puma560
 
     ended = asyncio.Event()
     end_on_signal(ended)
     model = puma560.model()
-    listening = sockets.bind(host, port)
+    host = doors.host
+    listening = sockets.bind(host, doors.port)
     port = listening.getsockname()[1]
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(listening.close)
+        val_listening = None if doors.val_port is None else sockets.bind(HOST, doors.val_port)
+        if val_listening is not None:
+            stack.callback(val_listening.close)
         url = await stack.enter_async_context(local_robot(options)) if robot_at is None else robot_at
         config = LiveOperatorConfig(
             model, model.poses["nominal"], url, conditions, robot_token, seed, server=version()
@@ -153,4 +190,12 @@ async def _serve(
         shown = f"[{host}]" if ":" in host else host
         typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
         typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}", err=True)
+        if val_listening is not None:
+            near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
+            door = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, version())
+            await stack.enter_async_context(door.listening(val_listening))
+            typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
+        sys.stdout.flush()
+        if doors.until_eof:
+            end_with_input(ended)
         await ended.wait()

@@ -11,7 +11,7 @@ import numpy as np
 
 from interfaces.runtime.attribution import CAUSES, Attribution, OffsetOutcome
 from interfaces.runtime.run import TwinRun
-from interfaces.runtime.virtual import status_counts
+from interfaces.runtime.session import status_counts
 from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
 from vrs.model import Array
 from vrs.receipt import Receipt

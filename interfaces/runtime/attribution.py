@@ -10,7 +10,8 @@ from interfaces.link import ConstantDelay, DelayProfile, Service
 from interfaces.runtime.bodies import exact_arm, simulated_puma
 from interfaces.runtime.plan import Plan
 from interfaces.runtime.run import TwinRun
-from interfaces.runtime.virtual import Progress, run_twins
+from interfaces.runtime.session import Progress
+from interfaces.runtime.virtual import run_twins
 from vrs.comparison import agreement
 from vrs.model import RobotModel
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from interfaces.runtime.virtual import Arm, ArmFactory
+from interfaces.runtime.session import Arm, ArmFactory
 from interfaces.teleop import Reference
 from vrs.model import Array
 

@@ -13,7 +13,17 @@ import msgspec
 import numpy as np
 
 from vrs.checks import one_of
-from vrs.commands import Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Profile, Target
+from vrs.commands import (
+    Insertion,
+    JointTarget,
+    Motion,
+    MotionCommand,
+    PlanEdit,
+    PoseTarget,
+    Profile,
+    SteerCommand,
+    Target,
+)
 from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
 from vrs.model import Array, RobotModel
 
@@ -32,15 +42,19 @@ ALLOWED = (
 )
 
 
+PlannedCommand: TypeAlias = MotionCommand | SteerCommand | PlanEdit
+"""What an operator may do to the timeline; plan files hold motion commands alone."""
+
+
 @dataclass(frozen=True, slots=True)
 class PlannedMotion:
-    """A motion command of a plan."""
+    """A command of a plan."""
 
     where: str
     """File and line, for messages."""
     registered_at: float
     """User time at which the command reaches the operator's engine [s], ≥ its issue time."""
-    command: MotionCommand
+    command: PlannedCommand
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +77,7 @@ class Plan:
     start: Array
     """Joints at the start [rad], (n,)."""
     motions: tuple[PlannedMotion, ...]
-    """At least one."""
+    """A plan file holds at least one."""
     payloads: tuple[PlannedPayload, ...]
 
 

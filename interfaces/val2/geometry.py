@@ -65,9 +65,15 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
 
 def from_oat(x: float, y: float, z: float, o: float, a: float, t: float) -> Transformation:
     """The transformation of X, Y, Z [mm] and O, A, T [deg]."""
-    R = about_z(o - 90.0).X @ about_y(a + 90.0).X @ about_z(t).X
-    R[:3, 3] = x, y, z
-    return Transformation(R)
+    (c1, s1), (c2, s2), (c3, s3) = _cos_sin(o - 90.0), _cos_sin(a + 90.0), _cos_sin(t)
+    return Transformation(
+        [
+            [c1 * c2 * c3 - s1 * s3, -c1 * c2 * s3 - s1 * c3, c1 * s2, x],
+            [s1 * c2 * c3 + c1 * s3, -s1 * c2 * s3 + c1 * c3, s1 * s2, y],
+            [-s2 * c3, s2 * s3, c2, z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def to_oat(transformation: Transformation) -> tuple[float, float, float, float, float, float]:

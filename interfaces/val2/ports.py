@@ -40,6 +40,9 @@ class ArmPort(Protocol):
     def real(self, *, now: float) -> Where | None:
         """Where the other twin was measured last; None where there's none."""
 
+    def reaches(self, location: Location, *, now: float) -> bool:
+        """Whether a motion could go there: INRANGE."""
+
     # What it waits for.
 
     def answered(self, *, now: float) -> bool:
@@ -107,6 +110,9 @@ class ArmPort(Protocol):
 
     def set_tolerance(self, percent: float | None, *, fine: bool, always: bool) -> None:
         """COARSE, FINE: how near counts as there."""
+
+    def tolerance(self) -> tuple[bool, float]:
+        """Whether FINE is in force, and its percentage."""
 
     def set_nulling(self, on: bool, *, always: bool) -> None:
         """NULL, NONULL: whether motions end when the real arm's errors have become small."""

@@ -40,6 +40,8 @@ class Variable:
     """Lower case, at most 15 characters beside the prefix, which is part of it."""
     indices: tuple[Expression, ...] = ()
     at: Place = field(default=NOWHERE, compare=False)
+    array: bool = False
+    """A whole array: `a[]`."""
 
     @property
     def prefix(self) -> str:
@@ -53,8 +55,8 @@ class Apply:
 
     function: str
     """Upper case; with its prefix, as `$ENCODE`, `#PPOINT`."""
-    arguments: tuple[Expression | None, ...] = ()
-    """None for one that was left out."""
+    arguments: tuple[Expression | Format | None, ...] = ()
+    """None for one that was left out; formats in `$ENCODE` alone."""
     at: Place = field(default=NOWHERE, compare=False)
 
 
@@ -327,7 +329,7 @@ class Program:
 
     name: str
     parameters: tuple[Variable, ...] = ()
-    """Arguments by reference; `x[]` for an array is a variable whose indices are left out."""
+    """Arguments by reference; `x[]` is a whole array."""
     steps: tuple[Step, ...] = ()
     """Step n is `steps[n - 1]`."""
     comment: str | None = None

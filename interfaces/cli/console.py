@@ -1,0 +1,125 @@
+"""`vrs console`: the VAL-II monitor, at a robot of its own or at one that a server serves."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.doors import version
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from interfaces.val2.monitor.monitor import Monitor
+    from interfaces.val2.monitor.switchboard import Control
+    from interfaces.val2.motion import Arm
+    from vrs.clock import Clock
+
+
+def console(
+    connect: Annotated[
+        str | None,
+        typer.Option(
+            "--connect", metavar="URL", help="A server, such as ws://127.0.0.1:8600; without it one is begun."
+        ),
+    ] = None,
+    token_file: Annotated[
+        Path | None, typer.Option("--token-file", metavar="FILE", help="Tokens of that server.")
+    ] = None,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="A virtual arm in this process only: no real one, no page.")
+    ] = False,
+    delay: Annotated[
+        str,
+        typer.Option("--delay", metavar="PROFILE", help="Emulated on the way to the robot that this begins."),
+    ] = "none",
+    files: Annotated[
+        Path, typer.Option("--files", metavar="DIR", help="Where LOAD and STORE find files.")
+    ] = Path(),
+) -> None:
+    """Move a PUMA 560 by VAL-II commands; HELP lists them. From a pipe, lines are done one after the other."""
+    from interfaces.link import delay_profile
+
+    if connect is not None and alone:
+        raise InvalidValueError("alone", alone, "left out with --connect")
+    if token_file is not None and connect is None:
+        raise InvalidValueError("token-file", str(token_file), "left out without --connect")
+    if not files.is_dir():
+        raise InvalidValueError("files", str(files), "a directory")
+    delay_profile(delay)
+    if alone:
+        _alone(files)
+    elif connect is not None:
+        _connected(connect, token_file, files)
+    else:
+        from interfaces.val2.local import local_server
+
+        typer.echo("vrs: starting both robots ..", err=True)
+        with local_server(["--delay", delay, "--link-loss", "hold"]) as url:
+            typer.echo(f"vrs: {url}/view shows both robots", err=True)
+            _connected(url, None, files)
+
+
+def _alone(files: Path) -> None:
+    from interfaces.val2.monitor.switchboard import Free
+    from interfaces.val2.motion import arm_for
+    from robots import puma560
+    from vrs.clock import ManualClock, WallClock
+    from vrs.engine import Engine
+
+    model = puma560.model()
+    engine = Engine(model, q=model.poses["nominal"], clock=ManualClock(0.0))
+    _converse(arm_for(engine), Free(), WallClock(), files, f"{version()}, a virtual {model.name} alone")
+
+
+def _connected(url: str, token_file: Path | None, files: Path) -> None:
+    from interfaces import connect
+    from interfaces.stream.access import read_tokens
+    from interfaces.stream.control import Role
+    from interfaces.val2.control import LeaseControl
+    from interfaces.val2.motion import arm_for
+
+    token = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
+    with connect(url, token=token, name="vrs console") as connection:
+        _converse(
+            arm_for(connection), LeaseControl(connection), connection, files, f"{version()}, connected to {url}"
+        )
+
+
+def _converse(arm: Arm, control: Control, clock: Clock, files: Path, what: str) -> None:
+    """Let a person, or a pipe, work at the monitor."""
+    import asyncio
+
+    from interfaces.val2.controller import Controller
+    from interfaces.val2.monitor.files import Files
+    from interfaces.val2.monitor.monitor import Monitor
+    from interfaces.val2.monitor.switchboard import Switchboard
+
+    controller = Controller(arm, parameters=arm.parameters, now=clock.now())
+    typed = sys.stdin.isatty() and sys.stdout.isatty()
+    board = Switchboard(controller, control)
+    monitor = Monitor(board, Files(files, anywhere=True), what, patient=not typed)
+    asyncio.run(_typed(monitor, clock) if typed else _piped(monitor, clock))
+
+
+async def _typed(monitor: Monitor, clock: Clock) -> None:
+    from interfaces.val2.monitor.terminal import Terminal
+
+    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
+    await Terminal(monitor, clock, history=state / "vrs-teleop" / "console").run()
+
+
+async def _piped(monitor: Monitor, clock: Clock) -> None:
+    import asyncio
+    import contextlib
+    import signal
+
+    from interfaces.val2.monitor.pipe import Pipe
+
+    pipe = Pipe(monitor, clock, source=sys.stdin.fileno())
+    with contextlib.suppress(NotImplementedError):
+        asyncio.get_running_loop().add_signal_handler(signal.SIGINT, pipe.interrupt)
+    await pipe.run()

@@ -1,0 +1,124 @@
+"""`vrs run`: a VAL-II program on both twins over an emulated internet."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.demo import ADAPTIVE, DEFAULT_DELAY, DEFAULT_SEED, explained, prepare, show, write
+from vrs.errors import FormatError
+
+if TYPE_CHECKING:
+    from interfaces.val2.source import SourceFile
+
+MAX_BYTES = 4 * 1024 * 1024
+
+
+def run(
+    program: Annotated[
+        Path, typer.Argument(metavar="PROGRAM.v2", help="File of VAL-II programs; its first is run.")
+    ],
+    delay: Annotated[
+        str,
+        typer.Option(
+            "--delay",
+            metavar="PROFILE",
+            help="none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar or trace:FILE.csv.",
+        ),
+    ] = DEFAULT_DELAY,
+    offset: Annotated[
+        str,
+        typer.Option(
+            "--offset",
+            metavar="OFFSET",
+            help="How far the real robot plays behind: adaptive, fixed (the profile's 95 % quantile) or fixed:S.",
+        ),
+    ] = ADAPTIVE,
+    service: Annotated[
+        str, typer.Option("--service", metavar="ORDER", help="Delivery on the link: datagram or in-order.")
+    ] = "datagram",
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random, RANDOM too.")
+    ] = DEFAULT_SEED,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Where report.html and summary.json go.")
+    ] = Path("out"),
+    limit: Annotated[
+        float, typer.Option("--limit", min=1, max=3600, metavar="S", help="When the program is given up [s].")
+    ] = 600.0,
+) -> None:
+    """Run the first program of a file, once, on virtual and real robot across an emulated internet.
+
+    Standard output is what the program TYPEs; PROMPT reads standard input.
+    """
+    from interfaces.link import Conditions, delay_profile
+    from interfaces.report.summary import summarize
+    from interfaces.runtime.bodies import simulated_puma
+    from interfaces.runtime.offset import fixed_offset
+    from interfaces.val2.playing import Listeners
+    from interfaces.val2.twins import play
+    from robots import puma560
+
+    profile = delay_profile(delay)
+    D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
+    source, model = read(program), puma560.model()
+    prepare(out)
+    played = play(
+        source, model, profile, simulated_puma(),
+        seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
+    )  # fmt: skip
+    whole, attributions, offsets = explained(played.plan, played.run, model, profile, seed, D, order)
+    summary = summarize(whole, attributions, offsets)
+    write(summary, whole, out)
+    show(summary, out, err=True)
+    if played.error is not None:
+        raise played.error
+
+
+def read(path: Path) -> SourceFile:
+    """Read a file of programs.
+
+    Raises:
+        FormatError: If it can't be read, or is longer than 4 MiB.
+        ValError: If it isn't VAL-II.
+    """
+    from interfaces.val2.source import parse_file
+
+    return parse_file(text_of(path), str(path))
+
+
+def text_of(path: Path) -> str:
+    """The text of a file: UTF-8, or Latin-1 as old files are.
+
+    Raises:
+        FormatError: If it can't be read, or is longer than 4 MiB.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
+    if len(data) > MAX_BYTES:
+        raise FormatError(str(path), f"is longer than the {MAX_BYTES} bytes allowed")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _typed(text: str) -> None:
+    sys.stdout.write(text)
+    sys.stdout.flush()
+
+
+def _told(text: str) -> None:
+    typer.echo(text, err=True)
+
+
+def _asked(question: str) -> str | None:
+    typer.echo(question, nl=False, err=True)
+    line = sys.stdin.readline()
+    return line.rstrip("\r\n") if line else None

@@ -1,0 +1,320 @@
+"""What is wrong with programs, as far as it can be told without running them."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from interfaces.val2 import forms, kinds, walk
+from interfaces.val2.errors import Place, ValError
+from interfaces.val2.grammar import SIGNIFICANT
+from interfaces.val2.parser import directive, lines_of, split_comment
+from interfaces.val2.slots import Kind, nearest
+from interfaces.val2.source import SourceFile, parse_file
+from interfaces.val2.structure import survey
+from interfaces.val2.syntax import (
+    Apply,
+    Assign,
+    Call,
+    Decompose,
+    Expression,
+    For,
+    Ignored,
+    Instruction,
+    Local,
+    Number,
+    Program,
+    React,
+    Set,
+    Statement,
+    Step,
+    Unary,
+    Variable,
+)
+
+MOST_ERRORS: Final = 100
+"""Lines that can't be read, of which a file's check tells."""
+_WORD: Final = re.compile(r'"[^"]*"|[#$]?[A-Za-z][A-Za-z0-9_.]*')
+_HEADER: Final = re.compile(r"\s*\.PROGRAM\s+([A-Za-z][A-Za-z0-9_.]*)", re.IGNORECASE | re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that a check found."""
+
+    severity: Literal["error", "warning"]
+    error: ValError
+    """What is wrong, and in which program and step."""
+    place: Place | None
+    """Where in the file."""
+
+
+def _error(error: ValError) -> Finding:
+    return Finding("error", error, error.place)
+
+
+def _warning(error: ValError) -> Finding:
+    return Finding("warning", error, error.place)
+
+
+def check_text(text: str, name: str) -> tuple[SourceFile | None, list[Finding]]:
+    """Read a file and check it.
+
+    Args:
+        text: Text of the file.
+        name: Its name.
+
+    Returns:
+        What it holds, None if not every line could be read; and what was found, in the order of its lines.
+    """
+    source, unreadable = read_all(text, name)
+    found = [_error(error) for error in unreadable]
+    if not source.programs and not unreadable:
+        found.append(_error(ValError("Undefined program", "the file holds none", place=Place(1, 1))))
+    found += check(source)
+    found += _alike_names(text)
+    return None if unreadable else source, sorted(found, key=_order)
+
+
+def _order(finding: Finding) -> tuple[int, int]:
+    place = finding.place
+    return (0, 0) if place is None else (place.line, place.column)
+
+
+def read_all(text: str, name: str) -> tuple[SourceFile, list[ValError]]:
+    """What can be read of a file, and an error for each line that can't."""
+    errors: list[ValError] = []
+    try:
+        lines = lines_of(text)
+    except ValError as error:
+        return SourceFile(name), [error.at(place=Place(1, 1))]
+    while len(errors) < MOST_ERRORS:
+        try:
+            return parse_file("\n".join(lines), name), errors
+        except ValError as error:
+            errors.append(error)
+            number = error.place.line if error.place is not None else len(lines)
+            lines[number - 1] = _stand_in(lines[number - 1], number)
+    return SourceFile(name), errors
+
+
+def _stand_in(line: str, number: int) -> str:
+    """What takes the place of a line that can't be read."""
+    if directive(line) != ".PROGRAM":
+        return ""
+    found = _HEADER.match(line)
+    return f".PROGRAM {'' if found is None else found[1][:8]}l{number}"
+
+
+def check(source: SourceFile) -> list[Finding]:
+    """What is wrong with the programs of a file, one after the other."""
+    checker = _Checker(source)
+    return [finding for program in source.programs for finding in checker.program(program)]
+
+
+class _Checker:
+    def __init__(self, source: SourceFile) -> None:
+        self._programs = {program.name: program for program in source.programs}
+        self._set: dict[str, set[str]] = defaultdict(set)
+        """Programs by which names are set; the empty name stands for all."""
+        self._known: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        """Kinds of what names were set to, by their scopes; the empty name stands for all."""
+        for entry in (*source.locations, *source.reals, *source.strings):
+            self._set[""].add(entry.variable.name)
+        for entry in source.locations:
+            self._known[""][entry.variable.name].add("frame")
+        for entry in source.reals:
+            self._known[""][entry.variable.name].add("real")
+        for program in source.programs:
+            self._gather(program)
+
+    def _gather(self, program: Program) -> None:
+        own = self._own(program)
+        for parameter in program.parameters:
+            self._set[program.name].add(parameter.name)
+        for step in program.steps:
+            for variable in walk.writes(step.statement):
+                scope = program.name if variable.name in own else ""
+                self._set[scope].add(variable.name)
+                self._known[scope][variable.name].add(_given(step.statement))
+
+    @staticmethod
+    def _own(program: Program) -> frozenset[str]:
+        """Names that are the program's own."""
+        names = {parameter.name for parameter in program.parameters}
+        for step in program.steps:
+            match step.statement:
+                case Local(keyword, variables) if keyword != "GLOBAL":
+                    names |= {variable.name for variable in variables}
+        return frozenset(names)
+
+    def program(self, program: Program) -> Iterator[Finding]:
+        """What is wrong with a program."""
+        yield from (_error(error) for error in survey(program)[1])
+        own = self._own(program)
+        parameters = {parameter.name for parameter in program.parameters}
+        known = {
+            name: next(iter(given))
+            for scope in ("", program.name)
+            for name, given in self._known[scope].items()
+            if len(given) == 1 and name not in parameters and (scope or name not in own)
+        }
+        usable = self._set[program.name] | {name for name in self._set[""] if name not in own}
+        reported: set[str] = set()
+        for number, step in enumerate(program.steps, 1):
+            for finding in self._step(step, known, usable, reported):
+                error = finding.error.at(program=program.name, step=number, place=step.at)
+                yield Finding(finding.severity, error, error.place)
+
+    def _step(self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]) -> Iterator[Finding]:
+        statement = step.statement
+        if isinstance(statement, Ignored):
+            detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
+            yield _warning(ValError("No meaning here", detail, place=statement.at))
+        for error in (*self._calls(statement), *_numbers(statement)):
+            yield _error(error)
+        for expression, wanted in walk.reads(statement):
+            for error in kinds.mistakes(expression, wanted, known):
+                yield _error(error)
+            yield from self._unset(expression, wanted, usable, reported)
+
+    def _unset(
+        self, expression: Expression, wanted: Kind, usable: set[str], reported: set[str]
+    ) -> Iterator[Finding]:
+        """Names that nothing in the file sets, each once in a program; functions that do nothing."""
+        match expression:
+            case Variable(name, _, at) if name not in usable and name not in reported:
+                reported.add(name)
+                located = name[0] == "#" or wanted in ("location", "frame")
+                what = "Undefined location" if located else "Undefined value"
+                yield _error(ValError(what, f"{name}; nothing in the file sets it", place=at))
+            case Apply("DEFINED" | "SWITCH" | "PARAMETER"):
+                return
+            case Apply(name, _, at) if forms.FUNCTIONS[name].idle:
+                gives = '""' if forms.FUNCTIONS[name].gives == "string" else "0"
+                yield _warning(ValError("No meaning here", f"{name} is {gives}", place=at))
+                return
+        for child, kind in _wanted(expression):
+            yield from self._unset(child, kind, usable, reported)
+
+    def _calls(self, statement: Statement) -> Iterator[ValError]:
+        match statement:
+            case Call(name, arguments, _, at):
+                called = self._programs.get(name)
+                if called is None:
+                    yield self._undefined(name, at)
+                    return
+                parameters = called.parameters
+                if len(arguments) > len(parameters):
+                    detail = f"{name} takes {len(parameters)}, and here are {len(arguments)}"
+                    yield ValError("Too many arguments", detail, place=at)
+                for argument, parameter in zip(arguments, parameters, strict=False):
+                    if argument is not None:
+                        yield from _passed(argument, parameter)
+            case React(program=name, at=at) if name and name not in self._programs:
+                yield self._undefined(name, at)
+
+    def _undefined(self, name: str, at: Place) -> ValError:
+        close = nearest(name.upper(), [known.upper() for known in self._programs])
+        return ValError("Undefined program", f"{name}{close.lower()}", place=at)
+
+
+def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
+    """The parts of an expression, and whether each has to be a location."""
+    if isinstance(expression, Apply):
+        slots = forms.FUNCTIONS[expression.function].slots
+        return [
+            (argument, slots[min(i, len(slots) - 1)].kind)
+            for i, argument in enumerate(expression.arguments)
+            if argument is not None and argument in walk.children(expression)
+        ]
+    kind: Kind = "real" if isinstance(expression, Variable) else "frame"
+    located = kinds.kind_of(expression, {}) == "frame"
+    return [(child, kind if located else "real") for child in walk.children(expression)]
+
+
+def _given(statement: Statement) -> str:
+    """What a statement sets names to: a real, a location, or either."""
+    match statement:
+        case Assign() | For() | Decompose():
+            return "real"
+        case Set(_, value):
+            return "frame" if kinds.kind_of(value, {}) == "frame" else ""
+        case Instruction("HERE"):
+            return "frame"
+    return ""
+
+
+def _passed(argument: Expression, parameter: Variable) -> Iterator[ValError]:
+    kind = kinds.kind_of(argument, {})
+    wanted = {"$": "string", "#": kinds.POINT}.get(parameter.prefix)
+    if kind and (kind != wanted if wanted else kind in ("string", kinds.POINT)):
+        yield ValError("Mixed types", f"an argument for {parameter.name}", place=argument.at)
+
+
+def _constant(expression: Expression | None) -> float | None:
+    """The value of a number that is written down."""
+    match expression:
+        case Number(value):
+            return value
+        case Unary("-", Number(value)):
+            return -value
+    return None
+
+
+_RANGES: Final[dict[tuple[str, int], tuple[float, float, str]]] = {
+    ("DRIVE", 0): (1, 6, "a joint, 1 to 6"),
+    ("DELAY", 0): (0, 1e6, "seconds, not negative"),
+    ("DURATION", 0): (0, 1e6, "seconds, not negative"),
+    ("WAIT.EVENT", 1): (0, 1e6, "seconds, not negative"),
+    ("SPEED", 0): (1e-3, 1e6, "a speed above 0"),
+    ("AT", 0): (0, 1e9, "seconds, not negative"),
+}
+_SIGNALS: Final = (range(1, 33), range(1001, 1033), range(2001, 2033))
+
+
+def _numbers(statement: Statement) -> Iterator[ValError]:
+    """Numbers that are written down and can't be."""
+    if not isinstance(statement, Instruction):
+        return
+    for i, operand in enumerate(statement.operands):
+        value = _constant(operand)
+        if value is None or operand is None:
+            continue
+        low, high, allowed = _RANGES.get((statement.keyword, i), (-1e300, 1e300, ""))
+        if not low <= value <= high:
+            yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
+        if statement.keyword == "SIGNAL" and not any(abs(value) in r for r in (*_SIGNALS[::2], (0.0,))):
+            yield ValError("Illegal digital signal", "allowed: 1 to 32, 2001 to 2032", place=operand.at)
+        if statement.keyword == "PARAMETER":
+            row = forms.PARAMETERS[statement.words[0]]
+            if not row.low <= value <= row.high:
+                allowed = f"{row.low:g} to {row.high:g} {row.unit}"
+                yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
+
+
+def _alike_names(text: str) -> Iterator[Finding]:
+    """Names that differ only where names don't count any more."""
+    first: dict[str, str] = {}
+    try:
+        lines = lines_of(text)
+    except ValError:
+        return
+    for number, line in enumerate(lines, 1):
+        try:
+            code, _ = split_comment(line, number)
+        except ValError:
+            continue
+        for found in _WORD.finditer(code):
+            name = found[0].lower()
+            counted = name[: SIGNIFICANT + (name[0] in "#$")]
+            if name[0] == '"' or len(counted) < SIGNIFICANT:
+                continue
+            other = first.setdefault(counted, name)
+            if other != name:
+                detail = f"{name} is the same as {other}: {SIGNIFICANT} characters count"
+                first[counted] = name
+                yield _warning(ValError("Long names", detail, place=Place(number, found.start() + 1)))

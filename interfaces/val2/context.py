@@ -1,0 +1,197 @@
+"""What running programs share: memory, arm, signals, switches, parameters, timers, and what they want done."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Generator, MutableMapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+from interfaces.val2.errors import Place, ValError
+from interfaces.val2.events import Event, SignalChanged, Warned
+from interfaces.val2.forms import PARAMETERS, SWITCHES
+from interfaces.val2.memory import Memory, where
+from interfaces.val2.ports import ArmPort
+from interfaces.val2.reactions import Reactions
+from interfaces.val2.signals import Signals
+from interfaces.val2.syntax import NOWHERE
+
+if TYPE_CHECKING:
+    from interfaces.val2.compiler import Code
+
+SPECIAL: Final = -1
+"""What a step returns instead of the next step's index when `Context.pending` holds what is to be done."""
+DEAR: Final = 9
+TIMERS: Final = range(16)
+SLICE: Final = 0.016
+"""How often a wait looks at what changes with time alone [s]: V+'s cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Invoke:
+    """Call a program."""
+
+    code: Code
+    slots: list[Any]
+    following: int
+    """The caller's step after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """RETURN, or the end of a program."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """End the cycle (`STOP`, `END`), or for good (`HALT`), once the arm stands."""
+
+    word: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """The cycle, or the program, has ended."""
+
+    word: str
+
+
+@dataclass(frozen=True, slots=True)
+class Suspend:
+    """PAUSE before a step."""
+
+    step: int
+    """Index of the step to go on with."""
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Wait; the generator yields when it wants to be asked again, and returns the next step's index."""
+
+    process: Wait
+    interruptible: bool = False
+    """Whether a reaction may come in between, and the wait goes on after it."""
+
+
+ARM: Final = -1.0
+"""What a wait yields for the arm's own deadline."""
+Wait: TypeAlias = Generator[float, None, "int | Finished | Suspend"]
+Action: TypeAlias = "Invoke | Leave | Finish | Finished | Suspend | Waiting | int"
+"""What a special step wants done; a number is the next step's index, after reactions have been looked at."""
+
+
+@dataclass(slots=True)
+class Context:
+    """What the closures of compiled programs reach out to."""
+
+    arm: ArmPort
+    memory: Memory = field(default_factory=Memory)
+    signals: Signals = field(default_factory=Signals)
+    reactions: Reactions = field(default_factory=Reactions)
+    switches: dict[str, bool] = field(default_factory=lambda: {s.name: s.default for s in SWITCHES.values()})
+    parameters: MutableMapping[str, float] = field(
+        default_factory=lambda: {p.name: p.default for p in PARAMETERS.values()}
+    )
+    rng: random.Random = field(default_factory=lambda: random.Random(0))  # noqa: S311
+    now: float = 0.0
+    timers: list[float] = field(default_factory=lambda: [0.0] * len(TIMERS))
+    """When each was 0."""
+    events: deque[Event] = field(default_factory=deque)
+    pending: Action = 0
+    stop_first: bool = False
+    """Whether the next motion begins at rest: a configuration was asked for."""
+    charged: int = 0
+    """Steps for which a dear one stands in addition."""
+    dropped: int = 0
+    """How often a REACTI braked before the motion that was asked for last had begun."""
+    asking: bool = False
+    """Whether a PROMPT waits for a line."""
+    answers: deque[str] = field(default_factory=lambda: deque(maxlen=1))
+    """The line that answers a PROMPT."""
+
+    compiled: dict[str, Code] = field(default_factory=dict)
+    """Programs that were compiled, by name."""
+    warned: set[Warned] = field(default_factory=set)
+
+    def code(self, name: str, at: Place = NOWHERE) -> Code:
+        """A program, compiled anew where it was changed.
+
+        Raises:
+            ValError: If there's none, or its structures don't match.
+        """
+        from interfaces.val2.compiler import compiled
+
+        program = self.memory.programs.get(name)
+        if program is None:
+            raise ValError("Undefined program name", name, place=where(at))
+        code = self.compiled.get(name)
+        if code is None or code.program is not program:
+            code = self.compiled[name] = compiled(program, self)
+        return code
+
+    def go_on(self, following: int) -> int:
+        """Go on after a dear step: one of locations or text, which takes as long as ten others."""
+        self.charged += DEAR
+        self.pending = following
+        return SPECIAL
+
+    def notice(self) -> bool:
+        """Tell of the signals that have turned, and let the program react to them; whether there are any."""
+        changes = self.signals.changes()
+        for number, on in changes:
+            self.events.append(SignalChanged(number, on))
+            self.reactions.notice(number, on)
+        return bool(changes)
+
+    def warn(self, warning: Warned) -> None:
+        """Warn, once an EXECUTE."""
+        if warning not in self.warned:
+            self.warned.add(warning)
+            self.events.append(warning)
+
+    def timer(self, number: float) -> int:
+        """The index of a timer.
+
+        Raises:
+            ValError: If there's no such timer.
+        """
+        if number not in TIMERS:
+            raise ValError("Illegal timer number", f"{number:.9g}: 0 to {TIMERS[-1]}")
+        return int(number)
+
+    def switch(self, name: str, on: bool) -> None:
+        """ENABLE or DISABLE.
+
+        Raises:
+            ValError: If there's no such switch.
+        """
+        if name not in self.switches:
+            raise ValError("Unknown switch", f"{name}: one of {', '.join(sorted(self.switches))}")
+        if name == "CP":
+            self.arm.set_continuous_path(on)
+        elif name == "DRY.RUN":
+            self.arm.set_dry_run(on)
+        self.switches[name] = on
+
+    def parameter(self, name: str, value: float) -> None:
+        """PARAMETER: set one.
+
+        Raises:
+            ValError: If there's no such parameter, or the value is out of its range.
+        """
+        if name not in self.parameters or name not in PARAMETERS:
+            raise ValError("Unknown parameter", f"{name}: one of {', '.join(sorted(self.parameters))}")
+        least, most = PARAMETERS[name].low, PARAMETERS[name].high
+        if not least <= value <= most:
+            raise ValError("Illegal value", f"{name} {value:.9g}: {least:g} to {most:g}")
+        self.parameters[name] = value
+
+    def powered(self) -> None:
+        """Motions ask this first.
+
+        Raises:
+            ValError: If POWER is off.
+        """
+        if not self.switches["POWER"]:
+            raise ValError("Arm power off")

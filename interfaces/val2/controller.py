@@ -1,0 +1,368 @@
+"""The controller: memory, signals and an arm, and the program that runs on them.
+
+It's a state machine: whoever drives it calls `advance` with the time, now and at `next_deadline`. What programs and
+commands bring about comes out of `advance` alone, so that several monitors may look at one controller.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import MutableMapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from interfaces.val2.alone import meanwhile, stray
+from interfaces.val2.compiler import compiled
+from interfaces.val2.context import Context
+from interfaces.val2.errors import ValError
+from interfaces.val2.events import Event, Failed
+from interfaces.val2.expressions import Expressions
+from interfaces.val2.interpreter import State, Task
+from interfaces.val2.memory import LONGEST_STRING, Memory, Slot
+from interfaces.val2.ports import ArmPort
+from interfaces.val2.signals import Rule, Signals
+from interfaces.val2.source import SignalRule
+from interfaces.val2.syntax import (
+    Expression,
+    Program,
+    Step,
+    Variable,
+)  # fmt: skip
+from interfaces.val2.values import Value
+
+STATEMENT: Final = 2e-6
+"""Session time that a step of computing takes [s]."""
+TURN: Final = 500
+"""Steps that are done at once; then time passes."""
+MOST_AT_ONCE: Final = 2_500
+"""Where the driver is late, some of what was missed is caught up with: never more steps than these."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What STATUS shows."""
+
+    state: State
+    program: str = ""
+    """Where it runs or stands: the innermost call."""
+    step: int = 0
+    """From 1; of a paused program the one that it stands at."""
+    cycles_left: int = 0
+    """With the present one; negative for ever."""
+    stack: tuple[tuple[str, int], ...] = ()
+    """Programs and steps, outermost first."""
+    word: str = ""
+    """Why it stands: PAUSE, ABORT, XSTEP or ERROR; or how it ended."""
+
+
+class Controller:
+    """One controller."""
+
+    def __init__(
+        self,
+        arm: ArmPort,
+        *,
+        memory: Memory | None = None,
+        parameters: MutableMapping[str, float] | None = None,
+        rng: random.Random | None = None,
+        now: float = 0.0,
+    ) -> None:
+        """Join what a controller needs.
+
+        Args:
+            arm: What moves.
+            memory: Programs and variables; an empty one by default.
+            parameters: Shared with the arm where it reads some; those that are missing are added.
+            rng: Of RANDOM.
+            now: Session time [s]; timers begin here.
+        """
+        self.context = Context(arm, memory or Memory(), now=now)
+        if rng is not None:
+            self.context.rng = rng
+        if parameters is not None:
+            for name, value in self.context.parameters.items():
+                parameters.setdefault(name, value)
+            self.context.parameters = parameters
+        self.context.timers = [now] * len(self.context.timers)
+        self.cell: tuple[SignalRule, ...] = ()
+        """What sets the inputs; begins anew at every EXECUTE."""
+        self._program: Task | None = None
+        self._do: Task | None = None
+        self._busy = now
+        self._due = False
+
+    @property
+    def arm(self) -> ArmPort:
+        """What moves."""
+        return self.context.arm
+
+    @property
+    def memory(self) -> Memory:
+        """Programs and variables."""
+        return self.context.memory
+
+    @property
+    def signals(self) -> Signals:
+        """Digital signals."""
+        return self.context.signals
+
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Switches by name; `switch` turns them."""
+        return self.context.switches
+
+    @property
+    def parameters(self) -> MutableMapping[str, float]:
+        """Parameters by name."""
+        return self.context.parameters
+
+    @property
+    def running(self) -> bool:
+        """Whether a program runs."""
+        return self._program is not None and self._program.state is State.RUNNING
+
+    @property
+    def doing(self) -> bool:
+        """Whether a DO is under way."""
+        return self._do is not None
+
+    @property
+    def asking(self) -> bool:
+        """Whether a PROMPT waits for a line."""
+        return self.context.asking
+
+    def status(self) -> Status:
+        """What the program does."""
+        task = self._program
+        if task is None:
+            return Status(State.IDLE)
+        stack = tuple((f.name, f.step) for f in task.frames)
+        return Status(task.state, *stack[-1], task.cycles, stack, task.word)
+
+    # Commands.
+
+    def execute(
+        self, name: str, arguments: Sequence[Expression] = (), *, cycles: int = 1, step: int = 1, now: float
+    ) -> None:
+        """EXECUTE: run a program.
+
+        Args:
+            name: The program.
+            arguments: Names by reference, other expressions by value.
+            cycles: How often; negative for ever.
+            step: First step, from 1.
+            now: Session time [s].
+
+        Raises:
+            ValError: If one runs, or this one is missing or not right.
+        """
+        self._begin(name, arguments, cycles=cycles, step=step, single=False, now=now)
+
+    def _begin(
+        self, name: str, arguments: Sequence[Expression], *, cycles: int, step: int, single: bool, now: float
+    ) -> None:
+        self._free()
+        context = self.context
+        context.now = max(now, context.now)
+        code = context.code(name)
+        x = Expressions(context)
+        slots = [x.reference(a)([]) if isinstance(a, Variable) else Slot(x.value(a)([])) for a in arguments]
+        task = Task(context, code, slots, cycles=cycles, step=step, single=single)
+        rules = [self._rule(r) for r in self.cell]
+        self.arm.begin_program()
+        context.reactions.clear()
+        context.warned.clear()
+        context.stop_first = False
+        self._program, self._due = task, True
+        self.signals.begin(rules, now=context.now)
+
+    def _rule(self, rule: SignalRule) -> Rule:
+        test = Expressions(self.context).condition(rule.value)
+
+        def holds() -> bool:
+            try:
+                return test([])
+            except ValError:
+                return False
+
+        return Rule(rule.signal, holds, rule.after, rule.lasting, rule.at_time)
+
+    def do(self, step: Step, *, now: float) -> None:
+        """DO: one step. While a program runs: those alone that take no time.
+
+        Raises:
+            ValError: If it can't stand alone, or must not now; what goes wrong while it's done is an event.
+        """
+        if (misplaced := stray(step, step.at)) is not None:
+            raise misplaced
+        if self._do is not None or (self.running and not meanwhile(step)):
+            raise ValError("Program already running")
+        self.context.now = max(now, self.context.now)
+        code = compiled(Program("", (), (step,)), self.context)
+        if not self.running:
+            self._do, self._due = Task(self.context, code, [], cycles=1), True
+            return
+        try:
+            code.steps[0](code.slots([]))
+        except ValError as error:
+            self.context.events.append(Failed(error))
+        self._due = True
+
+    def let_go(self, *, now: float) -> None:
+        """End a DO whose motion is accepted but begins later, without waiting for it; else nothing."""
+        context = self.context
+        context.now = max(now, context.now)
+        if self._do is None or context.asking:
+            return
+        try:
+            scheduled = self.arm.answered(now=context.now) and not self.arm.ready(now=context.now)
+            word = "DO"
+        except ValError as error:
+            context.events.append(Failed(error))
+            scheduled, word = True, "ERROR"
+        if scheduled:
+            self._do.end(word)
+            self._do = None
+            self._due = True
+
+    def abort(self, *, now: float) -> None:
+        """ABORT: the arm brakes within its limits; a program stands, and can go on; a DO is over."""
+        context = self.context
+        context.now = max(now, context.now)
+        if self._do is not None:
+            self._do.end("ABORT")
+            self._do = None
+        elif self._program is not None and self.running:
+            self._program.pause("ABORT")
+        self._due = True
+        self.arm.brake(now=context.now)
+
+    def proceed(self, *, now: float) -> None:
+        """PROCEED: go on, with the next step where one was given up.
+
+        Raises:
+            ValError: If there's nothing to go on with.
+        """
+        task = self._paused(now)
+        task.go_on(again=False)
+
+    def retry(self, *, now: float) -> None:
+        """RETRY: go on, with the motion and the step that were given up.
+
+        Raises:
+            ValError: If there's nothing to go on with.
+        """
+        task = self._paused(now)
+        self.arm.retry(now=self.context.now)
+        task.go_on(again=True)
+
+    def xstep(self, name: str | None = None, *, cycles: int = 1, step: int = 1, now: float) -> None:
+        """XSTEP: one step of a paused program, or the first step of another one.
+
+        Raises:
+            ValError: As `execute` and `proceed`.
+        """
+        if name is None:
+            self._paused(now).go_on(again=False, single=True)
+        else:
+            self._begin(name, (), cycles=cycles, step=step, single=True, now=now)
+
+    def answer(self, text: str, *, now: float) -> None:
+        """A line for the PROMPT that asked.
+
+        Raises:
+            ValError: If none asks.
+        """
+        if not self.asking:
+            raise ValError("No program asks")
+        self.context.now = max(now, self.context.now)
+        self.context.answers.append(text[:LONGEST_STRING])
+        self._due = True
+
+    def switch(self, name: str, on: bool) -> None:
+        """ENABLE or DISABLE.
+
+        Raises:
+            ValError: If there's no such switch.
+        """
+        self.context.switch(name, on)
+
+    def evaluate(self, expression: Expression, *, now: float) -> Value:
+        """The value of an expression.
+
+        Raises:
+            ValError: If it has none.
+        """
+        self.context.now = max(now, self.context.now)
+        return Expressions(self.context).value(expression)([])
+
+    def forget(self) -> None:
+        """ZERO: no program, no variables; outputs off.
+
+        Raises:
+            ValError: If a program runs.
+        """
+        self._free()
+        self._program = None
+        self.memory.clear()
+        self.context.compiled.clear()
+        self.signals.reset()
+        self._due = True
+
+    def _free(self) -> None:
+        if self.running or self._do is not None:
+            raise ValError("Program already running")
+
+    def _paused(self, now: float) -> Task:
+        self._free()
+        if self._program is None or self._program.state is not State.PAUSED:
+            raise ValError("No program to proceed")
+        self.context.now = max(now, self.context.now)
+        self._due = True
+        return self._program
+
+    # Time.
+
+    def _active(self) -> Task | None:
+        return self._do or (self._program if self.running else None)
+
+    def advance(self, *, now: float) -> tuple[Event, ...]:
+        """Let time come to now.
+
+        Args:
+            now: Session time [s]; it doesn't go back.
+
+        Returns:
+            What has happened, oldest first.
+        """
+        context = self.context
+        context.now = now = max(now, context.now)
+        context.signals.advance(now=now)
+        self._due |= context.notice()
+        task = self._active()
+        if task is None:
+            self._due = False
+        elif self._busy <= now:
+            self._due = False
+            start = now if task.waiting else max(self._busy, now - (MOST_AT_ONCE - TURN) * STATEMENT)
+            done = task.run(TURN + round((now - start) / STATEMENT))
+            self._busy = start + done * STATEMENT
+            context.signals.advance(now=now)
+            self._due |= context.notice()
+            if task is self._do and task.state is not State.RUNNING:
+                self._do = None
+        events = tuple(context.events)
+        context.events.clear()
+        return events
+
+    def next_deadline(self) -> float:
+        """When `advance` has something to do [s]: a time that is over for at once, infinity for never."""
+        if self.context.events or self.signals.changed:
+            return self.context.now
+        task = self._active()
+        if task is None:
+            wanted = self.context.now if self._due else math.inf
+        else:
+            wanted = max(self._busy, task.next_deadline() if task.waiting and not self._due else self._busy)
+        return min(wanted, self.signals.next_deadline())

@@ -1,0 +1,306 @@
+"""Every word of the language: how it's written, what it does in a line, and whose it is.
+
+The parser, the checker, the lexer, the monitor's help and its completion, and the reference in docs/val2.md
+read these tables.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from interfaces.val2.slots import Form, Function, Parameter, Switch, form, function
+
+_MOTION: Final = (
+    form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", "motion"),
+    form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", "motion"),
+    form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL", "motion"),
+    form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL", "motion"),
+    form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
+         "VAL", "motion"),
+    form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL", "motion"),
+    form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.",
+         "VAL", "motion"),
+    form("DEPARTS", "distance", "DEPART on a straight line.", "VAL", "motion"),
+    form("DRIVE", "joint, change, speed", "Turn one joint by a change [deg] at a speed [%].", "VAL", "motion"),
+    form("DRAW", "dx?, dy?, dz?", "Move straight by a way in world axes [mm].", "VAL", "motion"),
+    form("READY", "", "Move to the ready position: the arm straight up.", "VAL", "motion"),
+    form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II", "motion"),
+    form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL", "motion"),
+    form("DELAY", "seconds", "Stand still for a time, as a motion.", "VAL", "motion"),
+    form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", "motion"),
+    form("BRAKE", "", "Stop the present motion at once.", "V+", "motion"),
+    form("AT", "time", "The next motion begins at a time of the session [s].", "ours", "motion"),
+)  # fmt: skip
+
+_SETTINGS: Final = (
+    form("SPEED", "speed, turning?", "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.",
+         "VAL", "setting", words="MMPS|IPS|MONITOR ALWAYS"),
+    form("ACCEL", "up, down?", "Accelerations: [%] of the nominal.", "V+", "setting"),
+    form("DURATION", "seconds", "Shortest time of the next motion; ALWAYS: each.", "V+", "setting", words="ALWAYS"),
+    form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", "setting", words="ALWAYS"),
+    form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", "setting", words="ALWAYS"),
+    form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL", "setting",
+         words="ALWAYS"),
+    form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL", "setting",
+         words="ALWAYS"),
+    form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", "setting"),
+    form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", "setting"),
+    form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", "setting"),
+    form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", "setting"),
+    form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", "setting"),
+    form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", "setting"),
+    form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
+         "setting"),
+    form("BASE", "dx?, dy?, dz?, turn?", "Where the world is: a shift [mm] and a turn about z [deg].", "VAL",
+         "setting"),
+    form("ENABLE", "", "Turn switches on.", "VAL", "setting", usage="ENABLE switch, .."),
+    form("DISABLE", "", "Turn switches off.", "VAL", "setting", usage="DISABLE switch, .."),
+    form("PARAMETER", "value", "Set a parameter.", "VAL-II", "setting", usage="PARAMETER name = value"),
+    form("ALTER", "channel?, mode?, dx?, dy?, dz?, rx?, ry?, rz?",
+         "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", "setting",
+         usage="ALTER (channel) mode"),
+    form("ALTOUT", "dx?, dy?, dz?, rx?, ry?, rz?", "Correct the path by a way [mm] and turns [deg].", "VAL-II",
+         "setting"),
+    form("NOALTER", "", "Corrections of the path end.", "VAL-II", "setting"),
+    form("ALTON", "channel?, mode?", "As ALTER.", "V+", "setting", usage="ALTON (channel) mode"),
+    form("ALTOFF", "", "As NOALTER.", "V+", "setting"),
+)  # fmt: skip
+
+_HAND: Final = (
+    form("OPEN", "", "Open the hand with the next motion.", "VAL", "hand"),
+    form("CLOSE", "", "Close the hand with the next motion.", "VAL", "hand"),
+    form("RELAX", "", "Let the hand go slack with the next motion.", "VAL", "hand"),
+    form("OPENI", "", "Open the hand now, where the arm stands.", "VAL", "hand"),
+    form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL", "hand"),
+    form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL", "hand"),
+    form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
+         "hand"),
+)  # fmt: skip
+
+_LOCATIONS: Final = (
+    form("SET", "variable:variable, location:location", "Assign a location.", "VAL", "location",
+         usage="SET variable = location", own=True),
+    form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", "location"),
+    form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
+         "V+", "location", usage="DECOMPOSE array[first] = location", own=True),
+    form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", "location",
+         usage="SHIFT variable BY dx, dy, dz", own=True),
+)  # fmt: skip
+
+_SIGNALS: Final = (
+    form("SIGNAL", "number*", "Turn outputs on, or off where negative.", "VAL", "signal"),
+    form("RESET", "", "Turn all outputs off.", "V+", "signal"),
+    form("WAIT", "condition?", "Wait until a condition holds.", "VAL", "signal"),
+    form("WAIT.EVENT", "mask?, seconds?", "Wait for a time.", "V+", "signal"),
+    form("TIMER", "number, seconds", "Set a timer.", "VAL-II", "signal", usage="TIMER number = seconds"),
+    form("REACT", "signal, program:program?", "Call a program after the present step when a signal turns on.",
+         "VAL", "signal", words="ALWAYS", own=True),
+    form("REACTI", "signal, program:program?", "REACT, stopping the present motion at once.", "VAL", "signal",
+         words="ALWAYS", own=True),
+    form("IGNORE", "signal", "Don't react to a signal any more.", "VAL", "signal"),
+)  # fmt: skip
+
+_CONTROL: Final = (
+    form("IF", "condition", "Do steps if a condition holds.", "VAL", "control", own=True,
+         usage="IF condition THEN .. ELSE .. END, IF condition GOTO label"),
+    form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", "control", own=True),
+    form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", "control", own=True),
+    form("WHILE", "condition", "Repeat steps as long as a condition holds.", "VAL-II", "control", own=True,
+         usage="WHILE condition DO .. END"),
+    form("DO", "", "Repeat steps until a condition holds.", "VAL-II", "control", own=True,
+         usage="DO .. UNTIL condition"),
+    form("UNTIL", "condition", "The end of DO.", "VAL-II", "control", own=True),
+    form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", "control", own=True,
+         usage="FOR variable = start TO stop [STEP step] .. END"),
+    form("CASE", "value", "Do the steps of one of several values.", "VAL-II", "control", own=True,
+         usage="CASE value OF .. END"),
+    form("VALUE", "value*", "What of a CASE is done for these values.", "VAL-II", "control", own=True,
+         usage="VALUE value, ..:"),
+    form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", "control", own=True),
+    form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", "control", own=True),
+    form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", "control", own=True),
+    form("GOTO", "label:label", "Go on at a label.", "VAL", "control", own=True),
+    form("CALL", "program:program, argument:any?*", "Call a program; arguments by reference.", "VAL-II", "control",
+         own=True, usage="CALL program(argument, ..)"),
+    form("GOSUB", "program:program", "Call a program.", "VAL", "control", own=True),
+    form("RETURN", "", "Go back to the program that called.", "VAL", "control", own=True),
+    form("PAUSE", "", "Pause until PROCEED.", "VAL", "control"),
+    form("STOP", "", "End this cycle of the program.", "VAL", "control"),
+    form("HALT", "", "End the program, whatever cycles are left.", "VAL", "control"),
+)  # fmt: skip
+
+_DIALOGUE: Final = (
+    form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", "dialogue", own=True),
+    form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", "dialogue",
+         own=True),
+    form("REMARK", "text:text?", "A comment.", "VAL", "dialogue", own=True, usage="REMARK text"),
+    form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", "names", own=True,
+         usage="AUTO [REAL|LOC] name, .."),
+    form("LOCAL", "name:variable*", "Names of this program alone.", "V+", "names", own=True,
+         usage="LOCAL [REAL|LOC] name, .."),
+    form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+", "names", own=True,
+         usage="GLOBAL [REAL|LOC] name, .."),
+)  # fmt: skip
+
+INSTRUCTIONS: Final[dict[str, Form]] = {
+    row.keyword: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
+}
+"""Keywords of a program's lines."""
+
+IGNORED: Final = frozenset((
+    "ABORT", "ATTACH", "BITS", "CLEAR.EVENT", "CYCLE.END", "DETACH", "DISABLE.EVENT", "ENABLE.EVENT", "EXECUTE",
+    "FCLOSE", "FCMND", "FDELETE", "FEMPTY", "FOPEN", "FOPENA", "FOPEND", "FOPENR", "FOPENW", "FSEEK", "FSET",
+    "INTOFF", "INTON", "KILL", "LOCK", "MC", "MULTIPLE", "NOOVERLAP", "OVERLAP", "PRIME", "PROCEED", "REACTE",
+    "READ", "RELEASE", "RETRY", "RETURNE", "RUNSIG", "SELECT", "SET.EVENT", "SINGLE", "UNLOCK", "WEAVE",
+    "WINDOW", "WRITE",
+))  # fmt: skip
+"""Keywords that are recognised but have no meaning here: files, welding, other tasks."""
+
+_REAL_FUNCTIONS: Final = (
+    function("ABS", "x", "real", "Absolute value.", "VAL-II"),
+    function("ASC", "text:string, index?", "real", "Code of a character.", "VAL-II"),
+    function("ATAN2", "y, x", "real", "Angle of a direction [deg].", "VAL-II"),
+    function("BMASK", "bit*", "real", "A number with these bits set, from 1.", "V+"),
+    function("BITS", "first, count?", "real", "Signals from a first one on, as a number.", "V+"),
+    function("COS", "angle", "real", "Cosine of an angle [deg].", "VAL-II"),
+    function("DEFINED", "variable:any", "real", "Whether a variable has a value.", "V+"),
+    function("DISTANCE", "a:location, b:location", "real", "Distance of two locations [mm].", "VAL-II"),
+    function("DX", "a:location", "real", "X of a location [mm].", "VAL-II"),
+    function("DY", "a:location", "real", "Y of a location [mm].", "VAL-II"),
+    function("DZ", "a:location", "real", "Z of a location [mm].", "VAL-II"),
+    function("FRACT", "x", "real", "Fractional part.", "VAL-II"),
+    function("INRANGE", "a:location", "real", "0 if a location can be reached.", "V+"),
+    function("INT", "x", "real", "Integer part.", "VAL-II"),
+    function("LAST", "array:array", "real", "Largest index of an array.", "V+"),
+    function("LEN", "text:string", "real", "Length of a string.", "VAL-II"),
+    function("MAX", "x*", "real", "Largest of values.", "V+"),
+    function("MIN", "x*", "real", "Smallest of values.", "V+"),
+    function("OUTSIDE", "low, x, high", "real", "Whether a value is outside a range.", "V+"),
+    function("PARAMETER", "name:any", "real", "Value of a parameter.", "V+"),
+    function("PI", "", "real", "3.14159..", "VAL-II", constant=True),
+    function("POS", "text:string, part:string, from?", "real", "Where a string has another; 0 for nowhere.", "V+"),
+    function("RANDOM", "", "real", "A random number from 0 to 1.", "V+", constant=True),
+    function("SIG", "number*", "real", "Whether all these signals are on, or off where negative.", "VAL-II"),
+    function("SIGN", "x", "real", "-1 or 1.", "VAL-II"),
+    function("SIN", "angle", "real", "Sine of an angle [deg].", "VAL-II"),
+    function("SPEED", "which", "real", "1: the monitor speed [%].", "V+"),
+    function("SQR", "x", "real", "Square.", "V+"),
+    function("SQRT", "x", "real", "Square root.", "VAL-II"),
+    function("SWITCH", "name:any", "real", "Whether a switch is on.", "V+"),
+    function("TAN", "angle", "real", "Tangent of an angle [deg].", "V+"),
+    function("TIMER", "number", "real", "Seconds since a timer was set to 0.", "VAL-II"),
+    function("VAL", "text:string", "real", "The number that a string begins with.", "VAL-II"),
+    function("TRUE", "", "real", "-1.", "VAL-II", constant=True),
+    function("FALSE", "", "real", "0.", "VAL-II", constant=True),
+    function("ON", "", "real", "-1.", "VAL-II", constant=True),
+    function("OFF", "", "real", "0.", "VAL-II", constant=True),
+)  # fmt: skip
+
+_STRING_FUNCTIONS: Final = (
+    function("$CHR", "code", "string", "The character of a code.", "VAL-II"),
+    function("$DECODE", "$variable:variable, separators:string, mode?", "string",
+             "What stands before, or with mode 1 the run of, separators; it's taken out of the variable.", "V+"),
+    function("$ENCODE", "item:any?*", "string", "What TYPE would print.", "VAL-II"),
+    function("$MID", "text:string, from, length", "string", "Part of a string.", "VAL-II"),
+    function("$TRUNCATE", "text:string", "string", "A string up to its first character of code 0.", "V+"),
+)  # fmt: skip
+
+_LOCATION_FUNCTIONS: Final = (
+    function("TRANS", "x?, y?, z?, o?, a?, t?", "frame", "A transformation [mm, deg]; without angles, no turn.",
+             "VAL-II"),
+    function("SHIFT", "a:frame, dx?, dy?, dz?", "frame", "A location shifted in world axes [mm].", "VAL-II",
+             usage="SHIFT(a BY dx, dy, dz)"),
+    function("INVERSE", "a:frame", "frame", "The transformation back.", "VAL"),
+    function("FRAME", "a:frame, b:frame, c:frame, d:frame", "frame",
+             "A frame at d: x from a to b, c on the side of y.", "VAL"),
+    function("RX", "angle", "frame", "A turn about x [deg].", "V+"),
+    function("RY", "angle", "frame", "A turn about y [deg].", "V+"),
+    function("RZ", "angle", "frame", "A turn about z [deg].", "V+"),
+    function("NULL", "", "frame", "No way and no turn.", "VAL", constant=True),
+    function("HERE", "", "frame", "Where the tool is.", "VAL", constant=True),
+    function("DEST", "", "frame", "Where the tool goes.", "VAL-II", constant=True),
+    function("#PPOINT", "j1?, j2?, j3?, j4?, j5?, j6?", "location", "A precision point [deg].", "VAL-II"),
+    function("#HERE", "", "location", "Where the arm is, as a precision point.", "ours", constant=True),
+    function("#DEST", "", "location", "Where the arm goes, as a precision point.", "V+", constant=True),
+)  # fmt: skip
+
+_IDLE_FUNCTIONS: Final = (
+    function("IOSTAT", "lun:any, mode:any?", "real", "State of a file.", "V+", idle=True),
+    function("GETC", "lun:any, mode:any?", "real", "A character of a file.", "V+", idle=True),
+    function("LNGB", "text:string, from:any?", "real", "An integer of bytes.", "V+", idle=True),
+    function("FLTB", "text:string, from:any?", "real", "A number of bytes.", "V+", idle=True),
+    function("TASK", "mode:any?, number:any?", "real", "State of a task.", "V+", idle=True),
+    function("$ERROR", "code:any", "string", "Text of an error.", "V+", idle=True),
+    function("$LNGB", "value:any", "string", "Bytes of an integer.", "V+", idle=True),
+    function("$FLTB", "value:any", "string", "Bytes of a number.", "V+", idle=True),
+)  # fmt: skip
+
+FUNCTIONS: Final[dict[str, Function]] = {
+    row.name: row for row in (*_REAL_FUNCTIONS, *_STRING_FUNCTIONS, *_LOCATION_FUNCTIONS, *_IDLE_FUNCTIONS)
+}
+"""Functions and constants, with their prefixes."""
+
+ALIASES: Final = {"PPOINT": "#PPOINT", "#PDEST": "#DEST", "#PHERE": "#HERE"}
+"""Other spellings of functions, and what they become."""
+
+CONSTANTS: Final = frozenset([name for name, row in FUNCTIONS.items() if row.constant] + ["#PDEST", "#PHERE"])
+"""What may be written without parentheses, and so can't be a variable's name."""
+
+OPERATORS: Final = {
+    "AND": "Both hold.", "OR": "One holds, or both.", "XOR": "One holds, not both.", "NOT": "It doesn't hold.",
+    "BAND": "Bits of both.", "BOR": "Bits of either.", "BXOR": "Bits that differ.", "COM": "All bits turned.",
+    "MOD": "Rest of a division.",
+}  # fmt: skip
+"""Operators that are words."""
+
+LEVELS: Final = {
+    "OR": 1, "XOR": 1, "AND": 2, "==": 4, "<>": 4, "<": 4, "<=": 4, ">": 4, ">=": 4,
+    "+": 5, "-": 5, "BOR": 5, "BXOR": 5, "*": 6, "/": 6, "MOD": 6, "BAND": 6, "^": 8,
+}  # fmt: skip
+"""How tightly operators bind; of one level, from left to right."""
+LEVEL_OF_NOT: Final = 3
+LEVEL_OF_SIGN: Final = 7
+"""Of `-` and `COM` before an operand."""
+
+WORDS: Final = {
+    "ALWAYS": "Not for the next motion alone, but until it's changed.",
+    "MMPS": "Speed in millimetres a second.",
+    "IPS": "Speed in inches a second.",
+    "MONITOR": "The monitor speed, which stretches time.",
+    "THEN": "Of IF: the steps up to ELSE or END.",
+    "GOTO": "Go on at a label.",
+    "TO": "Of FOR: the last value.",
+    "STEP": "Of FOR: what is added each time.",
+    "DO": "Of WHILE: the steps up to END.",
+    "OF": "Of CASE: the values up to END.",
+    "BY": "Of SHIFT: how far.",
+}
+"""Words within a line."""
+
+FORMATS: Final = {
+    "B": "A bell.", "C": "New lines.", "D": "A number as it is.", "E": "A number with an exponent.",
+    "F": "A number with decimals.", "G": "/F or /E, whichever fits.", "H": "An integer, base 16.",
+    "I": "An integer.", "O": "An integer, base 8.", "S": "No new line at the end.", "U": "Lines up.",
+    "X": "Blanks.",
+}  # fmt: skip
+"""Control items of TYPE and $ENCODE."""
+
+SWITCHES: Final[dict[str, Switch]] = {
+    row.name: row
+    for row in (
+        Switch("CP", True, "Continuous path: motions go round their destinations.", "VAL-II"),
+        Switch("DRY.RUN", False, "Programs run without motion.", "V+"),
+        Switch("MESSAGES", True, "TYPE prints.", "VAL-II"),
+        Switch("POWER", True, "The arm has power.", "V+"),
+    )
+}
+"""What ENABLE and DISABLE turn."""
+
+PARAMETERS: Final[dict[str, Parameter]] = {
+    row.name: row
+    for row in (
+        Parameter("HAND.TIME", 0.05, 0.0, 60.0, "s", "How long OPENI, CLOSEI and RELAXI take.", "VAL-II"),
+        Parameter("HAND.LOAD", 0.0, 0.0, 20.0, "kg", "What the real hand holds while it's closed.", "ours"),
+    )
+}
+"""What PARAMETER sets."""

@@ -1,0 +1,189 @@
+"""Instructions, a keyword with operands each, as closures: what moves the arm, and what sets or asks something.
+
+Operands are evaluated before anything is asked. A motion waits until the one before it has begun, is asked for, and
+the program goes on when it has begun: it's then on its way while the next one is asked for, which may go round its
+destination. RIGHTY and its like let the next motion begin at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import Any, Final, TypeAlias
+
+from interfaces.val2.context import ARM, SLICE, SPECIAL, Action, Context, Finish, Suspend, Waiting
+from interfaces.val2.errors import ValError
+from interfaces.val2.expressions import Expressions
+from interfaces.val2.memory import where
+from interfaces.val2.motions import MOTIONS
+from interfaces.val2.operands import Ask, Operands
+from interfaces.val2.operations import Slots
+from interfaces.val2.settings import AT_ONCE, AT_REST
+from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Instruction, Number, Unary, Variable
+
+StepFunction: TypeAlias = Callable[[Slots], int]
+"""Does a step and returns the next one's index, or SPECIAL."""
+Pause: TypeAlias = Generator[float, None, None]
+_CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "HAND", "RANDOM", "SPEED", "TOOL", "BASE"}
+"""Functions whose values change with time alone."""
+
+
+def begun(context: Context) -> Pause:
+    """Wait until what was asked is answered, and the last motion has begun.
+
+    Raises:
+        ValError: If it was refused.
+    """
+    arm = context.arm
+    while not arm.answered(now=context.now) or not arm.ready(now=context.now):
+        yield ARM
+
+
+def settled(context: Context) -> Pause:
+    """Wait until what was asked is answered, and the arm stands.
+
+    Raises:
+        ValError: If it was refused.
+    """
+    arm = context.arm
+    while not arm.answered(now=context.now) or not arm.settled(now=context.now):
+        yield ARM
+
+
+def _special(context: Context, action: Action) -> int:
+    context.pending = action
+    return SPECIAL
+
+
+def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None, int]:
+    """Ask for a motion, and wait until it has begun; what a REACTI dropped before it began is asked for again."""
+    while True:
+        yield from settled(context) if context.stop_first else begun(context)
+        context.powered()
+        ask()
+        context.stop_first = False
+        dropped = context.dropped
+        yield from begun(context)
+        if context.dropped == dropped:
+            return following
+
+
+def _standing(context: Context, ask: Ask | None, following: Any) -> Generator[float, None, Any]:
+    """Wait for the arm to stand, ask, and wait again."""
+    yield from settled(context)
+    if ask is not None:
+        ask()
+        yield from settled(context)
+    return following
+
+
+def _changes(e: Expression | object) -> bool:
+    """Whether the value of an expression changes with time alone."""
+    match e:
+        case Apply(function, arguments):
+            return function in _CHANGING or any(_changes(a) for a in arguments)
+        case Unary(_, operand):
+            return _changes(operand)
+        case Binary(_, left, right):
+            return _changes(left) or _changes(right)
+        case Compound(parts) | Variable(_, parts):
+            return any(_changes(p) for p in parts)
+        case _:
+            return False
+
+
+def _condition(o: Operands) -> Callable[[Slots], bool]:
+    """WAIT's; a bare number is a signal's, as in VAL."""
+    e = o.expression(0)
+    number = e.operand if isinstance(e, Unary) and e.operator == "-" else e
+    return o.x.condition(Apply("SIG", (e,), e.at) if isinstance(number, Number) else e)
+
+
+def _wait(o: Operands, c: Context, following: int) -> StepFunction:
+    if not o.present(0):
+        return _sleep(o, c, following)
+    test = _condition(o)
+    polled = _changes(o.given[0])
+
+    def waiting(s: Slots) -> Generator[float, None, int]:
+        while not test(s):
+            yield c.now + SLICE if polled else float("inf")
+        return following
+
+    return lambda s: _special(c, Waiting(waiting(s), interruptible=True))
+
+
+def _sleep(o: Operands, c: Context, following: int) -> StepFunction:
+    """WAIT alone: a slice; WAIT.EVENT: a time, or for ever, as there are no other programs to send events."""
+    seconds = o.real(1, float("inf")) if o.instruction.keyword == "WAIT.EVENT" else o.real(0, SLICE)
+
+    def waiting(until: float) -> Generator[float, None, int]:
+        while c.now < until:
+            yield until
+        return following
+
+    return lambda s: _special(c, Waiting(waiting(c.now + seconds(s)), interruptible=True))
+
+
+def _grasp(o: Operands, c: Context, following: int, label: int | None) -> StepFunction:
+    least = o.real(0)
+
+    def grasping(opening: float) -> Generator[float, None, int]:
+        yield from _standing(c, lambda: c.arm.actuate(False, now=c.now), None)
+        if c.arm.here(now=c.now).hand >= opening:
+            return following
+        if label is None:
+            raise ValError("Nothing in the hand", f"it's open by less than {opening:.9g} mm")
+        return label
+
+    return lambda s: _special(c, Waiting(grasping(least(s))))
+
+
+def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) -> StepFunction:
+    """The closure of an instruction.
+
+    Args:
+        x: Of the program.
+        i: The instruction.
+        index: Of its step.
+        jump: Index of the step to which its label leads, if it has one.
+
+    Raises:
+        ValError: If there's none of this keyword, or an operand is missing or of a wrong type.
+    """
+    c, o, following = x.context, Operands(x, i), index + 1
+    if (motion := MOTIONS.get(i.keyword)) is not None:
+        prepare = motion(o, c)
+        return lambda s: _special(c, Waiting(_moving(c, prepare(s), following)))
+    if (at_once := AT_ONCE.get(i.keyword)) is not None:
+        prepare = at_once(o, c)
+
+        def now(s: Slots) -> int:
+            prepare(s)()
+            return _special(c, following)
+
+        return now
+    if (at_rest := AT_REST.get(i.keyword)) is not None:
+        prepare = at_rest(o, c)
+        return lambda s: _special(c, Waiting(_standing(c, prepare(s), following)))
+    match i.keyword:
+        case "BREAK":
+            return lambda _: _special(c, Waiting(_standing(c, None, following)))
+        case "BRAKE":
+
+            def brake(_: Slots) -> int:
+                c.arm.brake(now=c.now)
+                return _special(c, Waiting(_standing(c, None, following)))
+
+            return brake
+        case "WAIT":
+            return _wait(o, c, following)
+        case "WAIT.EVENT":
+            return _sleep(o, c, following)
+        case "GRASP":
+            return _grasp(o, c, following, jump)
+        case "PAUSE":
+            return lambda _: _special(c, Waiting(_standing(c, None, Suspend(following))))
+        case "STOP" | "HALT":
+            return lambda _: _special(c, Finish(i.keyword))
+        case _:
+            raise ValError("Unknown instruction", i.keyword, place=where(i.at))

@@ -1,0 +1,296 @@
+"""Runs a compiled program: a stack of calls, each at a step, which may wait."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from interfaces.val2.compiler import Code
+from interfaces.val2.context import (
+    ARM,
+    Action,
+    Context,
+    Finish,
+    Finished,
+    Invoke,
+    Leave,
+    Suspend,
+    Waiting,
+)  # fmt: skip
+from interfaces.val2.errors import ValError
+from interfaces.val2.events import Ended, Failed, Paused
+from interfaces.val2.instructions import settled
+from interfaces.val2.memory import Slot, where
+from interfaces.val2.reactions import Reaction
+from vrs.errors import VrsError
+
+MOST_CALLS: Final = 1_000
+"""How deep programs may call each other."""
+
+
+class State(Enum):
+    """What a program does."""
+
+    IDLE = "idle"
+    """It has ended."""
+    RUNNING = "running"
+    PAUSED = "paused"
+    """It can go on: after PAUSE, ABORT, a single step or an error."""
+
+
+@dataclass(slots=True)
+class Frame:
+    """A call."""
+
+    code: Code
+    slots: list[Any]
+    level: int = 0
+    """Of the reaction that it's in; 0 for none."""
+    pc: int = 0
+    """Index of the step that runs, or waits, or is next."""
+    waiting: Waiting | None = None
+
+    @property
+    def name(self) -> str:
+        """The program's."""
+        return self.code.program.name
+
+    @property
+    def step(self) -> int:
+        """The step's number, from 1; no more than there are."""
+        return min(self.pc, max(0, len(self.code.program.steps) - 1)) + 1
+
+    def drop(self) -> None:
+        """Wait no more."""
+        if self.waiting is not None:
+            self.waiting.process.close()
+            self.waiting = None
+
+
+class Task:
+    """A program that runs: EXECUTE's, or the one step of a DO."""
+
+    def __init__(
+        self,
+        context: Context,
+        code: Code,
+        arguments: list[Slot],
+        *,
+        cycles: int,
+        step: int = 1,
+        single: bool = False,
+    ) -> None:
+        """Stand before a step.
+
+        Args:
+            context: What it reaches out to.
+            code: The program.
+            arguments: By reference; the same ones in every cycle.
+            cycles: How often it's run; negative for ever.
+            step: The first step, from 1.
+            single: Whether it pauses after each step.
+
+        Raises:
+            ValError: If there's no such step, or there are too many arguments.
+        """
+        if not 1 <= step <= max(1, len(code.program.steps)):
+            raise ValError("Invalid step", f"{step}: 1 to {len(code.program.steps)}", program=code.program.name)
+        self.context, self.code, self.arguments = context, code, arguments
+        self.cycles, self.single = cycles, single
+        self.state = State.RUNNING
+        self.word = ""
+        """Why it paused or ended."""
+        self.deadline = math.inf
+        """When a wait wants to be looked at again."""
+        self._interrupted = False
+        self.frames = [Frame(code, code.slots(arguments), pc=step - 1)]
+
+    @property
+    def waiting(self) -> bool:
+        """Whether it waits for something else than its turn."""
+        return self.frames[-1].waiting is not None
+
+    @property
+    def standing(self) -> bool:
+        """Whether it's done but for the arm."""
+        return len(self.frames) == 1 and self.frames[0].pc >= len(self.code.program.steps)
+
+    def next_deadline(self) -> float:
+        """When its wait may be over by itself [s]; infinity for never."""
+        return self.context.arm.next_deadline() if self.deadline == ARM else self.deadline
+
+    def run(self, most: int) -> int:
+        """Do steps until it waits, pauses or ends.
+
+        Args:
+            most: Steps that it may do.
+
+        Returns:
+            Steps that it did.
+        """
+        done = 0
+        try:
+            while done < most and self.state is State.RUNNING:
+                self._react()
+                frame = self.frames[-1]
+                if frame.waiting is None:
+                    done += self._compute(frame, 1 if self.single else most - done) + self.context.charged
+                    self.context.charged = 0
+                elif not self._wait(frame):
+                    break
+                if self.single and self.state is State.RUNNING and not self.waiting:
+                    self.pause("XSTEP")
+        except ValError as error:
+            self._fail(error)
+        except VrsError as error:
+            self._fail(ValError("Motion error", str(error)))
+        self.context.notice()
+        return done
+
+    def _compute(self, frame: Frame, most: int) -> int:
+        steps, slots, pc = frame.code.steps, frame.slots, frame.pc
+        following, left = pc, most
+        try:
+            while left:
+                left -= 1
+                following = steps[pc](slots)
+                if following < 0:
+                    break
+                pc = following
+        finally:
+            frame.pc = pc
+        if following < 0:
+            self._act(self.context.pending, frame)
+        return most - left
+
+    def _wait(self, frame: Frame) -> bool:
+        """Whether a wait is over."""
+        assert frame.waiting is not None
+        try:
+            self.deadline = next(frame.waiting.process)
+        except StopIteration as stop:
+            frame.waiting = None
+            self._act(stop.value, frame)
+            return True
+        return False
+
+    def _act(self, action: Action, frame: Frame) -> None:
+        match action:
+            case int():
+                frame.pc = action
+            case Waiting():
+                frame.waiting = action
+            case Invoke(code, slots, following):
+                self._push(Frame(code, slots, frame.level))
+                frame.pc = following
+            case Leave():
+                self._leave(frame)
+            case Finish(word):
+                frame.waiting = Waiting(_resting(self.context, word))
+            case Finished(word):
+                self._finish(word)
+            case Suspend(step):
+                frame.pc = step
+                self.pause("PAUSE")
+
+    def _push(self, frame: Frame) -> None:
+        if len(self.frames) >= MOST_CALLS:
+            raise ValError("Too many calls", f"{MOST_CALLS} at most")
+        self.frames.append(frame)
+
+    def _leave(self, frame: Frame) -> None:
+        frame.drop()
+        if len(self.frames) == 1:
+            frame.waiting = Waiting(_resting(self.context, "END"))
+            return
+        self._release(self.frames.pop())
+
+    def _release(self, frame: Frame) -> None:
+        for slot in frame.slots[len(frame.code.program.parameters) : frame.code.names]:
+            self.context.memory.release(slot)
+
+    def _finish(self, word: str) -> None:
+        self._unwind()
+        if word == "HALT" or self.cycles in (0, 1):
+            self.state, self.word, self.cycles = State.IDLE, word, 0
+            self._forget()
+            self.context.events.append(Ended(self.code.program.name, word if self.code.program.name else "DO"))
+            return
+        self.cycles = max(self.cycles - 1, -1)
+        self.frames = [Frame(self.code, self.code.slots(self.arguments))]
+        self.context.arm.begin_program()
+
+    def _unwind(self) -> None:
+        for frame in self.frames:
+            frame.drop()
+            self._release(frame)
+
+    # Reactions.
+
+    def _react(self) -> None:
+        """Call what is to be called: REACT's after the current step, or amid a WAIT; REACTI's at once."""
+        self.context.notice()
+        frame = self.frames[-1]
+        amid = frame.waiting is not None and not frame.waiting.interruptible
+        reaction = self.context.reactions.due(max(frame.level, 1) if amid else frame.level)
+        if reaction is not None:
+            self._call(reaction, frame)
+
+    def _call(self, reaction: Reaction, frame: Frame) -> None:
+        context = self.context
+        if reaction.immediate:
+            context.dropped += not context.arm.ready(now=context.now)
+            context.arm.brake(now=context.now)
+        if not reaction.program:
+            self._leave(frame)
+            return
+        code = context.code(reaction.program)
+        self._push(Frame(code, code.slots([]), reaction.level))
+
+    # Interruptions.
+
+    def pause(self, word: str) -> None:
+        """Stand; the present step is given up if it has begun."""
+        frame = self.frames[-1]
+        self._interrupted = frame.waiting is not None
+        frame.drop()
+        self.state, self.word = State.PAUSED, word
+        self.context.events.append(Paused(frame.name, frame.step, word))
+
+    def end(self, word: str) -> None:
+        """End now."""
+        self._unwind()
+        self.state, self.word = State.IDLE, word
+        self._forget()
+        self.context.events.append(Ended(self.code.program.name, word))
+
+    def _forget(self) -> None:
+        """Watch no signals any more; a DO leaves the paused program's alone."""
+        if self.code.program.name:
+            self.context.reactions.clear()
+
+    def _fail(self, error: ValError) -> None:
+        frame = self.frames[-1]
+        frame.drop()
+        if frame.name:
+            steps = frame.code.program.steps
+            place = where(steps[frame.pc].at) if frame.pc < len(steps) else None
+            error = error.at(program=frame.name, step=frame.step, place=place)
+        self.state, self.word, self._interrupted = State.PAUSED, "ERROR", True
+        self.context.events.append(Failed(error))
+
+    def go_on(self, *, again: bool, single: bool = False) -> None:
+        """PROCEED, RETRY, XSTEP: run, from the next step or from the one that was given up."""
+        frame = self.frames[-1]
+        if self._interrupted and not again:
+            frame.pc = min(frame.pc + 1, len(frame.code.program.steps))
+        self._interrupted = False
+        self.state, self.word, self.single = State.RUNNING, "", single
+
+
+def _resting(context: Context, word: str) -> Generator[float, None, Finished]:
+    yield from settled(context)
+    return Finished(word)

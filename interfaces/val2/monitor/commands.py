@@ -1,0 +1,161 @@
+"""The monitor's commands: names, forms, help, and what each needs."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from interfaces.val2.errors import ValError
+
+
+class Need(enum.Enum):
+    """What a command needs."""
+
+    LOOK = "look"
+    """Nothing: it only looks."""
+    ARGUMENT = "argument"
+    """Control if it's given anything; without, it shows what is."""
+    CHANGE = "change"
+    """Control: it moves the arm, or changes what others see."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command."""
+
+    name: str
+    """Upper case."""
+    forms: str
+    """What follows the name; forms are separated by `|`."""
+    help: str
+    """One line."""
+    need: Need = Need.CHANGE
+    idle: bool = False
+    """Only while no program runs."""
+    ours: bool = False
+    """An extension, not VAL's."""
+    whole: bool = False
+    """Its name can't be abbreviated."""
+
+    @property
+    def usage(self) -> tuple[str, ...]:
+        """Each form with the name."""
+        return tuple(f"{self.name} {form.strip()}".rstrip() for form in self.forms.split("|"))
+
+    def looks(self, rest: str) -> bool:
+        """Whether it only looks, with what follows its name."""
+        if self.need is not Need.ARGUMENT:
+            return self.need is Need.LOOK
+        return rest in {"", "?"} or (self.name == "PARAMETER" and "=" not in rest)
+
+
+_LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
+
+_TABLE: Final = (
+    Command("ABORT", "", "Stop the program and the arm, within its limits; Ctrl-C does the same."),
+    Command("AT", "t | +t", "The next motion begins at a time, or so long from now [s].", idle=True, ours=True),
+    Command("BASE", "| dx,dy,dz,turn", "Show the base, or set it: mm, and deg about Z.", need=_ARGUMENT, idle=True),
+    Command("CALIBRATE", "", "Make joint values valid; asks first.", idle=True),
+    Command("COPY", "new=old", "Copy a program."),
+    Command("DELETE", "program,..", "Delete programs; asks first.", idle=True),
+    Command("DELETEL", "location,..", "Delete locations; asks first.", idle=True),
+    Command("DELETEP", "program,..", "Delete programs; asks first.", idle=True),
+    Command("DELETER", "real,..", "Delete reals; asks first.", idle=True),
+    Command("DELETES", "$string,..", "Delete strings; asks first.", idle=True),
+    Command("DIRECTORY", "", "List the programs in memory.", need=_LOOK),
+    Command("DISABLE", "switch,..", "Turn switches off."),
+    Command("DO", "instruction |", "Carry out one instruction; without one, the last again.", idle=True),
+    Command("EDIT", "program[,step]", "Edit a program line by line; ? there says how.", idle=True),
+    Command("ENABLE", "switch,..", "Turn switches on; ENABLE POWER after PANIC."),
+    Command("EXECUTE", "program[(arguments)][,cycles[,step]] |", "Run a program, or the last; cycles -1 for ever.",
+            idle=True),
+    Command("EXIT", "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
+    Command("FLIST", "", "List the files.", need=_LOOK),
+    Command("FREE", "", "Show what is in memory.", need=_LOOK),
+    Command("HELP", "| word", "List the commands, or explain a word of the language.", need=_LOOK),
+    Command("HERE", "location | #location | a:b", "Record where the arm is; then CR, or changes: ,,10"),
+    Command("ID", "", "Show what this is, and its version.", need=_LOOK),
+    Command("IO", "", "Show inputs, outputs and internal signals.", need=_LOOK),
+    Command("LISTF", "", "List the files.", need=_LOOK),
+    Command("LISTL", "| location,..", "List locations; * stands for any characters.", need=_LOOK),
+    Command("LISTP", "| program,..", "List programs.", need=_LOOK),
+    Command("LISTR", "| real,.. | expression", "List reals, or show what an expression comes to.", need=_LOOK),
+    Command("LISTS", "| $string,.. | expression", "List strings, or show what an expression comes to.", need=_LOOK),
+    Command("LOAD", "file", "Read programs and values from a file."),
+    Command("NEXT", "| n", "Carry out the next step of a program that stands, or the next n.", idle=True),
+    Command("PANIC", "", "Stop at once and turn the power off."),
+    Command("PARAMETER", "| name | name=value", "Show or set parameters.", need=_ARGUMENT),
+    Command("POINT", "location[=expression]", "Define or change a location; then CR, or changes: ,,10"),
+    Command("PROCEED", "", "Go on with a program that stands, at its next step.", idle=True),
+    Command("QUIT", "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
+    Command("RENAME", "new=old", "Rename a program.", idle=True),
+    Command("RESET", "", "Turn all outputs off."),
+    Command("RETRY", "", "Go on with a program that stands, at the step that was interrupted.", idle=True),
+    Command("REWIND", "t | -t", "Show where the arm was at a time, or so long ago [s].", need=_LOOK, ours=True),
+    Command("SIGNAL", "| n,-m,..", "Turn signals on, or off with a minus; show them.", need=_ARGUMENT),
+    Command("SPEED", "| percent", "Show or set the monitor speed; it counts at once.", need=_ARGUMENT),
+    Command("STATUS", "", "Show the program, its step and cycles, speeds, power.", need=_LOOK),
+    Command("STORE", "file[=program,..]", "Write programs, with all that they use, to a file."),
+    Command("STOREL", "file[=location,..]", "Write locations to a file."),
+    Command("STOREP", "file[=program,..]", "Write programs to a file."),
+    Command("STORER", "file[=real,..]", "Write reals to a file."),
+    Command("STORES", "file[=$string,..]", "Write strings to a file."),
+    Command("SWITCH", "| switch,..", "Show switches.", need=_LOOK),
+    Command("TEACH", "location", "Record one location after the other, each by CR; E ends.", idle=True),
+    Command("TIMELINE", "", "Show what is scheduled.", need=_LOOK, ours=True),
+    Command("TOOL", "| transformation", "Show the tool, or set it.", need=_ARGUMENT, idle=True),
+    Command("UNDO", "", "Take back the newest motion, as far as it's still to come.", ours=True),
+    Command("WHERE", "| 1 | REAL", "Show where the arm is; 1 repeats until CR, REAL: the other twin.", need=_LOOK),
+    Command("XSTEP", "| program[,cycles[,step]]", "Begin a program step by step, or do its next step.",
+            idle=True),
+    Command("ZERO", "", "Delete all programs and values; asks first.", idle=True),
+)  # fmt: skip
+
+COMMANDS: Final = {command.name: command for command in _TABLE}
+"""By name."""
+SHORT: Final = {
+    "A": "ABORT",
+    "D": "DO",
+    "E": "EXECUTE",
+    "EX": "EXECUTE",
+    "P": "PROCEED",
+    "S": "STATUS",
+    "W": "WHERE",
+}
+"""What stands for a command though others begin with it too."""
+
+
+def command(word: str) -> Command:
+    """The command that a word names, whole or by its beginning.
+
+    Raises:
+        ValError: If none or several begin with it.
+    """
+    wanted = word.upper()
+    if wanted in COMMANDS:
+        return COMMANDS[wanted]
+    found = SHORT.get(wanted) or unique(
+        wanted, (name for name, one in COMMANDS.items() if not one.whole), "command"
+    )
+    return COMMANDS[found]
+
+
+def unique(word: str, names: Iterable[str], kind: str) -> str:
+    """The name that a word is the beginning of; of STORE, STOREL, STOREP it's STORE.
+
+    Args:
+        word: Upper case.
+        names: Those that there are, upper case.
+        kind: What they are, for the error.
+
+    Raises:
+        ValError: If none or several begin with it.
+    """
+    found = sorted((name for name in names if name.startswith(word)), key=lambda name: (len(name), name))
+    if not word or not found:
+        raise ValError(f"Invalid {kind}", word)
+    if found[0] != word and not all(name.startswith(found[0]) for name in found):
+        raise ValError(f"Ambiguous {kind}", f"{word}: {', '.join(sorted(found))}")
+    return found[0]

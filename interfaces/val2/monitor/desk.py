@@ -1,0 +1,192 @@
+"""What commands work at: the controller, the files, and what is said to the person at the terminal."""
+
+from __future__ import annotations
+
+import enum
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from interfaces.val2.controller import Controller
+from interfaces.val2.errors import ValError
+from interfaces.val2.monitor.files import Files
+from interfaces.val2.parser import parse_expression, parse_line
+from interfaces.val2.syntax import Expression, Number, Step, Variable
+from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
+
+
+class Style(enum.StrEnum):
+    """What is said, for its colour."""
+
+    ANSWER = "answer"
+    """What a command shows."""
+    TYPED = "typed"
+    """What a program types."""
+    NOTE = "note"
+    """What has become of a program."""
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A piece of what is said."""
+
+    text: str
+    """Lines end with a newline; what a program types may go on in the next piece."""
+    style: Style
+
+
+class Dialogue(Protocol):
+    """What takes the next lines in place of commands."""
+
+    @property
+    def prompt(self) -> str:
+        """What it asks."""
+
+    def line(self, text: str, *, now: float) -> Dialogue | None:
+        """Take a line; what takes the next one, None for commands.
+
+        Raises:
+            ValError: If it can't be taken; then the same is asked again.
+        """
+
+    def leave(self, *, now: float, kept: bool) -> None:
+        """It ends without a line: the input has ended (kept), or Ctrl-C was pressed."""
+
+
+@dataclass(slots=True)
+class Desk:
+    """The place of one terminal."""
+
+    controller: Controller
+    files: Files
+    version: str
+    """Name and version of the program, and what it's connected to."""
+    line: str = ""
+    """The line that is being carried out."""
+    said: list[Said] = field(default_factory=list)
+    last_do: Step | None = None
+    last_run: str = ""
+    """What followed the last EXECUTE."""
+    last_edit: str = ""
+    scheduling: bool = False
+    """Whether the next motion is one for later, and isn't waited for."""
+    steps: int = 0
+    """Steps that NEXT has still to do."""
+
+    def say(self, *lines: str, style: Style = Style.ANSWER) -> None:
+        """Say whole lines."""
+        self.said.extend(Said(f"{line}\n", style) for line in lines)
+
+    def say_all(self, lines: Iterable[str], none: str = "") -> None:
+        """Say whole lines, or a note where there are none."""
+        listed = list(lines)
+        self.say(*listed)
+        if not listed and none:
+            self.say(none, style=Style.NOTE)
+
+    def fail(self, error: ValError) -> None:
+        """Say what is wrong; the place in the line as it was typed."""
+        text = str(error)
+        if not error.program and error.step is None and error.place is not None:
+            text = re.sub(r"line \d+, column", "column", text)
+        self.say(text, style=Style.ERROR)
+
+    def in_use(self) -> set[str]:
+        """The programs that run."""
+        return {name for name, _ in self.controller.status().stack} if self.controller.running else set()
+
+    def padded(self, part: str) -> str:
+        """A part of the line with blanks before it, so that columns are those of the line."""
+        return " " * max(self.line.rfind(part), 0) + part
+
+    def step(self, text: str) -> Step:
+        """An instruction of the line.
+
+        Raises:
+            ValError: If it's none.
+        """
+        return parse_line(self.padded(text))
+
+    def instruction(self, keyword: str, rest: str) -> Step:
+        """An instruction that has the form of the line, but for its abbreviated keyword."""
+        column = max(self.line.rfind(rest), 0)
+        return parse_line(f"{keyword:<{column}}{rest}" if column > len(keyword) else f"{keyword} {rest}")
+
+    def expression(self, text: str, what: str = "a value") -> Expression:
+        """An expression of the line.
+
+        Args:
+            text: The part of the line.
+            what: What is wanted, for the error.
+
+        Raises:
+            ValError: If it's none, or nothing.
+        """
+        if not text.strip():
+            raise ValError("Missing argument", what)
+        return parse_expression(self.padded(text))
+
+    def value(self, text: str, *, now: float) -> Value:
+        """What an expression of the line comes to."""
+        return self.controller.evaluate(self.expression(text), now=now)
+
+    def number(self, text: str, *, now: float) -> float:
+        """A number of the line.
+
+        Raises:
+            ValError: If it's something else.
+        """
+        value = self.value(text, now=now)
+        if not isinstance(value, float):
+            raise ValError("Invalid argument", f"{text}: a number is wanted")
+        return value
+
+    def transformation(self, text: str, *, now: float) -> Transformation:
+        """A transformation of the line.
+
+        Raises:
+            ValError: If it's something else.
+        """
+        value = self.value(text, now=now)
+        if not isinstance(value, Transformation):
+            raise ValError("Invalid argument", f"{text}: a transformation is wanted")
+        return value
+
+    def variable(self, text: str, *, now: float) -> Variable:
+        """A variable of the line, its indices worked out.
+
+        Raises:
+            ValError: If it's none.
+        """
+        found = self.expression(text, "a name")
+        if not isinstance(found, Variable):
+            raise ValError("Invalid argument", f"{text}: a name is wanted")
+        return self.settled(found, now=now)
+
+    def settled(self, variable: Variable, *, now: float) -> Variable:
+        """A variable with its indices worked out.
+
+        Raises:
+            ValError: If one isn't a number.
+        """
+        indices = []
+        for index in variable.indices:
+            value = self.controller.evaluate(index, now=now)
+            if not isinstance(value, float):
+                raise ValError("Invalid array index", variable.name)
+            indices.append(Number(float(math.floor(value))))
+        return replace(variable, indices=tuple(indices))
+
+
+def as_location(value: Value, text: str) -> Location:
+    """A value that's a location.
+
+    Raises:
+        ValError: If it's something else.
+    """
+    if not isinstance(value, Transformation | PrecisionPoint):
+        raise ValError("Invalid argument", f"{text}: a location is wanted")
+    return value

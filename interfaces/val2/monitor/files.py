@@ -1,0 +1,98 @@
+"""Programs and values on disk: in one directory, or, for who sits at this machine, anywhere."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+from pathlib import Path
+from typing import Final
+
+from interfaces.val2.errors import ValError
+
+SUFFIX: Final = ".v2"
+"""Of files that are named without any."""
+LARGEST: Final = 4_000_000
+"""Longest file that is read [B]."""
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
+
+
+class Files:
+    """A directory of files."""
+
+    def __init__(self, directory: Path, *, anywhere: bool = False) -> None:
+        """Say where.
+
+        Args:
+            directory: Where files without a path are.
+            anywhere: Whether paths may lead out of it; else only plain names ending in `.v2` are taken.
+        """
+        self.directory, self.anywhere = directory, anywhere
+
+    def path(self, name: str) -> Path:
+        """The file that a name stands for.
+
+        Raises:
+            ValError: If it's none, or isn't allowed.
+        """
+        name = name.strip().strip('"').strip()
+        if not name:
+            raise ValError("Missing argument", "a file's name")
+        if self.anywhere:
+            path = self.directory / Path(name).expanduser()
+            return path if path.suffix else path.with_name(path.name + SUFFIX)
+        if not _PLAIN.fullmatch(name):
+            raise ValError("Invalid file name", f"{name}: letters, digits, dots, - and _, and no path")
+        path = self.directory / (name if "." in name else name + SUFFIX)
+        if path.suffix != SUFFIX:
+            raise ValError("Invalid file name", f"{name}: it ends in {SUFFIX}")
+        if not path.resolve().is_relative_to(self.directory.resolve()):
+            raise ValError("Invalid file name", f"{name}: it leads somewhere else")
+        return path
+
+    def read(self, path: Path) -> str:
+        """A file's text.
+
+        Raises:
+            ValError: If it can't be read, or is too long.
+        """
+        try:
+            if not path.is_file():
+                raise ValError("Nonexistent file", path.name)
+            with path.open("rb") as file:
+                data = file.read(LARGEST + 1)
+        except OSError as error:
+            raise ValError("File error", f"{path.name}: {error.strerror}") from None
+        if len(data) > LARGEST:
+            raise ValError("File error", f"{path.name}: longer than {LARGEST} bytes")
+        return data.decode("utf-8", errors="replace")
+
+    def write(self, path: Path, text: str) -> None:
+        """Write a file, whole or not at all.
+
+        Raises:
+            ValError: If it can't be written.
+        """
+        draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+        try:
+            try:
+                with draft.open("w", encoding="utf-8", newline="") as file:
+                    file.write(text)
+                os.replace(draft, path)
+            finally:
+                with contextlib.suppress(FileNotFoundError):
+                    draft.unlink()
+        except OSError as error:
+            raise ValError("File error", f"{path.name}: {error.strerror}") from None
+
+    def listed(self) -> list[str]:
+        """The names of the files in the directory, without the suffix.
+
+        Raises:
+            ValError: If it can't be read.
+        """
+        try:
+            return sorted(path.stem for path in self.directory.glob(f"*{SUFFIX}") if path.is_file())
+        except OSError as error:
+            raise ValError("File error", f"{self.directory}: {error.strerror}") from None

@@ -1,0 +1,70 @@
+"""Which function carries out which command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, TypeAlias
+
+from interfaces.val2.monitor import keeping, listing, locations, running, settings, words
+from interfaces.val2.monitor.desk import Dialogue
+from interfaces.val2.monitor.editing import edit
+
+Handler: TypeAlias = Callable[..., Dialogue | None]
+"""Called with the desk, what follows the name, and `now`; what takes the next line, or None."""
+
+HANDLERS: Final[dict[str, Handler]] = {
+    "ABORT": running.abort,
+    "AT": running.at,
+    "BASE": locations.base,
+    "CALIBRATE": settings.calibrate,
+    "COPY": keeping.copy,
+    "DELETE": keeping.delete_programs,
+    "DELETEL": keeping.delete_values("location"),
+    "DELETEP": keeping.delete_programs,
+    "DELETER": keeping.delete_values("real"),
+    "DELETES": keeping.delete_values("string"),
+    "DIRECTORY": listing.directory,
+    "DISABLE": settings.disable,
+    "DO": running.do,
+    "EDIT": edit,
+    "ENABLE": settings.enable,
+    "EXECUTE": running.execute,
+    "FLIST": keeping.flist,
+    "FREE": listing.free,
+    "HELP": words.help_,
+    "HERE": locations.here,
+    "ID": listing.identity,
+    "IO": settings.io,
+    "LISTF": keeping.flist,
+    "LISTL": listing.listl,
+    "LISTP": listing.listp,
+    "LISTR": listing.listr,
+    "LISTS": listing.lists,
+    "LOAD": keeping.load,
+    "NEXT": running.next_,
+    "PANIC": running.panic,
+    "PARAMETER": settings.parameter,
+    "POINT": locations.point,
+    "PROCEED": running.proceed,
+    "RENAME": keeping.rename,
+    "RESET": settings.reset,
+    "RETRY": running.retry,
+    "REWIND": locations.rewind,
+    "SIGNAL": settings.signal,
+    "SPEED": settings.speed,
+    "STATUS": running.status,
+    "STORE": keeping.store(""),
+    "STOREL": keeping.store("L"),
+    "STOREP": keeping.store("P"),
+    "STORER": keeping.store("R"),
+    "STORES": keeping.store("S"),
+    "SWITCH": settings.switch,
+    "TEACH": locations.teach,
+    "TIMELINE": running.timeline,
+    "TOOL": locations.tool,
+    "UNDO": running.undo,
+    "WHERE": locations.where,
+    "XSTEP": running.xstep,
+    "ZERO": keeping.zero,
+}
+"""By command; EXIT and QUIT are the monitor's own."""

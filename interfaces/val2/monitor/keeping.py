@@ -1,0 +1,248 @@
+"""LOAD, STORE, DELETE, COPY, RENAME, ZERO, FLIST: what is kept, on disk and in memory."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+
+from interfaces.val2.errors import ValError
+from interfaces.val2.memory import Memory
+from interfaces.val2.monitor import layout
+from interfaces.val2.monitor.desk import Desk, Dialogue, Style
+from interfaces.val2.monitor.dialogues import Confirm
+from interfaces.val2.monitor.listing import chosen
+from interfaces.val2.monitor.text import halves, named, nothing
+from interfaces.val2.source import Entry, SourceFile, parse_file, print_file
+from interfaces.val2.syntax import Call, Program, React, Variable
+from interfaces.val2.values import PrecisionPoint, Transformation
+
+_PARTS = {"P": "programs", "L": "locations", "R": "reals", "S": "strings"}
+
+
+def flist(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+    """FLIST, LISTF: the files."""
+    nothing(rest, "FLIST")
+    desk.say_all(layout.in_columns(desk.files.listed()), "No files")
+
+
+def load(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+    """LOAD file: programs and values; all of it or nothing."""
+    path = desk.files.path(rest)
+    source = parse_file(desk.files.read(path), path.name)
+    running = desk.in_use()
+    for program in source.programs:
+        if program.name in running:
+            raise ValError("Program in use", program.name)
+    memory = desk.controller.memory
+    entries = [*source.locations, *source.reals, *source.strings]
+    _set_all(memory, entries)
+    memory.programs.update({program.name: program for program in source.programs})
+    if source.signals:
+        desk.controller.cell = source.signals
+    counts = [(len(source.programs), "program"), (len(entries), "value"), (len(source.signals), "signal rule")]
+    said = [f"{many} {what}{'s' * (many != 1)}" for many, what in counts if many]
+    desk.say(f"{path.name}: {', '.join(said) or 'nothing'}")
+
+
+def _set_all(memory: Memory, entries: Iterable[Entry]) -> None:
+    """Set variables; where one can't be, none is."""
+    known = {spelled(variable): value for variable, value in memory.variables()}
+    done: list[Variable] = []
+    try:
+        for entry in entries:
+            memory.set(entry.variable, entry.value)
+            done.append(entry.variable)
+    except ValError:
+        for variable in done:
+            memory.delete(variable)
+            if spelled(variable) in known:
+                memory.set(variable, known[spelled(variable)])
+        raise
+
+
+def store(parts: str) -> Callable[..., Dialogue | None]:
+    """STORE, STOREP, STOREL, STORER, STORES.
+
+    Args:
+        parts: Letters of what is written: programs, locations, reals, strings; empty for all, with what is used.
+    """
+
+    def act(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+        name, names = halves(rest)
+        path = desk.files.path(name)
+        source = _source(desk, path.name, parts, names or "")
+
+        def write(_: float) -> None:
+            desk.files.write(path, print_file(source))
+            values = len(source.locations) + len(source.reals) + len(source.strings)
+            programs = len(source.programs)
+            desk.say(f"{path.name}: {programs} program{'s' * (programs != 1)}, {values} value{'s' * (values != 1)}")
+
+        if path.exists():
+            return Confirm(f"{path.name} exists. Write over it", write)
+        write(now)
+        return None
+
+    return act
+
+
+def _source(desk: Desk, name: str, parts: str, names: str) -> SourceFile:
+    memory = desk.controller.memory
+    entries = [Entry(variable, value) for variable, value in memory.variables()]
+    kinds = {
+        "locations": [entry for entry in entries if isinstance(entry.value, Transformation | PrecisionPoint)],
+        "reals": [entry for entry in entries if isinstance(entry.value, float)],
+        "strings": [entry for entry in entries if isinstance(entry.value, str)],
+    }
+    programs = dict(memory.programs)
+    if parts in {"", "P"} and names:
+        programs = _called(programs, chosen(programs, names, "program"))
+    signals = desk.controller.cell if parts == "" else ()
+    wanted = set(_PARTS.values()) if parts == "" else {_PARTS[parts]}
+    if parts == "" and names:
+        used = {variable.name for program in programs.values() for variable in _variables(program)}
+        kinds = {kind: [e for e in some if e.variable.name in used] for kind, some in kinds.items()}
+    elif names:
+        kinds = {kind: _named(some, names, kind) if kind in wanted else some for kind, some in kinds.items()}
+    return SourceFile(
+        name,
+        tuple(programs.values()) if "programs" in wanted else (),
+        tuple(kinds["locations"]) if "locations" in wanted else (),
+        tuple(kinds["reals"]) if "reals" in wanted else (),
+        tuple(kinds["strings"]) if "strings" in wanted else (),
+        signals,
+    )
+
+
+def _named(entries: Iterable[Entry], names: str, kind: str) -> list[Entry]:
+    return list(
+        chosen({spelled(entry.variable): entry for entry in entries}, names, kind.removesuffix("s")).values()
+    )
+
+
+def _called(programs: dict[str, Program], some: dict[str, Program]) -> dict[str, Program]:
+    """Programs with all that they call."""
+    found, waiting = dict(some), list(some.values())
+    while waiting:
+        for node in _walk(waiting.pop()):
+            name = node.program if isinstance(node, Call | React) else ""
+            if name in programs and name not in found:
+                found[name] = programs[name]
+                waiting.append(programs[name])
+    return found
+
+
+def _variables(program: Program) -> Iterator[Variable]:
+    return (node for node in _walk(program) if isinstance(node, Variable))
+
+
+def _walk(node: object) -> Iterator[object]:
+    """A tree's nodes."""
+    if isinstance(node, tuple):
+        for part in node:
+            yield from _walk(part)
+    elif dataclasses.is_dataclass(node):
+        yield node
+        for field in dataclasses.fields(node):
+            yield from _walk(getattr(node, field.name))
+
+
+def delete_programs(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+    """DELETE, DELETEP."""
+    if not rest:
+        raise ValError("Missing argument", "which programs?")
+    programs = desk.controller.memory.programs
+    doomed = chosen(dict(programs), rest, "program")
+    for name in doomed:
+        if name in desk.in_use():
+            raise ValError("Program in use", name)
+
+    def act(_: float) -> None:
+        for name in doomed:
+            programs.pop(name, None)
+
+    return Confirm(f"Delete {_listed(doomed)}", act)
+
+
+def delete_values(kind: str) -> Callable[..., Dialogue]:
+    """DELETEL, DELETER, DELETES.
+
+    Args:
+        kind: `location`, `real` or `string`.
+    """
+
+    def command(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+        if not rest:
+            raise ValError("Missing argument", f"which {kind}s?")
+        memory = desk.controller.memory
+        kinds = {"location", "point"} if kind == "location" else {kind}
+        known = {name for some in kinds for name, _ in memory.listing(some)}
+        doomed = chosen(
+            {spelled(v): v for v, _ in memory.variables() if spelled(v) in known},
+            rest,
+            "location" if kind == "location" else "value",
+        )
+
+        def act(_: float) -> None:
+            for variable in doomed.values():
+                memory.delete(variable)
+
+        return Confirm(f"Delete {_listed(doomed)}", act)
+
+    return command
+
+
+def spelled(variable: Variable) -> str:
+    """A variable as it's written, its indices numbers."""
+    indices = ",".join(layout.number(getattr(index, "value", 0.0)) for index in variable.indices)
+    return f"{variable.name}[{indices}]" if indices else variable.name
+
+
+def _listed(names: Iterable[str]) -> str:
+    listed = list(names)
+    return ", ".join(listed) if len(listed) <= 4 else f"{listed[0]} .. {listed[-1]}, {len(listed)} in all"
+
+
+def copy(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+    """COPY new=old."""
+    return _put(desk, rest, "COPY", keep=True, now=now)
+
+
+def rename(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+    """RENAME new=old."""
+    return _put(desk, rest, "RENAME", keep=False, now=now)
+
+
+def _put(desk: Desk, rest: str, name: str, *, keep: bool, now: float) -> Dialogue | None:
+    given, old = halves(rest)
+    if old is None:
+        raise ValError("Missing argument", f"{name} new=old")
+    new, old = named(given, "program"), named(old, "program")
+    programs = desk.controller.memory.programs
+    if old not in programs:
+        raise ValError("Undefined program name", old)
+    for one in (new, *(() if keep else (old,))):
+        if one in desk.in_use():
+            raise ValError("Program in use", one)
+
+    def act(_: float) -> None:
+        program = programs[old] if keep else programs.pop(old)
+        programs[new] = replace(program, name=new)
+
+    if new in programs and new != old:
+        return Confirm(f"{new} exists. Replace it", act)
+    act(now)
+    return None
+
+
+def zero(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+    """ZERO: forget everything."""
+    nothing(rest, "ZERO")
+
+    def act(_: float) -> None:
+        desk.controller.forget()
+        desk.controller.cell = ()
+        desk.say("Memory is empty", style=Style.NOTE)
+
+    return Confirm("Delete all programs and values. Are you sure", act)

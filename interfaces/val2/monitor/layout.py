@@ -1,0 +1,104 @@
+"""How values, programs and tables are laid out on 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from interfaces.val2.geometry import to_oat
+from interfaces.val2.ports import Where
+from interfaces.val2.values import Location, PrecisionPoint, Transformation
+
+WIDTH = 79
+"""Longest line [characters]."""
+_COLUMN = 9
+HEADINGS = ("X/JT1", "Y/JT2", "Z/JT3", "O/JT4", "A/JT5", "T/JT6")
+"""Of a location's six numbers."""
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals, without a minus before zero."""
+    shown = f"{value:.{decimals}f}"
+    return shown.removeprefix("-") if float(shown) == 0.0 else shown
+
+
+def number(value: float) -> str:
+    """A number as short as it can be while it's still the same."""
+    if value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
+
+
+def six(location: Location) -> tuple[float, ...]:
+    """X, Y, Z [mm], O, A, T [deg] of a transformation; the joint values [deg] of a precision point."""
+    return location.joints if isinstance(location, PrecisionPoint) else to_oat(location)
+
+
+def heading() -> str:
+    """The line above those of `row`."""
+    return "".join(f"{text:>{_COLUMN}}" for text in HEADINGS)
+
+
+def row(location: Location) -> str:
+    """A location's six numbers in columns."""
+    lengths = isinstance(location, Transformation)
+    return "".join(
+        f"{fixed(value, 2 if lengths and index < 3 else 3):>{_COLUMN}}" for index, value in enumerate(six(location))
+    )
+
+
+def where(place: Where) -> list[str]:
+    """WHERE: the tool, then the joints and the hand."""
+    joints = row(place.joints)
+    return [f"{heading()}{'HAND':>{_COLUMN}}", row(place.tool), f"{joints}{fixed(place.hand, 2):>{_COLUMN}}"]
+
+
+def locations(values: Mapping[str, Location]) -> list[str]:
+    """LISTL: a line each; a long name has one of its own."""
+    lines = [f"{'':15}{heading()}"] if values else []
+    for name, value in values.items():
+        if len(name) > 15:
+            lines.append(name)
+        lines.append(f"{name if len(name) <= 15 else '':15}{row(value)}")
+    return lines
+
+
+def reals(values: Mapping[str, float]) -> list[str]:
+    """LISTR: a line each."""
+    width = max(map(len, values), default=0)
+    return [f"{name:{width}} = {number(value)}" for name, value in values.items()]
+
+
+def strings(values: Mapping[str, str]) -> list[str]:
+    """LISTS: a line each."""
+    width = max(map(len, values), default=0)
+    return [f'{name:{width}} = "{visible(value)}"' for name, value in values.items()]
+
+
+def visible(text: str) -> str:
+    """A text on one line: characters that would move a terminal's cursor are shown as a dot."""
+    return "".join(letter if letter.isprintable() else "·" for letter in text)
+
+
+def table(rows: Sequence[Sequence[str]], *, indent: str = "") -> list[str]:
+    """Rows in columns; the last column isn't padded."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        (indent + "  ".join(f"{cell:{width}}" for cell, width in zip(line, widths, strict=True))).rstrip()
+        for line in rows
+    ]
+
+
+def in_columns(words: Iterable[str]) -> list[str]:
+    """Words beside each other, in alphabetical order down the columns."""
+    listed = sorted(words)
+    if not listed:
+        return []
+    width = max(map(len, listed)) + 2
+    many = max((WIDTH + 2) // width, 1)
+    deep = -(-len(listed) // many)
+    return ["".join(f"{word:{width}}" for word in listed[line::deep]).rstrip() for line in range(deep)]
+
+
+def numbered(lines: Sequence[str], first: int = 1) -> list[str]:
+    """A program's steps with their numbers."""
+    return [f"{index:5}  {line}".rstrip() for index, line in enumerate(lines, first)]

@@ -1,0 +1,216 @@
+"""The monitor at a terminal: history, completion, help on every word, colours."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from prompt_toolkit import PromptSession, print_formatted_text
+from prompt_toolkit.application import run_in_terminal
+from prompt_toolkit.auto_suggest import AutoSuggestFromHistory
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
+from prompt_toolkit.formatted_text import FormattedText, StyleAndTextTuples
+from prompt_toolkit.history import FileHistory, History, InMemoryHistory
+from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+
+from interfaces.timer import Turning
+from interfaces.val2.monitor.colours import LineLexer, style
+from interfaces.val2.monitor.completion import hint, suggestions
+from interfaces.val2.monitor.desk import Said
+from interfaces.val2.monitor.monitor import Monitor
+from vrs.clock import Clock
+
+if TYPE_CHECKING:
+    from prompt_toolkit.input import Input
+    from prompt_toolkit.output import Output
+
+_ROWS: Final = 8
+"""Lines that are kept free for the menu."""
+
+
+class _Completer(Completer):
+    """Completes by `suggestions`."""
+
+    def __init__(self, monitor: Monitor) -> None:
+        self._monitor = monitor
+
+    def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
+        """What may complete the line."""
+        if not self._monitor.takes_commands and not self._monitor.edits:
+            return
+        if not complete_event.completion_requested and not document.text_before_cursor.strip():
+            return
+        desk = self._monitor.desk
+        fragment, found = suggestions(document.text_before_cursor, desk, program=self._monitor.edits)
+        for one in found:
+            yield Completion(one.word, -len(fragment), display_meta=one.help)
+
+
+class Terminal:
+    """A monitor at a terminal."""
+
+    def __init__(
+        self,
+        monitor: Monitor,
+        clock: Clock,
+        *,
+        history: Path | None = None,
+        source: Input | None = None,
+        sink: Output | None = None,
+    ) -> None:
+        """Begin; `run` reads.
+
+        Args:
+            monitor: Whose terminal it is.
+            clock: Session time.
+            history: Where lines are kept from one session to the next; None for nowhere.
+            source: What is read; None for standard input.
+            sink: What is written; None for standard output.
+        """
+        self._monitor, self._clock = monitor, clock
+        self._said: list[Said] = []
+        self._partial = ""
+        """What a program typed without ending the line; it's shown before the prompt."""
+        self._shown = ""
+        self._turning = Turning(clock, self._turn)
+        self._session: PromptSession[str] = PromptSession(
+            message=self._message,
+            lexer=LineLexer(monitor),
+            style=style(),
+            completer=_Completer(monitor),
+            complete_while_typing=True,
+            auto_suggest=AutoSuggestFromHistory(),
+            bottom_toolbar=self._toolbar,
+            history=_history(history),
+            key_bindings=self._keys(),
+            reserve_space_for_menu=_ROWS,
+            input=source,
+            output=sink,
+        )
+
+    async def run(self) -> None:
+        """Until QUIT or the end of the input, and of what is under way then."""
+        self._monitor.start(now=self._clock.now())
+        self._turning.start()
+        try:
+            # Between two lines, too: what is typed then isn't to be shown twice.
+            with self._session.input.raw_mode():
+                while not self._monitor.done:
+                    self._print()
+                    await self._next()
+                self._print()
+        finally:
+            self._turning.stop()
+            self._monitor.leave(now=self._clock.now())
+
+    async def _next(self) -> None:
+        """Take a line."""
+        try:
+            text = await self._session.prompt_async()
+        except EOFError:
+            self._monitor.leave(now=self._clock.now())
+        except KeyboardInterrupt:
+            self._monitor.interrupt(now=self._clock.now())
+        else:
+            self._partial = ""
+            if not self._monitor.done:
+                self._monitor.line(text, now=self._clock.now())
+        self._turn(self._clock.now())
+
+    def _turn(self, now: float) -> float:
+        monitor = self._monitor
+        monitor.advance(now=now)
+        self._said += monitor.output()
+        app = self._session.app
+        if app.is_running:
+            if monitor.done:
+                if not app.is_done:
+                    app.exit(result="")
+            elif self._said:
+                asyncio.ensure_future(run_in_terminal(self._write))  # noqa: RUF006 - the application keeps it
+            elif self._prompt() != self._shown:
+                app.invalidate()
+        return monitor.next_deadline()
+
+    def _print(self) -> None:
+        self._said += self._monitor.output()
+        self._write()
+
+    def _write(self) -> None:
+        """Write whole lines of what was said; the rest stands before the prompt."""
+        said, self._said = self._said, []
+        pieces: StyleAndTextTuples = [("class:typed", self._partial)] if self._partial else []
+        pieces += [(f"class:{piece.style}", piece.text) for piece in said]
+        self._partial = ""
+        while pieces and not pieces[-1][1].endswith("\n"):
+            kind, text, *_ = pieces.pop()
+            whole, newline, rest = text.rpartition("\n")
+            self._partial = rest + self._partial
+            if newline:
+                pieces.append((kind, whole + newline))
+        if pieces:
+            app = self._session.app
+            print_formatted_text(FormattedText(pieces), end="", style=style(), output=app.output)
+
+    def _prompt(self) -> str:
+        return self._partial + self._monitor.prompt
+
+    def _message(self) -> StyleAndTextTuples:
+        self._shown = self._prompt()
+        kind = "running" if self._monitor.prompt == "*" else "prompt"
+        between = "\n" if self._partial and len(self._monitor.prompt) == 1 else ""
+        return [("class:typed", self._partial + between), (f"class:{kind}", self._monitor.prompt)]
+
+    def _toolbar(self) -> StyleAndTextTuples:
+        document = self._session.default_buffer.document
+        if not (self._monitor.takes_commands or self._monitor.edits):
+            return [("", " ")]
+        width = shutil.get_terminal_size().columns
+        with contextlib.suppress(OSError):
+            width = self._session.app.output.get_size().columns
+        said = hint(document.text_before_cursor, program=self._monitor.edits)
+        return [
+            ("class:hint", (said or "Tab completes, HELP explains, Ctrl-C is ABORT, Ctrl-D leaves")[: width - 1])
+        ]
+
+    def _keys(self) -> KeyBindings:
+        keys = KeyBindings()
+
+        @keys.add("c-c")
+        def _interrupt(event: KeyPressEvent) -> None:
+            buffer = event.app.current_buffer
+            if buffer.text and not self._monitor.busy:
+                buffer.reset()
+            else:
+                self._monitor.interrupt(now=self._clock.now())
+                buffer.reset()
+                self._turning.soon()
+
+        @keys.add("c-d")
+        def _end(event: KeyPressEvent) -> None:
+            buffer = event.app.current_buffer
+            if buffer.text:
+                buffer.delete()
+            else:
+                self._monitor.end_of_input(now=self._clock.now())
+                self._turning.soon()
+
+        return keys
+
+
+def _history(path: Path | None) -> History:
+    """Lines of earlier sessions; none where they can't be kept."""
+    if path is None:
+        return InMemoryHistory()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a"):
+            pass
+    except OSError:
+        return InMemoryHistory()
+    return FileHistory(str(path))

@@ -1,0 +1,113 @@
+"""The hand: how far it's open, and when it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+OPEN: Final = 100.0
+"""Opening of a hand that's open [mm]."""
+HAND_TIME: Final = 0.05
+"""What the hand takes unless the parameter HAND.TIME says otherwise [s]."""
+
+Gripped = Callable[[float, bool], None]
+"""Is told when the hand takes hold of something (True) or lets go [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """The hand is to move when a motion begins."""
+
+    number: int
+    """Of the motion."""
+    to: float
+    """Opening [mm]."""
+    holds: bool
+
+
+class Hand:
+    """A hand that opens and closes evenly in HAND.TIME."""
+
+    def __init__(self, parameters: Mapping[str, float], gripped: Gripped | None) -> None:
+        self._parameters, self._gripped = parameters, gripped
+        self._from = self._to = OPEN
+        self._start = self._end = 0.0
+        self._holds = False
+        self._orders: list[_Order] = []
+        self.wanted: float | bool | None = None
+        """What goes with the next motion: an opening [mm], open or closed; None for nothing."""
+        self.relax = False
+        """Whether the next motion relaxes it."""
+
+    @property
+    def end(self) -> float:
+        """When it's done with what it does now [s]."""
+        return self._end
+
+    @property
+    def waits(self) -> bool:
+        """Whether it's to move with a motion that hasn't begun."""
+        return bool(self._orders)
+
+    @property
+    def goal(self) -> float:
+        """Opening that it goes to in the end [mm]."""
+        return self._orders[-1].to if self._orders else self._to
+
+    def opening(self, now: float) -> float:
+        """Opening at a time [s], [mm]."""
+        if now >= self._end:
+            return self._to
+        share = max((now - self._start) / (self._end - self._start), 0.0)
+        return self._from + share * (self._to - self._from)
+
+    def ask(self, number: int, hand: float | bool | None) -> None:
+        """Let it move when a motion begins: as the motion says, else as was asked for the next one."""
+        wanted = self.wanted if hand is None else hand
+        if wanted is not None:
+            self._orders.append(_Order(number, *_meaning(wanted)))
+        elif self.relax:
+            self._orders.append(_Order(number, self.goal, holds=False))
+        self.wanted, self.relax = None, False
+
+    def begin(self, started: Callable[[int], float | None], now: float) -> None:
+        """Move for every motion that has begun; the callable says when it did [s], None for not yet."""
+        while self._orders:
+            t = started(self._orders[0].number)
+            if t is None or t > now:
+                return
+            order = self._orders.pop(0)
+            self._move(order.to, order.holds, t)
+
+    def actuate(self, hand: bool | None, now: float) -> None:
+        """Open (True), close or relax (None) it now."""
+        self._move(*((self._to, False) if hand is None else _meaning(hand)), now)
+
+    def give_back(self) -> None:
+        """What was asked for a motion that doesn't come is for the next one."""
+        if self._orders:
+            order = self._orders[-1]
+            self.relax = not order.holds and order.to == self._to
+            self.wanted = None if self.relax else order.to
+            self._orders.clear()
+
+    def forget(self) -> None:
+        """Drop what was asked for motions to come."""
+        self._orders.clear()
+        self.wanted, self.relax = None, False
+
+    def _move(self, to: float, holds: bool, t: float) -> None:
+        self._from, self._to = self.opening(t), to
+        self._start, self._end = t, t + max(self._parameters.get("HAND.TIME", HAND_TIME), 0.0)
+        if holds is not self._holds and self._gripped is not None:
+            self._gripped(self._end if holds else t, holds)
+        self._holds = holds
+
+
+def _meaning(hand: float | bool) -> tuple[float, bool]:
+    """Opening [mm], and whether something is held then; closed is 0."""
+    if isinstance(hand, bool):
+        return (OPEN, False) if hand else (0.0, True)
+    opening = min(max(hand, 0.0), OPEN)
+    return opening, opening <= 0.0

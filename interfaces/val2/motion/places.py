@@ -1,0 +1,169 @@
+"""Where locations are: the tool's tip in BASE's frame, the last link in the robot's, and joints between them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from interfaces.val2.errors import ValError
+from interfaces.val2.geometry import FLANGE, from_base, from_val_joints, to_base, to_val_joints
+from interfaces.val2.ports import Where
+from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation
+from vrs.errors import InvalidValueError, OutOfLimitsError, UnreachablePoseError
+from vrs.model import Array, RobotModel
+
+READY: Final = PrecisionPoint((0.0, -90.0, 90.0, 0.0, 0.0, 0.0))
+NEST: Final = PrecisionPoint((0.0, -135.0, 180.0, 0.0, 45.0, 0.0))
+"""Ours: the arm folded over its shoulder."""
+AXES: Final = np.diag([-1.0, -1.0, 1.0])
+"""VAL's world axes in the base frame, and its hand's axes in the last link's."""
+_WORDS: Final = (("RIGHTY", "LEFTY"), ("ABOVE", "BELOW"), ("FLIP", "NOFLIP"))
+_MODELS: Final = {"FLIP": "NOFLIP", "NOFLIP": "FLIP"}
+"""VAL's FLIP is a negative joint 5, which the model calls NOFLIP."""
+
+_OUTSIDE: Final = re.compile(r"joint (\d) would be at \S+ deg, (\S+ deg) outside its limits \[[^]]*\] deg")
+"""What the model says of joint angles, which have other zeros."""
+_WRIST: Final = re.compile(r"\b(NO)?FLIP\b")
+
+
+def location_error(detail: str) -> ValError:
+    """A location that the arm can't reach; the model's words of a configuration become VAL's."""
+    detail = _OUTSIDE.sub(r"Jt \1 would be \2 outside its limits", detail)
+    return ValError("Location out of range", _WRIST.sub(lambda found: _MODELS[found[0]], detail))
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Tool and base, and the robot between them."""
+
+    model: RobotModel
+    tool: Transformation = NULL
+    base: Transformation = NULL
+
+    def with_tool(self, tool: Transformation) -> Frames:
+        """The same with another tool."""
+        return replace(self, tool=tool)
+
+    def with_base(self, base: Transformation) -> Frames:
+        """The same with another base."""
+        return replace(self, base=base)
+
+    def tip(self) -> Array:
+        """The tool's tip in the frame of the last link, (4, 4) [m]."""
+        X = np.eye(4)
+        X[:3, :3] = AXES @ self.tool.X[:3, :3]
+        X[:3, 3] = AXES @ (self.tool.X[:3, 3] + (0.0, 0.0, FLANGE)) / 1000.0
+        return X
+
+    def where(self, q: Array, hand: float) -> Where:
+        """Where joints [rad], (6,), put the tool."""
+        flange = from_base(self.model.forward(q))
+        tip = self.base.inverse() @ flange @ self.tool
+        return Where(tip, to_val_joints(q, self.model.limits), hand)
+
+    def pose(self, place: Transformation) -> Array:
+        """Pose of the last link in the robot's base frame, (4, 4) [m], that puts the tool at a place."""
+        if self.tool is NULL:
+            return to_base(place if self.base is NULL else self.base @ place)
+        return to_base(self.base @ place @ self.tool.inverse())
+
+    def place(self, location: Location) -> Transformation:
+        """The tool at a location."""
+        if isinstance(location, Transformation):
+            return location
+        return self.where(self.joints(location), 0.0).tool
+
+    def joints(self, point: PrecisionPoint) -> Array:
+        """Joints [rad], (6,), of a precision point.
+
+        Raises:
+            ValError: If a joint can't go there.
+        """
+        limits = self.model.limits
+        q = from_val_joints(point, limits)
+        # A limit itself is allowed, whatever the conversion rounds.
+        q = np.where(np.abs(q - limits.q_min) < 1e-12, limits.q_min, q)
+        q = np.where(np.abs(q - limits.q_max) < 1e-12, limits.q_max, q)
+        self._check(q)
+        return q
+
+    def _check(self, q: Array) -> None:
+        try:
+            self.model.limits.check(q)
+        except OutOfLimitsError as error:
+            low, high = (
+                to_val_joints(edge, self.model.limits).joints[error.joint]
+                for edge in (self.model.limits.q_min, self.model.limits.q_max)
+            )
+            at = to_val_joints(q, self.model.limits).joints[error.joint]
+            text = f"Jt {error.joint + 1} would be at {at:.6g} deg, allowed are {low:.6g} to {high:.6g}"
+            raise location_error(text) from None
+
+    def solve(self, location: Location, near: Array, words: tuple[str, ...]) -> Array:
+        """Joints [rad], (6,), that put the tool at a location, in the arm's own configuration but for what's asked.
+
+        Args:
+            location: Where to.
+            near: Where the arm comes from [rad], (6,).
+            words: Configuration words that are asked for, VAL's.
+
+        Raises:
+            ValError: If it can't be reached so.
+        """
+        if isinstance(location, PrecisionPoint):
+            return self.joints(location)
+        X = self.pose(location)
+        try:
+            if not words:
+                return self.model.inverse_near(X, near)
+            asked = " ".join(_MODELS.get(word, word) for word in words)
+            own = self.model.configuration(near).split()
+            kept = " ".join(word for word, pair in zip(own, _WORDS, strict=True) if not set(pair) & set(words))
+            try:
+                return self.model.inverse_near(X, near, f"{asked} {kept}")
+            except UnreachablePoseError:
+                return self.model.inverse_near(X, near, asked)
+        except (UnreachablePoseError, InvalidValueError) as error:
+            raise location_error(str(error)) from None
+
+    def configured(self, q: Array) -> tuple[str, ...]:
+        """VAL's words of the configuration at joints [rad], (6,)."""
+        return tuple(_MODELS.get(word, word) for word in self.model.configuration(q).split())
+
+
+def with_word(words: tuple[str, ...], word: str) -> tuple[str, ...]:
+    """What is asked for of the configuration, with another word; the word before it of the pair is dropped."""
+    for pair in _WORDS:
+        if word in pair:
+            return (*(other for other in words if other not in pair), word)
+    raise ValError("Illegal value", f"{word}: a configuration is {', '.join(w for pair in _WORDS for w in pair)}")
+
+
+def aligned(place: Transformation) -> Transformation:
+    """The same place with the tool's axis along the world axis that's nearest, turned the shortest way."""
+    X = np.array(place.X)
+    z = X[:3, 2]
+    axis = np.zeros(3)
+    k = int(np.argmax(np.abs(z)))
+    axis[k] = 1.0 if z[k] > 0 else -1.0
+    v, c = np.cross(z, axis), float(z @ axis)
+    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    X[:3, :3] = (np.eye(3) + K + K @ K / (1.0 + c)) @ X[:3, :3]
+    return Transformation(X)
+
+
+def behind(place: Transformation, distance: float) -> Transformation:
+    """The place at a distance [mm] back along the tool's axis."""
+    X = np.array(place.X)
+    X[:3, 3] -= distance * X[:3, 2]
+    return Transformation(X)
+
+
+def shifted(place: Transformation, dx: float, dy: float, dz: float) -> Transformation:
+    """The place shifted along the axes of its frame [mm]."""
+    X = np.array(place.X)
+    X[:3, 3] += (dx, dy, dz)
+    return Transformation(X)

@@ -1,0 +1,206 @@
+"""What the arm has been asked for, and what it waits for."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import MutableMapping
+from typing import Final
+
+import numpy as np
+
+from interfaces.val2.errors import ValError
+from interfaces.val2.motion.altering import Alterations
+from interfaces.val2.motion.hand import Gripped, Hand
+from interfaces.val2.motion.pacing import MonitorSpeed
+from interfaces.val2.motion.places import Frames, location_error
+from interfaces.val2.motion.robot import Fate, Robot
+from interfaces.val2.motion.speeds import Manner, Manners
+from interfaces.val2.ports import Where
+from interfaces.val2.values import Location
+from vrs.commands import Command, MotionCommand
+from vrs.model import Array
+
+_POLL: Final = 0.01
+"""How often it's looked whether an answer has come [s]."""
+_NULL_POLL: Final = 0.05
+"""How often it's looked whether the other twin is there [s]."""
+_NULL_PATIENCE: Final = 5.0
+"""How long NULL waits for it [s]."""
+_FINE: Final = math.radians(0.2)
+"""100 % of FINE: errors of joints that count as none [rad]."""
+_COARSE: Final = math.radians(2.0)
+_RECENT: Final = 4
+"""Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
+
+
+class Progress:
+    """How far an arm is with what was asked of it."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        parameters: MutableMapping[str, float] | None = None,
+        gripped: Gripped | None = None,
+    ) -> None:
+        """Command a robot.
+
+        Args:
+            robot: The robot.
+            parameters: Shared with the interpreter; of them HAND.TIME [s] is read.
+            gripped: Is told when the hand takes hold of something or lets go [s].
+        """
+        self.robot = robot
+        self.parameters: MutableMapping[str, float] = {} if parameters is None else parameters
+        self._frames = Frames(robot.model)
+        self._manners = Manners()
+        self._hand = Hand(self.parameters, gripped)
+        self._alterations = Alterations()
+        self._pace = MonitorSpeed(robot)
+        self._continuous = True
+        self._dry: Array | None = None
+        """Where a dry run would be by now [rad], (6,); None outside of one."""
+        self._words: tuple[str, ...] = ()
+        self._at: float | None = None
+        self._delay: tuple[float, float] | None = None
+        """When a DELAY may begin at the earliest, and how long it lasts [s]."""
+        self._open: list[tuple[int, bool]] = []
+        """What has no answer yet, and whether it's a straight line."""
+        self._recent: deque[tuple[int, MotionCommand]] = deque(maxlen=_RECENT)
+        self._interrupted: tuple[MotionCommand, ...] = ()
+        self._made = Manner()
+        """How the newest motion was asked for."""
+        self._made_words: tuple[str, ...] = ()
+        self._now = -math.inf
+
+    # Where it is.
+
+    def here(self, *, now: float) -> Where:
+        """Where the operator's arm is."""
+        return self.past(now, now=now)
+
+    def destination(self, *, now: float) -> Where:
+        """Where it goes."""
+        self._look(now)
+        return self._frames.where(self._goal(), self._hand.goal)
+
+    def real(self, *, now: float) -> Where | None:
+        """Where the other twin was measured last."""
+        q = self.robot.real(now=now)
+        return None if q is None else self._frames.where(q, self._hand.opening(now))
+
+    def past(self, t: float, *, now: float) -> Where:
+        """Where the arm was, or will be, at a time [s]."""
+        self._look(now)
+        return self._frames.where(self.robot.timeline.sample(t), self._hand.opening(t))
+
+    def _goal(self) -> Array:
+        """Joints at the destination [rad], (6,)."""
+        return self.robot.timeline.final() if self._dry is None else self._dry
+
+    def reaches(self, location: Location, *, now: float) -> bool:
+        """Whether a motion could go there."""
+        self._look(now)
+        try:
+            self._frames.solve(location, self._goal(), ())
+        except ValError:
+            return False
+        return True
+
+    # What it waits for.
+
+    def _look(self, now: float) -> None:
+        self._now = now
+        self._pace.advance(now=now)
+        self._hand.begin(self._begins, now)
+
+    def _begins(self, number: int) -> float | None:
+        """When a motion begins [s]; None while that's unknown. One that was taken back has begun."""
+        fate = self.robot.fate(number, now=self._now)
+        if fate is None:
+            return None
+        receipt = fate.receipt
+        known = receipt is not None and receipt.execute_at is not None and not receipt.undone
+        return receipt.execute_at if receipt is not None and known else self._now
+
+    def _delay_span(self) -> tuple[float, float]:
+        """When the DELAY begins and ends [s]; in the past where there's none."""
+        if self._delay is None:
+            return -math.inf, -math.inf
+        earliest, seconds = self._delay
+        begin = max(earliest, self.robot.timeline.end)
+        return begin, begin + seconds
+
+    def answered(self, *, now: float) -> bool:
+        """Whether all that was asked has been answered."""
+        self._look(now)
+        while self._open:
+            number, straight = self._open[0]
+            fate = self.robot.fate(number, now=now)
+            if fate is None:
+                return False
+            self._open.pop(0)
+            if fate.reason:
+                raise _refusal(fate, straight)
+        return not self._pace.waits
+
+    def ready(self, *, now: float) -> bool:
+        """Whether the next motion may be asked for: the last has begun, and all has been answered."""
+        return self.answered(now=now) and self._begun(now)
+
+    def _begun(self, now: float) -> bool:
+        last = self._begins(self._recent[-1][0]) if self._recent else -math.inf
+        return last is not None and last <= now and self._delay_span()[0] <= now
+
+    def settled(self, *, now: float) -> bool:
+        """Whether the arm stands at its destination, and the hand has done what it was told."""
+        if not self.answered(now=now) or self._hand.waits:
+            return False
+        return now >= max(self._end(), self._hand.end) and self._nulled(now)
+
+    def _end(self) -> float:
+        return max(self.robot.timeline.end, self._delay_span()[1])
+
+    def _nulled(self, now: float) -> bool:
+        """Whether the other twin is there, where a motion was to end so."""
+        q = self.robot.real(now=now) if self._made.nulling and self._dry is None else None
+        if q is None or now >= self._end() + _NULL_PATIENCE:
+            return True
+        allowed = (_FINE if self._made.fine else _COARSE) * self._made.tolerance / 100.0
+        return bool(np.abs(q - self.robot.timeline.final()).max() <= allowed)
+
+    def next_deadline(self) -> float:
+        """When any of these may change by itself [s]; infinity for never."""
+        now, (delayed, ends) = self._now, self._delay_span()
+        times = [self.robot.timeline.end, self._hand.end, self._pace.next_deadline(), delayed, ends]
+        if self._recent:
+            begins = self._begins(self._recent[-1][0])
+            times.append(now + _POLL if begins is None else begins)
+        if self._open or self._pace.waits:
+            times.append(now + _POLL)
+        if self._made.nulling and now >= self._end() and not self._nulled(now):
+            times.append(now + _NULL_POLL)
+        return min((t for t in times if t > now), default=math.inf)
+
+    def _moves(self, now: float) -> bool:
+        """Whether the arm is on a motion that a program or the monitor asked for."""
+        return bool(self._recent) and now < self.robot.timeline.end
+
+    def _send(self, command: Command | None, straight: bool, now: float) -> int:
+        number = self.robot.ask(command, now=now)
+        fate = self.robot.fate(number, now=now)
+        if fate is None:
+            self._open.append((number, straight))
+        elif fate.reason:
+            raise _refusal(fate, straight)
+        return number
+
+
+def _refusal(fate: Fate, straight: bool) -> ValError:
+    """What a refusal is in VAL's words."""
+    if fate.receipt is None:
+        return ValError("Command refused", fate.reason)
+    if straight:
+        return ValError("Straight line not possible", fate.reason)
+    return location_error(fate.reason)

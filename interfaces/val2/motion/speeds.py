@@ -1,0 +1,125 @@
+"""How fast motions go: VAL's program speed, accelerations and durations, and shares of the robot's own."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from interfaces.val2.errors import ValError
+from vrs.model import Array, RobotModel
+
+SLOWEST: Final = 1e-3
+"""Least share of a speed."""
+INCH: Final = 25.4
+"""[mm]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """A program speed."""
+
+    value: float = 100.0
+    """In its unit."""
+    unit: str = "%"
+    """`%`, `MMPS` or `IPS`."""
+    turn: float = 100.0
+    """Of turning [%], for straight lines."""
+
+    def _linear(self, model: RobotModel) -> float:
+        """Share of the tool's nominal speed."""
+        if self.unit == "%":
+            return self.value / 100.0
+        return self.value * (INCH if self.unit == "IPS" else 1.0) / 1000.0 / model.tool_speed
+
+    def share(self, model: RobotModel) -> float:
+        """Share of the nominal speeds for a joint-interpolated motion."""
+        return bounded(self._linear(model))
+
+    def line_share(self, model: RobotModel, start: Array, goal: Array) -> float:
+        """Share of the nominal speeds for a straight line between poses of the tool's tip, (4, 4) [m].
+
+        It's the share at which neither way nor turn is faster than it may be.
+        """
+        way = float(np.linalg.norm(goal[:3, 3] - start[:3, 3])) / model.tool_speed
+        cosine = 0.5 * (float(np.sum(goal[:3, :3] * start[:3, :3])) - 1.0)
+        turn = math.acos(min(max(cosine, -1.0), 1.0)) / model.tool_turn_speed
+        slowest = max(way / self._linear(model), turn / (self.turn / 100.0))
+        return bounded(max(way, turn) / slowest) if slowest > 0 else self.share(model)
+
+
+def bounded(share: float) -> float:
+    """A share between the least and all of it."""
+    return min(max(share, SLOWEST), 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How a motion is made."""
+
+    speed: Speed = Speed()
+    acceleration: float = 1.0
+    """Share of the limits, in [0.01, 1]."""
+    duration: float = 0.0
+    """Least time that it takes [s]; 0 for none."""
+    fine: bool = False
+    tolerance: float = 100.0
+    """How near counts as there [%]."""
+    nulling: bool = False
+    """Whether its end waits for the other twin."""
+
+
+class Manners:
+    """What holds for the next motion, and what for all after it."""
+
+    def __init__(self) -> None:
+        self.always = Manner()
+        self.next = Manner()
+
+    def reset(self) -> None:
+        """Be as at the beginning of a program."""
+        self.always = self.next = Manner()
+
+    def taken(self) -> None:
+        """A motion was made: what was for it alone is over."""
+        self.next = self.always
+
+    def _change(self, always: bool, **changes: object) -> None:
+        self.next = replace(self.next, **changes)  # type: ignore[arg-type]
+        if always:
+            self.always = replace(self.always, **changes)  # type: ignore[arg-type]
+
+    def set_speed(self, speed: float, turn: float | None, unit: str, always: bool) -> None:
+        """SPEED; in percent it's the speed of turning, too, unless that's given."""
+        for value in (speed, turn):
+            if value is not None and not 0 < value < math.inf:
+                raise ValError("Illegal value", f"{value:g}: a speed is above 0")
+        if turn is None:
+            turn = speed if unit == "%" else 100.0
+        self._change(always, speed=Speed(speed, unit, turn))
+
+    def set_acceleration(self, up: float, down: float) -> None:
+        """ACCEL; the smaller counts for both."""
+        for value in (up, down):
+            if not 0 < value < math.inf:
+                raise ValError("Illegal value", f"{value:g}: an acceleration is above 0")
+        self._change(True, acceleration=min(max(min(up, down) / 100.0, 0.01), 1.0))
+
+    def set_duration(self, seconds: float, always: bool) -> None:
+        """DURATION."""
+        if not 0 <= seconds < math.inf:
+            raise ValError("Illegal value", f"{seconds:g}: a duration is 0 or above")
+        self._change(always, duration=seconds)
+
+    def set_tolerance(self, percent: float | None, fine: bool, always: bool) -> None:
+        """COARSE, FINE."""
+        percent = 100.0 if percent is None else percent
+        if not 0 < percent < math.inf:
+            raise ValError("Illegal value", f"{percent:g}: a tolerance is above 0 %")
+        self._change(always, fine=fine, tolerance=percent)
+
+    def set_nulling(self, on: bool, always: bool) -> None:
+        """NULL, NONULL."""
+        self._change(always, nulling=on)

@@ -1,0 +1,257 @@
+"""From text to trees: lines, expressions and programs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Final
+
+from interfaces.val2 import forms, grammar, statements
+from interfaces.val2.errors import Place, ValError
+from interfaces.val2.printer import print_step
+from interfaces.val2.rest import HIGHEST_LABEL, Rest
+from interfaces.val2.slots import nearest
+from interfaces.val2.syntax import Blank, Expression, Instruction, Program, Statement, Step, Variable
+
+LONGEST_LINE: Final = 1000
+MOST_LINES: Final = 100_000
+DIRECTIVES: Final = (".PROGRAM", ".END", ".LOCATIONS", ".REALS", ".STRINGS", ".SIGNALS")
+"""What lines of a file may begin with, beside what programs hold."""
+
+_SURELY_SHORT: Final = 120
+"""Characters of a line that can't come to too many when they're printed."""
+_INDENTED: Final = 250
+"""Columns that structures may indent a line by, and a label."""
+_BREAK: Final = re.compile(r"\r\n|\r|\n")
+_CODE: Final = re.compile(r'(?:[^";]|"[^"]*")*')
+_LABEL: Final = re.compile(r"\s*([0-9]+)(?![A-Za-z0-9_.])\s*")
+_HEAD: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)\s*(\[|=(?!=))?")
+_REMARK: Final = re.compile(r"\s*(?:[0-9]+\s+)?(REMARK)(?![A-Za-z0-9_.])\s?(?!\s*[=\[])", re.IGNORECASE | re.ASCII)
+_HEADER: Final = re.compile(r"\s*\.PROGRAM(?![A-Za-z0-9_.])\s*", re.IGNORECASE | re.ASCII)
+_PROGRAM_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
+_PARAMETER: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)\s*(\[[\s,]*\])?\s*")
+_DIRECTIVE: Final = re.compile(r"\s*(\.[A-Za-z]+)(?![A-Za-z0-9_.])", re.ASCII)
+
+
+def lines_of(text: str) -> list[str]:
+    """The lines of a text, however they end.
+
+    Raises:
+        ValError: If there are too many of them.
+    """
+    lines = _BREAK.split(text.removeprefix("\ufeff").rstrip("\x1a\x00"))
+    if len(lines) > MOST_LINES:
+        raise ValError("Text too long", f"{MOST_LINES} lines at most")
+    return lines
+
+
+def parse_line(text: str) -> Step:
+    """The step of one line, such as `100 MOVE p1 ;there`.
+
+    Raises:
+        ValError: If it can't be one; its place is in line 1.
+    """
+    return read_line(text, 1)
+
+
+def read_line(text: str, line: int) -> Step:
+    """The step of a line that has a number in its text, from 1.
+
+    Raises:
+        ValError: If it can't be one.
+    """
+    _see_one_line(text, line)
+    step = _step(text, line)
+    if len(text) > _SURELY_SHORT and len(print_step(step)) > LONGEST_LINE - _INDENTED:
+        detail = f"spelled out it has more than {LONGEST_LINE - _INDENTED} characters"
+        raise ValError("Line too long", detail, place=step.at)
+    return step
+
+
+def _see_one_line(text: str, line: int) -> None:
+    if len(text) > LONGEST_LINE:
+        detail = f"{LONGEST_LINE} characters at most"
+        raise ValError("Line too long", detail, place=Place(line, LONGEST_LINE + 1))
+    if "\n" in text or "\r" in text:
+        found = _BREAK.search(text)
+        column = found.start() + 1 if found else 1
+        raise ValError("Syntax error", "one line is allowed", place=Place(line, column))
+
+
+@lru_cache(maxsize=8192)
+def _step(text: str, line: int) -> Step:
+    if remark := _REMARK.match(text):
+        label, _ = _label(text, line)
+        return Step(Blank(), label, text[remark.end() :].rstrip(), Place(line, remark.start(1) + 1))
+    code, comment = split_comment(text, line)
+    label, begin = _label(code, line)
+    found = _HEAD.match(code, begin)
+    if found is None:
+        begin += len(code[begin:]) - len(code[begin:].lstrip())
+        if begin < len(code):
+            detail = f"unexpected {code[begin]!r}; allowed: an instruction, or a variable and '='"
+            raise ValError("Syntax error", detail, place=Place(line, begin + 1))
+        return Step(Blank(), label, comment, Place(line, 1))
+    at = Place(line, found.start(1) + 1)
+    keyword = found[1].upper()
+    if found[2]:
+        return Step(statements.assignment(Rest(code, found.start(1), at)), label, comment, at)
+    rest = Rest(code, found.end(1), at)
+    if keyword == "END" and not rest.empty:
+        rest, comment = Rest("", found.end(1), at), text[found.end(1) :].strip()
+    return Step(statements.statement(keyword, rest), label, comment, at)
+
+
+def split_comment(text: str, line: int) -> tuple[str, str | None]:
+    """The code of a line, and its comment.
+
+    Raises:
+        ValError: If a string has no closing quote.
+    """
+    code, semicolon, comment = text.partition(";")
+    if '"' in code:
+        found = _CODE.match(text)
+        end = found.end() if found else 0
+        if text[end : end + 1] == '"':
+            raise ValError("Syntax error", "the string has no closing quote", place=Place(line, end + 1))
+        code, semicolon, comment = text[:end], text[end : end + 1], text[end + 1 :]
+    return code, comment.rstrip() if semicolon else None
+
+
+def _label(code: str, line: int) -> tuple[int | None, int]:
+    """The label of a line, and where what stands behind it begins."""
+    found = _LABEL.match(code)
+    if found is None:
+        return None, 0
+    if len(found[1].lstrip("0")) > len(str(HIGHEST_LABEL)) or int(found[1]) > HIGHEST_LABEL:
+        raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=Place(line, found.start(1) + 1))
+    return int(found[1]), found.end()
+
+
+def parse_expression(text: str) -> Expression:
+    """The expression of a text.
+
+    Raises:
+        ValError: If it isn't one.
+    """
+    _see_one_line(text, 1)
+    return grammar.expression(grammar.read(text, "expression", 1), 1)
+
+
+def parse_program(text: str) -> Program:
+    """The program of a text from `.PROGRAM` on; `.END` may be missing.
+
+    Raises:
+        ValError: If it isn't one program.
+    """
+    lines = lines_of(text)
+    begin = next((i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(";")), 0)
+    program, end = read_program(lines, begin)
+    for i in range(end, len(lines)):
+        if lines[i].strip() and not lines[i].lstrip().startswith(";"):
+            raise ValError("Syntax error", "one program is allowed", place=Place(i + 1, 1))
+    return program
+
+
+def directive(line: str) -> str:
+    """The directive that a line begins with, upper case; empty if there's none."""
+    if not line.lstrip().startswith("."):
+        return ""
+    found = _DIRECTIVE.match(line)
+    return found[1].upper() if found else "."
+
+
+def read_program(lines: Sequence[str], begin: int) -> tuple[Program, int]:
+    """The program whose header is a line, counted from 0, and the line behind it.
+
+    Raises:
+        ValError: If there's no such program; its place is in the lines.
+    """
+    name, parameters, comment = _header(lines[begin], begin + 1)
+    steps, end = read_steps(lines, begin + 1, name)
+    return Program(name, parameters, steps, comment, Place(begin + 1, 1)), end
+
+
+def read_steps(lines: Sequence[str], begin: int, name: str) -> tuple[tuple[Step, ...], int]:
+    """The steps from a line, counted from 0, to `.END`, and the line behind it.
+
+    Raises:
+        ValError: If one of them can't be a step.
+    """
+    steps: list[Step] = []
+    for i in range(begin, len(lines)):
+        match directive(lines[i]):
+            case "":
+                try:
+                    steps.append(read_line(lines[i], i + 1))
+                except ValError as error:
+                    raise error.at(program=name) from None
+            case ".END":
+                return tuple(steps), i + 1
+            case other:
+                if other in DIRECTIVES:
+                    return _trimmed(steps), i
+                raise unknown_directive(lines[i], i + 1).at(program=name)
+    return _trimmed(steps), len(lines)
+
+
+def unknown_directive(line: str, number: int) -> ValError:
+    """The error of a line that begins with what is no directive."""
+    word = line.split(maxsplit=1)[0]
+    detail = f"{word}{nearest(word, DIRECTIVES)}; allowed: {', '.join(DIRECTIVES)}"
+    return ValError("Undefined directive", detail, place=Place(number, len(line) - len(line.lstrip()) + 1))
+
+
+def _trimmed(steps: list[Step]) -> tuple[Step, ...]:
+    """Without the blank lines at the end, where none says that they're the program's."""
+    end = len(steps)
+    while end and steps[end - 1] == Step(Blank()):
+        end -= 1
+    return tuple(steps[:end])
+
+
+def _header(line: str, number: int) -> tuple[str, tuple[Variable, ...], str | None]:
+    code, comment = split_comment(line, number)
+    found = _HEADER.match(code)
+    if found is None:
+        at = Place(number, len(line) - len(line.lstrip()) + 1)
+        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=at)
+    name = _PROGRAM_NAME.match(code, found.end())
+    if name is None:
+        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(number, found.end() + 1))
+    parameters, end = _parameters(code, name.end(), number)
+    if code[end:].strip():
+        column = end + len(code[end:]) - len(code[end:].lstrip()) + 1
+        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(number, column))
+    return grammar.name_of(name[0]), parameters, comment
+
+
+def _parameters(code: str, begin: int, line: int) -> tuple[tuple[Variable, ...], int]:
+    opening = begin + len(code[begin:]) - len(code[begin:].lstrip())
+    if code[opening : opening + 1] != "(":
+        return (), begin
+    closing = code.find(")", opening)
+    if closing < 0:
+        raise ValError("Syntax error", "')' is missing", place=Place(line, len(code.rstrip()) + 1))
+    parameters: list[Variable] = []
+    position = opening + 1
+    while code[position:closing].strip():
+        found = _PARAMETER.match(code, position, closing)
+        if found is None or (found.end() < closing and code[found.end()] != ","):
+            column = (found.end() if found else position) + 1
+            raise ValError("Syntax error", "allowed: names with commas between them", place=Place(line, column))
+        at = Place(line, found.start(1) + 1)
+        variable = Variable(grammar.name_of(found[1]), (), at, array=bool(found[2]))
+        if found[1].upper() in forms.CONSTANTS:
+            raise ValError("Reserved name", f"{found[1].upper()} is a function", place=at)
+        if any(variable.name == other.name for other in parameters):
+            raise ValError("Duplicate name", variable.name, place=at)
+        parameters.append(variable)
+        position = found.end() + 1
+    return tuple(parameters), closing + 1
+
+
+def is_motion(statement: Statement) -> bool:
+    """Whether a statement is a motion."""
+    return isinstance(statement, Instruction) and forms.INSTRUCTIONS[statement.keyword].group == "motion"

@@ -1,0 +1,138 @@
+"""A program of a file, from its first step to its end, for whoever lets time pass."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from interfaces.val2.controller import Controller
+from interfaces.val2.errors import Place, ValError
+from interfaces.val2.events import Asked, Ended, Event, Failed, Paused, Typed, Warned
+from interfaces.val2.motion import Arm
+from interfaces.val2.source import SourceFile
+
+
+def unanswered(question: str) -> str | None:  # noqa: ARG001
+    """Nobody answers."""
+    return None
+
+
+def unheard(text: str) -> None:
+    """Nobody listens."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listeners:
+    """Who hears what a program says."""
+
+    typed: Callable[[str], None] = unheard
+    """What it TYPEs, with line ends."""
+    told: Callable[[str], None] = unheard
+    """Warnings, a line each."""
+    asked: Callable[[str], str | None] = unanswered
+    """Answers PROMPT; None where nobody does."""
+
+
+@dataclass(slots=True)
+class Player:
+    """A controller that carries out the first program of a file, once."""
+
+    source: SourceFile
+    arm: Arm
+    listeners: Listeners = field(default_factory=Listeners)
+    rng: random.Random | None = None
+    """Of RANDOM."""
+    skips: bool = False
+    """Whether it goes on after what it can't reach, and after PAUSE."""
+    errors: list[ValError] = field(default_factory=list)
+    """What stopped it, or what it went on after."""
+    done: bool = False
+    _controller: Controller = field(init=False)
+
+    def __post_init__(self) -> None:
+        if not self.source.programs:
+            raise ValError("Undefined program name", "the file holds no program")
+        self._controller = controller = Controller(self.arm, parameters=self.arm.parameters, rng=self.rng)
+        for program in self.source.programs:
+            controller.memory.programs[program.name] = program
+        for entry in (*self.source.locations, *self.source.reals, *self.source.strings):
+            controller.memory.set(entry.variable, entry.value)
+        controller.cell = self.source.signals
+
+    def begin(self, now: float) -> None:
+        """Execute the program.
+
+        Raises:
+            ValError: If it can't be.
+        """
+        self._controller.execute(self.source.programs[0].name, now=now)
+
+    def advance(self, now: float) -> None:
+        """Do what is due by now [s]."""
+        for event in self._controller.advance(now=now):
+            self._take(event, now)
+
+    def next_deadline(self) -> float:
+        """When something is due [s]; infinity where nothing will ever be."""
+        return math.inf if self.done else self._controller.next_deadline()
+
+    def give_up(self, error: ValError, now: float) -> None:
+        """End it for a reason of its surroundings."""
+        self.errors.append(error)
+        self._controller.abort(now=now)
+        self.done = True
+
+    def _take(self, event: Event, now: float) -> None:
+        match event:
+            case Typed(text):
+                self.listeners.typed(text)
+            case Warned(text):
+                self.listeners.told(text)
+            case Asked(question):
+                line = self.listeners.asked(question)
+                if line is None:
+                    self.give_up(ValError("No answer", f"nobody answers {question!r}"), now)
+                else:
+                    self._controller.answer(line, now=now)
+            case Failed(error):
+                self.errors.append(error)
+                self._go_on(now, unreached(error))
+            case Paused(program, step, word):
+                if not self.done and not self._go_on(now, True):
+                    self.listeners.told(f"{word} in program {program} before step {step}: nobody proceeds")
+            case Ended():
+                self.done = True
+            case _:
+                pass
+
+    def _go_on(self, now: float, may: bool) -> bool:
+        if self.skips and may:
+            self._controller.proceed(now=now)
+            return True
+        self.done = True
+        return False
+
+    def place(self, error: ValError) -> Place | None:
+        """Where in the file an error happened; None where that's unknown."""
+        for program in self.source.programs:
+            if program.name == error.program and error.step is not None and error.step <= len(program.steps):
+                at = program.steps[error.step - 1].at
+                return Place(at.line, at.column if error.place is None else error.place.column)
+        return error.place if error.step is None else None
+
+
+def unreached(error: ValError) -> bool:
+    """Whether an error is about where the arm can't go."""
+    return error.what in ("Location out of range", "Straight line not possible")
+
+
+def stuck() -> ValError:
+    """The error of a program that nothing wakes."""
+    return ValError("Waits for ever", "no signal that it waits for will come")
+
+
+def endless(limit: float) -> ValError:
+    """The error of a program that is given up."""
+    return ValError("Program given up", f"it hadn't ended after {limit:g} s")

@@ -1,0 +1,276 @@
+"""From trees to text: keywords in upper case, names in lower case; parsing it gives the same trees."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from interfaces.val2 import forms
+from interfaces.val2.syntax import (
+    AnyValue,
+    Apply,
+    Assign,
+    Binary,
+    Blank,
+    Call,
+    Case,
+    Compound,
+    Decompose,
+    Do,
+    Else,
+    End,
+    Exit,
+    Expression,
+    For,
+    Format,
+    Goto,
+    If,
+    IfGoto,
+    Ignored,
+    Instruction,
+    Local,
+    Next,
+    Number,
+    Program,
+    Prompt,
+    React,
+    Return,
+    Set,
+    Statement,
+    Step,
+    Text,
+    Type,
+    Unary,
+    Until,
+    Value,
+    Variable,
+    While,
+)
+
+INDENT: Final = 2
+"""Blanks for each level of structure."""
+MARGIN: Final = 6
+"""Columns in which labels stand."""
+
+_NOT, _SIGN, _POWER, _COMPOUND, _ATOM = forms.LEVEL_OF_NOT, forms.LEVEL_OF_SIGN, forms.LEVELS["^"], 9, 10
+
+
+def print_expression(expression: Expression) -> str:
+    """The text of an expression."""
+    return _spelled(expression, 0)
+
+
+def _spelled(expression: Expression, level: int) -> str:
+    """The text of an expression, in parentheses if it binds less than a level asks for."""
+    text, own = _text(expression)
+    return f"({text})" if own < level else text
+
+
+def _text(expression: Expression) -> tuple[str, int]:
+    match expression:
+        case Number(value):
+            return number(value), _ATOM if value >= 0 else _SIGN
+        case Text(value):
+            return string(value)
+        case Variable():
+            return _variable(expression), _ATOM
+        case Apply(name, arguments):
+            return _apply(name, arguments), _ATOM
+        case Unary("NOT", operand):
+            return f"NOT {_spelled(operand, _NOT)}", _NOT
+        case Unary(operator, operand):
+            blank = " " if operator == "COM" else ""
+            return f"{operator}{blank}{_spelled(operand, _SIGN)}", _SIGN
+        case Binary("^", left, right):
+            return f"{_spelled(left, _POWER)}^{_exponent(right)}", _POWER
+        case Binary(operator, left, right):
+            level = forms.LEVELS[operator]
+            return f"{_spelled(left, level)} {operator} {_spelled(right, level + 1)}", level
+        case Compound(parts):
+            return ":".join(_spelled(part, _ATOM) for part in parts), _COMPOUND
+
+
+def _exponent(expression: Expression) -> str:
+    if isinstance(expression, Unary) and expression.operator != "NOT":
+        blank = " " if expression.operator == "COM" else ""
+        return f"{expression.operator}{blank}{_exponent(expression.operand)}"
+    return _spelled(expression, _COMPOUND)
+
+
+def number(value: float) -> str:
+    """The shortest text of a number that gives it again exactly."""
+    text = repr(float(value)).upper()
+    return text.removesuffix(".0")
+
+
+def string(value: str) -> tuple[str, int]:
+    """The text of a string, with `$CHR` for what can't stand between quotes, and how tightly it binds."""
+    parts: list[str] = []
+    plain = ""
+    for character in value:
+        if character in '"\r\n':
+            parts += [f'"{plain}"'] if plain else []
+            parts.append(f"$CHR({ord(character)})")
+            plain = ""
+        else:
+            plain += character
+    if plain or not parts:
+        parts.append(f'"{plain}"')
+    return " + ".join(parts), _ATOM if len(parts) == 1 else forms.LEVELS["+"]
+
+
+def _variable(variable: Variable) -> str:
+    if variable.array:
+        return f"{variable.name}[]"
+    if not variable.indices:
+        return variable.name
+    return f"{variable.name}[{','.join(_spelled(i, 0) for i in variable.indices)}]"
+
+
+def _apply(name: str, arguments: tuple[Expression | Format | None, ...]) -> str:
+    if not arguments:
+        return name if forms.FUNCTIONS[name].constant else f"{name}()"
+    if name == "SHIFT" and len(arguments) > 1:
+        return f"SHIFT({_item(arguments[0])} BY {_listed(arguments[1:])})"
+    return f"{name}({_listed(arguments)})"
+
+
+def _listed(items: tuple[Expression | Format | None, ...]) -> str:
+    """Items with commas between them."""
+    shown = ""
+    for i, item in enumerate(items):
+        text = _item(item)
+        shown += ("," if i else "") + (" " if i and text else "") + text
+    return shown
+
+
+def _item(item: Expression | Format | None) -> str:
+    if item is None:
+        return ""
+    return _format(item) if isinstance(item, Format) else _spelled(item, 0)
+
+
+def _format(item: Format) -> str:
+    width = "" if item.width is None else str(item.width)
+    return f"/{item.code}{width}" + ("" if item.decimals is None else f".{item.decimals}")
+
+
+def print_statement(statement: Statement) -> str:
+    """The text of a statement."""
+    match statement:
+        case Blank():
+            return ""
+        case Assign(target, value):
+            return f"{_variable(target)} = {print_expression(value)}"
+        case Set(target, value):
+            return f"SET {_variable(target)} = {print_expression(value)}"
+        case Decompose(target, value):
+            return f"DECOMPOSE {_variable(target)} = {print_expression(value)}"
+        case Instruction():
+            return _instruction(statement)
+        case If(condition):
+            return f"IF {print_expression(condition)} THEN"
+        case IfGoto(condition, label):
+            return f"IF {print_expression(condition)} GOTO {label}"
+        case While(condition):
+            return f"WHILE {print_expression(condition)} DO"
+        case Until(condition):
+            return f"UNTIL {print_expression(condition)}"
+        case For(variable, start, stop, step):
+            head = f"FOR {_variable(variable)} = {print_expression(start)} TO {print_expression(stop)}"
+            return head if step is None else f"{head} STEP {print_expression(step)}"
+        case Case(value):
+            return f"CASE {print_expression(value)} OF"
+        case Value(values):
+            return f"VALUE {_listed(values)}:"
+        case Else():
+            return "ELSE"
+        case End():
+            return "END"
+        case Do():
+            return "DO"
+        case AnyValue():
+            return "ANY"
+        case Return():
+            return "RETURN"
+        case Exit(count):
+            return "EXIT" if count == 1 else f"EXIT {count}"
+        case Next(count):
+            return "NEXT" if count == 1 else f"NEXT {count}"
+        case Goto(label):
+            return f"GOTO {label}"
+        case _:
+            return _other(statement)
+
+
+def _other(statement: Statement) -> str:
+    match statement:
+        case Call(program, arguments, keyword):
+            call = f"{keyword} {program}"
+            return call if keyword == "GOSUB" and not arguments else f"{call}({_listed(arguments)})"
+        case React(signal, program, immediate, always):
+            head = f"{'REACTI' if immediate else 'REACT'} {print_expression(signal)}"
+            return head + (f", {program}" if program else "") + (" ALWAYS" if always else "")
+        case Type(items):
+            return f"TYPE {_listed(items)}".rstrip()
+        case Prompt(text, targets):
+            return f"PROMPT {_listed((text, *targets))}"
+        case Local(keyword, names, kind):
+            return " ".join(filter(None, (keyword, kind, _listed(names))))
+        case Ignored(keyword, rest):
+            return f"{keyword} {rest}".rstrip()
+        case _:
+            raise AssertionError(statement)
+
+
+def _instruction(statement: Instruction) -> str:
+    keyword, operands = statement.keyword, statement.operands
+    match keyword:
+        case "PARAMETER":
+            return f"PARAMETER {statement.words[0]} = {_listed(operands)}"
+        case "TIMER":
+            index, value = (_item(o) for o in operands)
+            return f"TIMER {index} = {value}"
+        case "ENABLE" | "DISABLE":
+            return f"{keyword} {', '.join(statement.words)}"
+    return " ".join(filter(None, (keyword, _listed(operands), *statement.words)))
+
+
+def print_step(step: Step) -> str:
+    """The text of a step: label, statement and comment, without indentation."""
+    label = "" if step.label is None else str(step.label)
+    comment = None if step.comment is None else f";{step.comment}"
+    return " ".join(filter(None, (label, print_statement(step.statement), comment)))
+
+
+def print_program(program: Program) -> str:
+    """The text of a program from `.PROGRAM` to `.END`, indented by its structure, with a newline at the end."""
+    parameters = ", ".join(_variable(p) for p in program.parameters)
+    comment = "" if program.comment is None else f" ;{program.comment}"
+    lines = [f".PROGRAM {program.name}({parameters}){comment}"]
+    level = 0
+    for step in program.steps:
+        out, inside = _shape(step.statement)
+        level = max(level - out, 0)
+        lines.append(_line(step, level))
+        level += inside
+    return "\n".join([*lines, ".END", ""])
+
+
+def _shape(statement: Statement) -> tuple[int, int]:
+    """How many levels a statement stands further out, and how many what follows it stands further in."""
+    match statement:
+        case If() | While() | For() | Case() | Do():
+            return 0, 1
+        case Else() | Value() | AnyValue():
+            return 1, 1
+        case End() | Until():
+            return 1, 0
+    return 0, 0
+
+
+def _line(step: Step, level: int) -> str:
+    label = "" if step.label is None else str(step.label)
+    text = print_statement(step.statement)
+    comment = "" if step.comment is None else f";{step.comment}"
+    body = " ".join(filter(None, (text, comment)))
+    return (label.ljust(MARGIN - 1) + " " + " " * (INDENT * level) + body).rstrip() if body or label else ""

@@ -1,0 +1,170 @@
+"""Digital signals: outputs 1 to 32, inputs 1001 to 1032, internal ones 2001 to 2032; and simulated cells.
+
+A cell is a run of rules, the lines of a file's `.SIGNALS`: what sets the inputs where no factory does. An input
+takes the value of an expression once it has held that value for the rule's delay without a break, as a part is
+there when the belt has run for so long.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from interfaces.val2.errors import ValError
+
+OUTPUTS: Final = range(1, 33)
+INPUTS: Final = range(1001, 1033)
+INTERNAL: Final = range(2001, 2033)
+SOONEST: Final = 1e-3
+"""A rule acts at least so much later than what it waits for [s]: rules in a circle take time."""
+MOST_RULES: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One line of a cell."""
+
+    signal: int
+    """An input, or an internal signal."""
+    value: Callable[[], bool]
+    """What it follows."""
+    after: float = 0.0
+    """Delay [s]."""
+    lasting: float | None = None
+    """Each turning-on is a pulse so long [s]; None: the signal follows off, too."""
+    at_time: float | None = None
+    """It's done once, so long after EXECUTE [s]; None: all the time."""
+
+    def __post_init__(self) -> None:
+        times = (self.after, self.lasting or 0.0, self.at_time or 0.0)
+        if not all(math.isfinite(t) and 0.0 <= t <= 1e6 for t in times):
+            raise ValError("Invalid signal rule", "times are 0 to 1000000 s")
+        if legal(self.signal) in OUTPUTS or self.signal < 0:
+            raise ValError("Invalid signal rule", f"{self.signal}: a cell sets inputs and internal signals")
+
+
+def legal(number: float) -> int:
+    """The number of a signal, without its sign.
+
+    Raises:
+        ValError: If there's no such signal.
+    """
+    if number == int(number) and (n := abs(int(number))) and (n in OUTPUTS or n in INPUTS or n in INTERNAL):
+        return n
+    raise ValError("Illegal digital signal", f"{number:.9g}: 1 to 32, 1001 to 1032, 2001 to 2032")
+
+
+class Signals:
+    """The state of all signals, and the cell that runs beside the program."""
+
+    def __init__(self) -> None:
+        self._on: set[int] = set()
+        self._changes: list[tuple[int, bool]] = []
+        self._rules: tuple[Rule, ...] = ()
+        self._seen: list[bool] = []
+        self._due: list[float] = []
+        self._over: list[float] = []
+
+    def on(self, number: float) -> bool:
+        """Whether a signal is on; of a negative number, whether it's off.
+
+        Raises:
+            ValError: If there's no such signal.
+        """
+        return (legal(number) in self._on) == (number > 0)
+
+    def set(self, numbers: Iterable[float]) -> None:
+        """SIGNAL: turn outputs and internal signals on, or off where negative; 0 is passed over.
+
+        Raises:
+            ValError: If one of them is none of these; then nothing has changed.
+        """
+        wanted = [int(n) for n in numbers if n != 0 and legal(n)]
+        for number in wanted:
+            if abs(number) in INPUTS:
+                raise ValError("Illegal digital signal", f"{abs(number)} is an input")
+        for number in wanted:
+            self._turn(abs(number), number > 0)
+
+    def force(self, number: float) -> None:
+        """Turn any signal on, or off if negative, inputs too: what a factory does, or a monitor in its stead.
+
+        Raises:
+            ValError: If there's no such signal.
+        """
+        self._turn(legal(number), number > 0)
+
+    def reset(self) -> None:
+        """RESET: all outputs off."""
+        for number in OUTPUTS:
+            self._turn(number, on=False)
+
+    def states(self, numbers: Sequence[int]) -> list[bool]:
+        """Whether signals are on, for the monitor's IO."""
+        return [n in self._on for n in numbers]
+
+    def changes(self) -> list[tuple[int, bool]]:
+        """What has changed since this was last asked, oldest first."""
+        changes, self._changes = self._changes, []
+        return changes
+
+    @property
+    def changed(self) -> bool:
+        """Whether `changes` has something."""
+        return bool(self._changes)
+
+    def begin(self, rules: Sequence[Rule], *, now: float) -> None:
+        """Run a cell from now on; it takes the place of the one before.
+
+        Raises:
+            ValError: If there are too many rules.
+        """
+        if len(rules) > MOST_RULES:
+            raise ValError("Too many signal rules", f"{MOST_RULES} at most")
+        self._rules = tuple(rules)
+        self._seen = [r.signal in self._on for r in rules]
+        self._due = [math.inf if r.at_time is None else now + r.at_time + r.after for r in rules]
+        self._over = [math.inf] * len(rules)
+        self.advance(now=now)
+
+    def advance(self, *, now: float) -> None:
+        """Do what the cell has to do until now, in its order; what it waits for is looked at now."""
+        while (t := self.next_deadline()) <= now:
+            if t in self._over:
+                i = self._over.index(t)
+                self._over[i] = math.inf
+                self._turn(self._rules[i].signal, on=False)
+            else:
+                i = self._due.index(t)
+                self._due[i] = math.inf
+                self._act(self._rules[i], i, t)
+            self._watch(t)
+        self._watch(now)
+
+    def next_deadline(self) -> float:
+        """When the cell next does something [s]; infinity for never."""
+        return min(min(self._due, default=math.inf), min(self._over, default=math.inf))
+
+    def _act(self, rule: Rule, i: int, t: float) -> None:
+        on = self._seen[i] if rule.at_time is None else rule.value()
+        if rule.lasting is None:
+            self._turn(rule.signal, on)
+        elif on:
+            self._turn(rule.signal, on=True)
+            self._over[i] = t + max(rule.lasting, SOONEST)
+
+    def _watch(self, now: float) -> None:
+        """Notice what the rules' expressions have become."""
+        for i, rule in enumerate(self._rules):
+            if rule.at_time is None and (value := rule.value()) != self._seen[i]:
+                self._seen[i] = value
+                settled = rule.lasting is None and value == (rule.signal in self._on)
+                self._due[i] = math.inf if settled else now + max(rule.after, SOONEST)
+
+    def _turn(self, number: int, on: bool) -> None:
+        if (number in self._on) == on:
+            return
+        (self._on.add if on else self._on.discard)(number)
+        self._changes.append((number, on))

@@ -1,0 +1,287 @@
+"""Files: programs, locations, reals, strings, and the cell that is simulated around them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePath
+from typing import Final
+
+from interfaces.val2 import forms, geometry, grammar
+from interfaces.val2.errors import Place, ValError
+from interfaces.val2.parser import (
+    directive,
+    lines_of,
+    read_program,
+    read_steps,
+    split_comment,
+    unknown_directive,
+)
+from interfaces.val2.printer import number, print_expression, print_program
+from interfaces.val2.syntax import NOWHERE, Apply, Binary, Expression, Number, Program, Text, Variable
+from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
+
+DECIMALS: Final = 9
+"""Of lengths [mm] and angles [deg] of transformations: what is read again is printed as it was."""
+_NAME: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)(?:\s*\[([0-9,\s]*)\])?(?=[\s,=]|$)\s*[=,]?\s*")
+_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[Ee][+-]?[0-9]+)?(?=[\s,]|$)")
+_GAP: Final = re.compile(r"\s*,?\s*")
+_ELEMENT: Final = re.compile(r"[0-9]{1,6}")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A variable, or an element of an array with numbers as indices, and its value."""
+
+    variable: Variable
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class SignalRule:
+    """A line of `.SIGNALS`, ours: what a simulated cell does to an input or an internal signal."""
+
+    signal: int
+    value: Expression
+    """What it follows."""
+    after: float = 0.0
+    """So much later [s]."""
+    lasting: float | None = None
+    """Each turning-on is a pulse of so long [s]; None: it follows off, too."""
+    at_time: float | None = None
+    """Once, so long after EXECUTE [s]; None: all the time."""
+    at: Place = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class SourceFile:
+    """What a file holds."""
+
+    name: str
+    programs: tuple[Program, ...] = ()
+    locations: tuple[Entry, ...] = ()
+    """Transformations and precision points."""
+    reals: tuple[Entry, ...] = ()
+    strings: tuple[Entry, ...] = ()
+    signals: tuple[SignalRule, ...] = ()
+
+
+def parse_file(text: str, name: str) -> SourceFile:
+    """What the text of a file holds.
+
+    Args:
+        text: The text; lines end as they like.
+        name: Name of the file; a text that begins without `.PROGRAM` is a program of its name.
+
+    Raises:
+        ValError: If it can't be read; its place is in the file.
+    """
+    return _Reader(lines_of(text), name).run()
+
+
+class _Reader:
+    def __init__(self, lines: Sequence[str], name: str) -> None:
+        self._lines, self._name = lines, name
+        self._programs: list[Program] = []
+        self._entries: dict[str, dict[Variable, Value]] = {".LOCATIONS": {}, ".REALS": {}, ".STRINGS": {}}
+        self._rules: list[SignalRule] = []
+
+    def run(self) -> SourceFile:
+        i = 0
+        while i < len(self._lines):
+            line = self._lines[i]
+            match directive(line):
+                case ".PROGRAM":
+                    program, i = read_program(self._lines, i)
+                    self._add(program)
+                case ".LOCATIONS" | ".REALS" | ".STRINGS" | ".SIGNALS" as section:
+                    i = self._section(section, i + 1)
+                case ".END":
+                    i += 1
+                case "":
+                    i = self._outside(i)
+                case _:
+                    raise unknown_directive(line, i + 1)
+        locations, reals, strings = (
+            tuple(Entry(variable, value) for variable, value in entries.items())
+            for entries in self._entries.values()
+        )
+        return SourceFile(self._name, tuple(self._programs), locations, reals, strings, tuple(self._rules))
+
+    def _add(self, program: Program) -> None:
+        if any(program.name == other.name for other in self._programs):
+            raise ValError("Duplicate program", program.name, place=program.at)
+        self._programs.append(program)
+
+    def _outside(self, i: int) -> int:
+        """Blank lines and comments between programs; else a program that has no header."""
+        if not split_comment(self._lines[i], i + 1)[0].strip():
+            return i + 1
+        if self._programs:
+            column = len(self._lines[i]) - len(self._lines[i].lstrip()) + 1
+            raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(i + 1, column))
+        stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(self._name).stem)
+        name = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
+        steps, end = read_steps(self._lines, i, name)
+        self._add(Program(name, (), steps, None, Place(i + 1, 1)))
+        return end
+
+    def _section(self, section: str, begin: int) -> int:
+        for i in range(begin, len(self._lines)):
+            word = directive(self._lines[i])
+            if word:
+                return i + (word == ".END")
+            code, _ = split_comment(self._lines[i], i + 1)
+            if code.strip() and section == ".SIGNALS":
+                self._rules.append(parse_rule(code, i + 1))
+            elif code.strip():
+                variable, value = _ENTRIES[section](code, i + 1)
+                self._entries[section][variable] = value
+        return len(self._lines)
+
+
+def _variable(code: str, line: int, prefixes: str) -> tuple[Variable, int]:
+    """The variable that a line begins with, and where what stands behind it begins."""
+    found = _NAME.match(code)
+    at = Place(line, len(code) - len(code.lstrip()) + 1)
+    if found is None:
+        raise ValError("Syntax error", "allowed: a name, and its value", place=at)
+    prefix = found[1][0] if found[1][0] in "#$" else ""
+    if prefix not in prefixes.split("|"):
+        shown = " or ".join(f"{p}name" for p in prefixes.split("|"))
+        raise ValError("Syntax error", f"{found[1]}; allowed: {shown}", place=at)
+    if found[1].upper() in forms.CONSTANTS:
+        raise ValError("Reserved name", f"{found[1].upper()} is a function", place=at)
+    indices = [] if found[2] is None else [part.strip() for part in found[2].split(",")]
+    if len(indices) > 3 or not all(_ELEMENT.fullmatch(part) for part in indices):
+        raise ValError("Syntax error", "allowed: one to three indices", place=at)
+    return Variable(grammar.name_of(found[1]), tuple(Number(float(n)) for n in indices), at), found.end()
+
+
+def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
+    values: list[float] = []
+    position = begin
+    while position < len(code.rstrip()):
+        found = _NUMBER.match(code, position)
+        if found is None or len(values) == count:
+            what = "a number" if len(values) < count else "the end of the line"
+            raise ValError("Syntax error", f"allowed: {what}", place=Place(line, position + 1))
+        value = float(found[0])
+        if not math.isfinite(value):
+            raise ValError("Number too large", found[0], place=Place(line, position + 1))
+        values.append(value)
+        gap = _GAP.match(code, found.end())
+        position = gap.end() if gap else found.end()
+    if len(values) < count:
+        detail = f"{len(values)} of {count} numbers"
+        raise ValError("Missing argument", detail, place=Place(line, len(code.rstrip()) + 1))
+    return tuple(values)
+
+
+def _location(code: str, line: int) -> tuple[Variable, Value]:
+    variable, begin = _variable(code, line, "|#")
+    return variable, location_of(variable, _numbers(code, begin, line, 6))
+
+
+def _real(code: str, line: int) -> tuple[Variable, Value]:
+    variable, begin = _variable(code, line, "")
+    return variable, _numbers(code, begin, line, 1)[0]
+
+
+def _string(code: str, line: int) -> tuple[Variable, Value]:
+    variable, begin = _variable(code, line, "$")
+    tree = grammar.read(" " * begin + code[begin:], "expression", line)
+    return variable, _constant(grammar.expression(tree, line))
+
+
+_ENTRIES: Final[dict[str, Callable[[str, int], tuple[Variable, Value]]]] = {
+    ".LOCATIONS": _location,
+    ".REALS": _real,
+    ".STRINGS": _string,
+}
+
+
+def _constant(expression: Expression) -> str:
+    match expression:
+        case Text(value):
+            return value
+        case Apply("$CHR", (Number(code),)) if code.is_integer() and 0 <= code <= 0x10FFFF:
+            return chr(int(code))
+        case Binary("+", left, right):
+            return _constant(left) + _constant(right)
+    raise ValError("Syntax error", "allowed: strings and $CHR(code) with + between them", place=expression.at)
+
+
+def location_of(variable: Variable, values: Sequence[float]) -> Location:
+    """The location of six numbers: joints for a precision point, else X, Y, Z, O, A, T."""
+    if variable.prefix == "#":
+        return PrecisionPoint(tuple(values))
+    x, y, z, o, a, t = values
+    return geometry.from_oat(x, y, z, o, a, t)
+
+
+def numbers_of(location: Location) -> tuple[float, ...]:
+    """The six numbers of a location, of a transformation to `DECIMALS`."""
+    if isinstance(location, PrecisionPoint):
+        return location.joints
+    return tuple(round(value, DECIMALS) + 0.0 for value in geometry.to_oat(location))
+
+
+def parse_rule(text: str, line: int = 1) -> SignalRule:
+    """The rule of a line such as `1001 = SIG(1) AFTER 2`.
+
+    Raises:
+        ValError: If it isn't one.
+    """
+    signal, _, value, *rest = grammar.read(text, "rule", line).children
+    number_of = grammar.number(signal, line)
+    place = Place(line, signal.column)
+    if not number_of.is_integer():
+        raise ValError("Illegal digital signal", str(signal), place=place)
+    times: dict[str, float] = {}
+    for word, seconds in zip(rest[::2], rest[1::2], strict=True):
+        if word.type in times:
+            raise ValError("Syntax error", f"a second {word}", place=Place(line, word.column))
+        times[word.type] = grammar.number(seconds, line)
+    return SignalRule(
+        int(number_of),
+        grammar.expression(value, line),
+        times.get("AFTER", 0.0),
+        times.get("FOR"),
+        times.get("AT"),
+        place,
+    )
+
+
+def print_rule(rule: SignalRule) -> str:
+    """The line of a rule."""
+    shown = f"{rule.signal} = {print_expression(rule.value)}"
+    for word, seconds in (("AFTER", rule.after or None), ("FOR", rule.lasting), ("AT", rule.at_time)):
+        shown += "" if seconds is None else f" {word} {number(seconds)}"
+    return shown
+
+
+def print_file(source: SourceFile) -> str:
+    """The text of a file; a section without entries is left out."""
+    parts = [print_program(program) for program in source.programs]
+    parts.append(_printed(".LOCATIONS", [_row(e, " ".join(map(number, _numbers_of(e)))) for e in source.locations]))
+    parts.append(_printed(".REALS", [_row(e, number(float(e.value))) for e in source.reals]))  # type: ignore[arg-type]
+    parts.append(_printed(".STRINGS", [_row(e, print_expression(Text(str(e.value)))) for e in source.strings]))
+    parts.append(_printed(".SIGNALS", [print_rule(rule) for rule in source.signals]))
+    return "".join(parts)
+
+
+def _numbers_of(entry: Entry) -> tuple[float, ...]:
+    if not isinstance(entry.value, Transformation | PrecisionPoint):
+        raise ValError("Mixed types", f"{print_expression(entry.variable)} isn't a location")
+    return numbers_of(entry.value)
+
+
+def _row(entry: Entry, value: str) -> str:
+    return f"{print_expression(entry.variable)} {value}"
+
+
+def _printed(section: str, rows: list[str]) -> str:
+    return "\n".join([section, *rows, ".END", ""]) if rows else ""

@@ -1,0 +1,367 @@
+"""Statements of lines: what a keyword and the text behind it mean."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Final
+
+from interfaces.val2 import forms, grammar
+from interfaces.val2.errors import Place, ValError
+from interfaces.val2.rest import Rest, as_word, count, label, label_of, operands_and_words
+from interfaces.val2.slots import MISSING, TOO_MANY, Form, nearest
+from interfaces.val2.syntax import (
+    AnyValue,
+    Apply,
+    Assign,
+    Call,
+    Case,
+    Compound,
+    Decompose,
+    Do,
+    Else,
+    End,
+    Exit,
+    Expression,
+    For,
+    Format,
+    Goto,
+    If,
+    IfGoto,
+    Ignored,
+    Instruction,
+    Local,
+    Next,
+    Number,
+    Prompt,
+    React,
+    Return,
+    Set,
+    Statement,
+    Text,
+    Type,
+    Unary,
+    Until,
+    Value,
+    Variable,
+    While,
+)
+
+MOST_LOOPS: Final = 100
+"""What EXIT and NEXT may count."""
+_CHANNEL: Final = re.compile(
+    r"(\s*)\(([^()]*)\)(\s*)(?=[0-9.(A-Za-z])(?!(?:AND|X?OR|MOD|B(?:AND|X?OR)|EQ|NE|L[TE]|G[TE])(?![A-Za-z0-9_.]))",
+    re.IGNORECASE | re.ASCII,
+)
+_KIND: Final = re.compile(r"\s*(REAL|DOUBLE|LOC)\s+(?=[A-Za-z#$])", re.IGNORECASE | re.ASCII)
+_SETTING: Final = re.compile(r"\s*([A-Za-z][A-Za-z0-9_.]*)\s*(=(?!=))?")
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
+
+
+def statement(keyword: str, rest: Rest) -> Statement:
+    """The statement of a keyword, upper case, and what stands behind it.
+
+    Raises:
+        ValError: If that can't be.
+    """
+    if keyword in _OWN:
+        return _OWN[keyword](keyword, rest)
+    row = forms.INSTRUCTIONS.get(keyword)
+    if row is not None:
+        return _instruction(row, rest)
+    if keyword in forms.IGNORED:
+        return Ignored(keyword, rest.text.strip(), rest.at)
+    if rest.text.lstrip().startswith("=="):
+        raise ValError("Syntax error", "'==' compares, '=' assigns", place=rest.start)
+    detail = f"{keyword}{nearest(keyword, forms.INSTRUCTIONS)}"
+    if keyword in ("ELSEIF", "ELIF"):
+        detail = f"{keyword}; allowed: ELSE on a line, and an IF of its own on the next"
+    raise ValError("Undefined instruction", detail, place=rest.at)
+
+
+def assignment(rest: Rest) -> Statement:
+    """`x = 3`, or a location without SET before it."""
+    target, value = _assigned(rest)
+    located = target.prefix == "#" or _is_location(value)
+    return Set(target, value) if located else Assign(target, value)
+
+
+def _assigned(rest: Rest) -> tuple[Variable, Expression]:
+    left, _, right = rest.tree("assignment")
+    return grammar.variable(left, rest.line), rest.expression(right)
+
+
+def _is_location(value: Expression) -> bool:
+    if isinstance(value, Apply):
+        return forms.FUNCTIONS[value.function].gives in ("frame", "location")
+    return isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
+
+
+def _instruction(row: Form, rest: Rest) -> Statement:
+    if row.keyword in ("ACCEL", "ALTER", "ALTON"):
+        _open_channel(row, rest)
+    operands, words = operands_and_words(row, rest.operands())
+    if row.keyword == "ACCEL" and len(operands) == 3:
+        operands = operands[1:]
+    count(row, operands, rest)
+    if row.keyword == "GRASP" and len(operands) == 2:
+        operands[1] = Number(label_of(operands[1], rest), operands[1].at if operands[1] else rest.start)
+    if row.keyword == "WAIT" and operands:
+        operands[0] = _channel_wait(operands[0])
+    return Instruction(row.keyword, tuple(operands), words, rest.at)
+
+
+def _open_channel(row: Form, rest: Rest) -> None:
+    """`ALTER (1) 3` reads like `ALTER 1, 3`."""
+    if found := _CHANNEL.match(rest.text):
+        inner = found[2] if found[2].strip() or row.keyword != "ACCEL" else "1"
+        rest.text = f"{found[1]} {inner},{found[3]}{rest.text[found.end() :]}"
+
+
+def _channel_wait(condition: Expression | None) -> Expression | None:
+    """`WAIT 3` and `WAIT -3` of VAL wait for an input."""
+    inner = condition.operand if isinstance(condition, Unary) and condition.operator == "-" else condition
+    if not isinstance(inner, Number) or not inner.value.is_integer() or inner.value < 1:
+        return condition
+    channel = Number(inner.value + 1000 if inner.value <= 32 else inner.value, inner.at)
+    signed = channel if inner is condition else Unary("-", channel, inner.at)
+    return Apply("SIG", (signed,), inner.at)
+
+
+def _nothing(make: Callable[[], Statement]) -> Callable[[str, Rest], Statement]:
+    def read(keyword: str, rest: Rest) -> Statement:
+        if not rest.empty:
+            detail = f"unexpected '{rest.text.strip()}' behind {keyword}; allowed: the end of the line"
+            raise ValError("Syntax error", detail, place=rest.start)
+        return make()
+
+    return read
+
+
+def _set(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    return Set(*_assigned(rest))
+
+
+def _decompose(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    return Decompose(*_assigned(rest))
+
+
+def _shift(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    first, *others = rest.tree("shift")
+    values = [None if n is None else rest.expression(n) for n in others if getattr(n, "type", "") != "BY"]
+    if len(values) > 3:
+        raise ValError(TOO_MANY, f"allowed: {forms.INSTRUCTIONS[keyword].usage}", place=rest.end)
+    target = grammar.variable(first, rest.line)
+    return Set(target, Apply("SHIFT", (target, *values), rest.at))
+
+
+def _timer(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    index, _, value = rest.tree("timing")
+    return Instruction(keyword, (rest.expression(index), rest.expression(value)), (), rest.at)
+
+
+def _parameter(keyword: str, rest: Rest) -> Statement:
+    row = forms.INSTRUCTIONS[keyword]
+    rest.require(row)
+    found = _SETTING.match(rest.text)
+    if found is None:
+        raise ValError("Syntax error", f"allowed: {row.usage}", place=rest.start)
+    name = found[1].upper()
+    if name not in forms.PARAMETERS:
+        return Ignored(keyword, rest.text.strip(), rest.at)
+    if found[2] is None:
+        raise ValError(MISSING, f"allowed: {row.usage}", place=Place(rest.line, found.end() + 1))
+    value = grammar.read(" " * found.end() + rest.text[found.end() :], "expression", rest.line)
+    return Instruction(keyword, (rest.expression(value),), (name,), rest.at)
+
+
+def _switches(keyword: str, rest: Rest) -> Statement:
+    row = forms.INSTRUCTIONS[keyword]
+    rest.require(row)
+    names = []
+    for operand, words in rest.operands():
+        name = as_word(operand)
+        if not isinstance(operand, Variable) or not name or words:
+            at = operand.at if operand is not None else rest.start
+            raise ValError("Syntax error", f"allowed: {row.usage}", place=at)
+        names.append(name)
+    if any(name not in forms.SWITCHES for name in names):
+        return Ignored(keyword, rest.text.strip(), rest.at)
+    return Instruction(keyword, (), tuple(names), rest.at)
+
+
+def _react(keyword: str, rest: Rest) -> Statement:
+    row = forms.INSTRUCTIONS[keyword]
+    operands, words = operands_and_words(row, rest.operands())
+    count(row, operands[:2], rest)
+    if len(operands) > 3:
+        raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
+    signal, *others = operands
+    assert signal is not None
+    program = _program_of(others[0]) if others and others[0] is not None else ""
+    return React(signal, program, keyword == "REACTI", bool(words), rest.at)
+
+
+def _program_of(operand: Expression) -> str:
+    if isinstance(operand, Variable) and not operand.prefix and not operand.indices:
+        return operand.name
+    if isinstance(operand, Apply) and not operand.arguments and not operand.function.startswith(("#", "$")):
+        return operand.function.lower()
+    raise ValError("Syntax error", "allowed: the name of a program", place=operand.at)
+
+
+def _if(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    condition, *others = rest.tree("branch")
+    built = rest.expression(condition)
+    if others and others[-1].type == "NUMBER":
+        return IfGoto(built, label(others[-1], rest), rest.at)
+    return If(built)
+
+
+def _goto(keyword: str, rest: Rest) -> Statement:
+    operands = rest.operands()
+    if len(operands) != 1 or operands[0][1]:
+        detail = f"allowed: {forms.INSTRUCTIONS[keyword].usage}"
+        raise ValError(MISSING if rest.empty else "Syntax error", detail, place=rest.end)
+    return Goto(label_of(operands[0][0], rest), rest.at)
+
+
+def _while(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    return While(rest.expression(rest.tree("while")[0]))
+
+
+def _until(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    return Until(rest.expression(rest.tree("until")[0]))
+
+
+def _case(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    return Case(rest.expression(rest.tree("case")[0]))
+
+
+def _value(keyword: str, rest: Rest) -> Statement:
+    trimmed = rest.text.rstrip()
+    rest.text = trimmed.removesuffix(":")
+    row = forms.INSTRUCTIONS[keyword]
+    rest.require(row)
+    values = []
+    for operand, words in rest.operands():
+        if operand is None or words:
+            raise ValError("Syntax error", f"allowed: {row.usage}", place=words[0][1] if words else rest.start)
+        values.append(operand)
+    return Value(tuple(values))
+
+
+def _any(keyword: str, rest: Rest) -> Statement:
+    rest.text = rest.text.rstrip().removesuffix(":")
+    return _nothing(AnyValue)(keyword, rest)
+
+
+def _for(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    children = [n for n in rest.tree("loop") if getattr(n, "type", "") not in ("TO", "STEP", "EQUALS")]
+    step = rest.expression(children[3]) if len(children) > 3 and children[3] is not None else None
+    return For(
+        grammar.variable(children[0], rest.line), rest.expression(children[1]), rest.expression(children[2]), step
+    )
+
+
+def _loops(keyword: str, rest: Rest) -> Statement:
+    text, count = rest.text.strip(), 1
+    plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
+    if text and not (plain and 1 <= (count := int(text)) <= MOST_LOOPS):
+        raise ValError("Syntax error", f"allowed: a number of loops, 1 to {MOST_LOOPS}", place=rest.start)
+    return Exit(count, rest.at) if keyword == "EXIT" else Next(count, rest.at)
+
+
+def _call(keyword: str, rest: Rest) -> Statement:
+    rest.require(forms.INSTRUCTIONS[keyword])
+    name, arguments = rest.tree("call")
+    if not _NAME.fullmatch(name):
+        raise ValError("Syntax error", "allowed: the name of a program", place=Place(rest.line, name.column))
+    given: list[Expression | None] = []
+    for node in arguments.children if arguments is not None else ():
+        if getattr(node, "type", "") in ("FORMAT", "BY"):
+            raise ValError("Syntax error", f"unexpected {node}", place=Place(rest.line, node.column))
+        given.append(None if node is None else rest.expression(node))
+    if given == [None]:
+        given = []
+    return Call(grammar.name_of(name), tuple(given), keyword, rest.at)
+
+
+def items(rest: Rest) -> tuple[Expression | Format, ...]:
+    """What TYPE prints."""
+    if rest.empty:
+        return ()
+    listed: list[Expression | Format] = []
+    for node in rest.tree("items"):
+        is_format = getattr(node, "type", "") == "FORMAT"
+        listed.append(grammar.form_of(node, rest.line) if is_format else rest.expression(node))
+    return tuple(listed)
+
+
+def _prompt(keyword: str, rest: Rest) -> Statement:
+    operands = rest.operands()
+    row = forms.INSTRUCTIONS[keyword]
+    targets = []
+    for operand, words in operands:
+        if words:
+            raise ValError("Syntax error", f"unexpected {words[0][0]}; allowed: {row.usage}", place=words[0][1])
+        if operand is not operands[0][0]:
+            if not isinstance(operand, Variable) or operand.array:
+                at = operand.at if operand is not None else rest.start
+                raise ValError("Syntax error", "allowed: variables behind the text", place=at)
+            targets.append(operand)
+    text = operands[0][0] if operands else None
+    return Prompt(Text("", rest.at) if text is None else text, tuple(targets))
+
+
+def _local(keyword: str, rest: Rest) -> Statement:
+    kind = ""
+    if found := _KIND.match(rest.text):
+        kind = "LOC" if found[1].upper() == "LOC" else "REAL"
+        rest.text = " " * found.end() + rest.text[found.end() :]
+    rest.require(forms.INSTRUCTIONS[keyword])
+    names = tuple(grammar.variable(node, rest.line) for node in rest.tree("names"))
+    return Local(keyword, names, kind)
+
+
+_OWN: Final[dict[str, Callable[[str, Rest], Statement]]] = {
+    "SET": _set,
+    "DECOMPOSE": _decompose,
+    "SHIFT": _shift,
+    "TIMER": _timer,
+    "PARAMETER": _parameter,
+    "ENABLE": _switches,
+    "DISABLE": _switches,
+    "REACT": _react,
+    "REACTI": _react,
+    "IF": _if,
+    "ELSE": _nothing(Else),
+    "END": _nothing(End),
+    "WHILE": _while,
+    "DO": _nothing(Do),
+    "UNTIL": _until,
+    "FOR": _for,
+    "CASE": _case,
+    "VALUE": _value,
+    "ANY": _any,
+    "EXIT": _loops,
+    "NEXT": _loops,
+    "GOTO": _goto,
+    "CALL": _call,
+    "GOSUB": _call,
+    "RETURN": _nothing(Return),
+    "TYPE": lambda _, rest: Type(items(rest)),
+    "PROMPT": _prompt,
+    "AUTO": _local,
+    "LOCAL": _local,
+    "GLOBAL": _local,
+}

@@ -1,0 +1,129 @@
+"""A program on both twins in the laboratory: virtual time, repeatable from a seed."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass, field
+from typing import Final
+
+from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
+from interfaces.runtime.offset import QUANTILE
+from interfaces.runtime.plan import Plan, PlannedMotion, PlannedPayload
+from interfaces.runtime.run import TwinRun
+from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
+from interfaces.val2.errors import ValError
+from interfaces.val2.motion import Arm, SiteRobot
+from interfaces.val2.playing import Listeners, Player, endless, stuck
+from interfaces.val2.source import SourceFile
+from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
+from vrs.model import RobotModel
+from vrs.receipt import Receipt
+
+LONGEST: Final = 600.0
+"""How long a program may take [s], unless it's told otherwise."""
+_LOOK: Final = 0.1
+"""How often a program is looked after at least [s]: reports may have changed what it waits for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    """What became of a program on the twins."""
+
+    run: TwinRun
+    """The record of both twins."""
+    plan: Plan
+    """What the program made the operator do, for runs under other conditions."""
+    error: ValError | None
+    """What stopped it; None if nothing did."""
+
+
+@dataclass(slots=True)
+class _Operator:
+    """A program in the place of an operator."""
+
+    session: TwinSession
+    limit: float
+    name: str
+    motions: list[PlannedMotion] = field(default_factory=list)
+    payloads: list[PlannedPayload] = field(default_factory=list)
+    parameters: dict[str, float] = field(default_factory=dict)
+    player: Player = field(init=False)
+    _holds: bool = False
+
+    def told(self, now: float, command: Command, receipt: Receipt) -> None:
+        """Write down what the virtual robot took."""
+        assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit))
+        self.session.sent(now, command, receipt)
+        self.motions.append(PlannedMotion(self.name, now, command))
+
+    def gripped(self, t: float, holds: bool) -> None:
+        """Let the real hand hold what the parameter HAND.LOAD says [kg], or nothing."""
+        load = self.parameters.get("HAND.LOAD", 0.0) if holds else 0.0
+        if load <= 0 and not self._holds:
+            return
+        self._holds = load > 0
+        mass = load if load > 0 else None
+        self.session.hand(t, mass)
+        self.payloads.append(PlannedPayload(self.name, t, mass))
+
+    def advance(self, now: float) -> None:
+        """Let the program go on, and say when it's to be looked after again."""
+        player = self.player
+        player.advance(now)
+        if not player.done and player.next_deadline() == math.inf:
+            player.give_up(stuck(), now)
+        if not player.done and now >= self.limit:
+            player.give_up(endless(self.limit), now)
+        if player.done:
+            self.session.last_action = now
+        else:
+            self.session.lab.schedule(min(max(player.next_deadline(), now), now + _LOOK), self.advance)
+
+
+def play(
+    source: SourceFile,
+    model: RobotModel,
+    profile: DelayProfile,
+    arm: ArmFactory,
+    *,
+    seed: int,
+    offset: float | None = None,
+    service: Service = Service.DATAGRAM,
+    listeners: Listeners | None = None,
+    limit: float = LONGEST,
+    progress: Progress | None = None,
+) -> Played:
+    """Carry out the first program of a file, once, from the robot's `nominal` pose.
+
+    Args:
+        source: The file.
+        model: The robot.
+        profile: The link's delay, either way.
+        arm: Makes the real robot's body.
+        seed: Seed of the link and of RANDOM, ≥ 0.
+        offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
+        service: Order of delivery on the link.
+        listeners: Who hears what the program says; nobody by default.
+        limit: When the program is given up [s].
+        progress: Called now and then with the user time reached [s].
+
+    Raises:
+        ValError: If the program can't be begun.
+    """
+    start = model.poses["nominal"]
+    conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
+    with arm(start) as body:
+        session = TwinSession(start, model, conditions, body, seed=seed, offset=offset)
+        operator = _Operator(session, limit, source.name)
+        robot = SiteRobot(session.operator, operator.told)
+        val = Arm(robot, parameters=operator.parameters, gripped=operator.gripped)
+        rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
+        operator.player = player = Player(source, val, listeners or Listeners(), rng)
+        session.last_action = math.inf
+        player.begin(0.0)
+        session.lab.schedule(0.0, operator.advance)
+        end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or unheard)
+    run = session.record(end, source.name, conditions.forward, seed)
+    plan = Plan(source.name, start, tuple(operator.motions), tuple(operator.payloads))
+    return Played(run, plan, player.errors[-1] if player.errors else None)

@@ -1,0 +1,87 @@
+"""A person at a monitor, in virtual time: an arm on an engine of its own, lines in, a transcript out."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from interfaces.val2.controller import Controller
+from interfaces.val2.monitor.files import Files
+from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.switchboard import Control, Free, Switchboard
+from interfaces.val2.motion import arm_for
+from robots import puma560
+from vrs.clock import ManualClock
+from vrs.engine import Engine
+
+MODEL = puma560.model()
+LONGEST = 120.0
+"""Longest that anything may take here [s]."""
+
+
+class Sitting:
+    """One or more terminals at a controller."""
+
+    def __init__(self, directory: Path, *, control: Control | None = None, patient: bool = False) -> None:
+        self.engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
+        parameters: dict[str, float] = {}
+        self.arm = arm_for(self.engine, parameters=parameters)
+        self.controller = Controller(self.arm, parameters=parameters)
+        self.board = Switchboard(self.controller, Free() if control is None else control)
+        self.files = Files(directory)
+        self.now = 0.0
+        self.monitor = self.terminal(patient=patient)
+        self.shown = ""
+
+    def terminal(self, *, patient: bool = False) -> Monitor:
+        """One more terminal."""
+        monitor = Monitor(self.board, self.files, "vrs-teleop 0: a test", patient=patient)
+        monitor.start(now=self.now)
+        monitor.output()
+        return monitor
+
+    def type(self, *lines: str) -> str:
+        """Type lines, each when the prompt is there; what was shown since."""
+        self.shown = ""
+        for line in lines:
+            self.line(line)
+            self.until(lambda: bool(self.monitor.prompt))
+        return self.shown
+
+    def line(self, text: str) -> str:
+        """Type a line, whatever is there; what was shown at once."""
+        before = len(self.shown)
+        self.monitor.line(text, now=self.now)
+        self._show()
+        return self.shown[before:]
+
+    def until(self, there, longest: float = LONGEST) -> None:
+        """Let time pass until something is so."""
+        end = self.now + longest
+        while not there():
+            assert self.now < end, f"not within {longest} s: {self.shown}"
+            self.pass_time(0.05)
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self.now + seconds
+        for _ in range(1_000_000):
+            deadline = self.monitor.next_deadline()
+            self.now = min(end, max(deadline, self.now + 1e-3)) if math.isfinite(deadline) else end
+            self.monitor.advance(now=self.now)
+            self._show()
+            if self.now >= end:
+                return
+
+    def finish(self) -> str:
+        """Let a program run to its end; what was shown."""
+        self.shown = ""
+        self.until(lambda: not (self.controller.running or self.controller.doing))
+        return self.shown
+
+    def joints(self) -> tuple[float, ...]:
+        """Where the arm is, in VAL's joints [deg]."""
+        return self.arm.here(now=self.now).joints.joints
+
+    def _show(self) -> None:
+        self.shown += "".join(piece.text for piece in self.monitor.output())

@@ -1,0 +1,214 @@
+"""Static checks: what is found, where, and that sound programs are left alone; and `vrs check`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from interfaces.cli.main import _status
+from interfaces.val2.check import check_text
+
+HERE = Path(__file__).parent
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "val2").glob("*.v2"))
+
+
+def found(*lines, sections=""):
+    text = "\n".join([".PROGRAM main", *lines, ".END", sections])
+    return [
+        (f.severity, f.error.what, f.error.detail, f.place.line, f.place.column)
+        for f in check_text(text, "t.v2")[1]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("line", "what", "column"),
+    [
+        ("CALL nothing", "Undefined program", 1),
+        ("REACT 1001, nothing", "Undefined program", 1),
+        ("GOTO 7", "Undefined label", 1),
+        ("IF TRUE GOTO 7", "Undefined label", 1),
+        ("END", "Control structure error", 1),
+        ("MOVE p", "Undefined location", 6),
+        ("MOVE #p", "Undefined location", 6),
+        ("MOVE SHIFT(p BY 1)", "Undefined location", 12),
+        ("MOVE NULL:p", "Undefined location", 11),
+        ("x = y + 1", "Undefined value", 5),
+        ("x = 1 + DX(p)", "Undefined location", 12),
+        ("a[i] = 1", "Undefined value", 3),
+        ("TYPE $s", "Undefined value", 6),
+        ("SIGNAL -n", "Undefined value", 9),
+        ("MOVE 3", "Mixed types", 6),
+        ('MOVE "a"', "Mixed types", 6),
+        ("x = NULL:NULL + 1", "Mixed types", 5),
+        ('x = "a"', "Mixed types", 5),
+        ("$x = 1", "Mixed types", 6),
+        ('x = 1 + "a"', "Mixed types", 7),
+        ('x = 2 * "a"', "Mixed types", 9),
+        ('IF "a" == 1 GOTO 7', "Mixed types", 8),
+        ("SET p = 1", "Mixed types", 9),
+        ('x = SIN("a")', "Mixed types", 9),
+        ("x = LEN(3)", "Mixed types", 9),
+        ("SET p = NULL:#PPOINT(1)", "Mixed types", 14),
+        ("SET p = INVERSE(#PPOINT(1))", "Mixed types", 17),
+        ("DRIVE 7, 1, 1", "Value out of range", 7),
+        ("DELAY -1", "Value out of range", 7),
+        ("SPEED 0", "Value out of range", 7),
+        ("SIGNAL 1, 1001", "Illegal digital signal", 11),
+        ("PARAMETER HAND.TIME = -1", "Value out of range", 23),
+        ("MOVE", "Missing argument", 5),
+        ("x = (1", "Syntax error", 7),
+    ],
+)
+def test_mistakes_are_found_where_they_are(line, what, column):
+    assert ("error", what, 3, column) in [(f[0], f[1], f[3], f[4]) for f in found("", line)]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["HERE p", "MOVE p:NULL", "HERE p:q", "MOVE q"],
+        ["HERE #p", "MOVE #p", "DECOMPOSE a[1] = #p", "x = a[3]"],
+        ["FOR i = 1 TO 3", "x[i] = i", "END", "TYPE x[2], LAST(x[])"],
+        ['PROMPT "n", n, $s', "TYPE n, $s", '$t = $DECODE($s, ",", 0)'],
+        ["CALL main", "IF DEFINED(p) GOTO 5", "5 MOVE HERE"],
+        ["SET p = #PPOINT(1,2,3,4,5,6)", "MOVE p"],
+        ["PARAMETER HAND.TIME = 0.5", "x = PARAMETER(HAND.TIME) + SWITCH(CP)"],
+        ["MOVET #PPOINT(0), TRUE", "MOVEST HERE, 40", "BASE 1, 2", "BASE NULL", "TOOL NULL"],
+        ['$a = "x" + "y"', 'IF $a == "xy" GOTO 1', "1 TYPE $a, /F8.2, 3, NULL"],
+        ["SIGNAL 0, -2001", "WAIT SIG(1001, -2)", "DELAY 0", "x = 1", "SIGNAL -x"],
+        ["a = 1", "CASE a OF", 'VALUE 1, "x":', "ANY", "END"],
+    ],
+)
+def test_sound_programs_are_left_alone(lines):
+    assert found(*lines) == []
+
+
+def test_names_of_a_programs_own_dont_count_for_others():
+    text = ".PROGRAM a\nAUTO x, y\nx = 1\nCALL b(x, y)\n.END\n.PROGRAM b(p, q)\nq = p + x\n.END"
+    (finding,) = check_text(text, "t")[1]
+    assert (finding.error.what, finding.error.program, finding.error.step, finding.place.line) == (
+        "Undefined value",
+        "b",
+        1,
+        7,
+    )
+    (finding,) = check_text(".PROGRAM a\nx = y\nCALL b\n.END\n.PROGRAM b\nAUTO y\ny = 1\n.END", "t")[1]
+    assert (finding.error.program, finding.error.detail) == ("a", "y; nothing in the file sets it")
+
+
+def test_a_programs_own_name_isnt_set_by_another():
+    text = ".PROGRAM a\nAUTO y\nx = y\nx = y\nCALL b\n.END\n.PROGRAM b\ny = x\n.END"
+    (finding,) = check_text(text, "t")[1]
+    assert (finding.error.program, finding.place.line) == ("a", 3)
+
+
+def test_a_name_is_reported_once_in_a_program():
+    assert [row[3] for row in found("x = y", "x = y + y", "MOVE p", "MOVE p")] == [2, 4]
+
+
+def test_kinds_of_names_follow_what_they_are_set_to():
+    assert [f[1] for f in found("n = 1", "MOVE n")] == ["Mixed types"]
+    assert [f[1] for f in found("SET p = HERE", "x = p + 1")] == ["Mixed types"]
+    assert [f[1] for f in found("MOVE n", sections=".REALS\nn 1\n.END")] == ["Mixed types"]
+    assert found("MOVE p", sections=".LOCATIONS\np 1 2 3 4 5 6\n.END") == []
+
+
+def test_arguments_are_counted_and_of_the_kinds_of_their_parameters():
+    second = ".PROGRAM b(n, $s, #p, x[])\nn = 1\n.END"
+    assert [f[1] for f in found("CALL b(1, 2)", sections=second)] == ["Mixed types"]
+    assert [f[1] for f in found("CALL b($s)", sections=second)] == ["Mixed types"]
+    assert [f[1] for f in found('CALL b(1, "x", #PPOINT(0), y[], 5)', sections=second)] == ["Too many arguments"]
+    assert found('CALL b(, "x", #p, y[])', sections=second) == []
+
+
+def test_what_has_no_meaning_here_is_a_warning():
+    rows = found("ATTACH (3)", "x = IOSTAT(lun)", "ENABLE COLOR.SPEED", "TYPE $ERROR(x)")
+    assert [(severity, what, line) for severity, what, _, line, _ in rows] == [
+        ("warning", "No meaning here", line) for line in (2, 3, 4, 5)
+    ]
+
+
+def test_long_names_that_become_the_same_are_a_warning():
+    (row,) = found("center.position.x = 1", "center.position.y = 2")
+    assert row == (
+        "warning",
+        "Long names",
+        "center.position.y is the same as center.position.x: 15 characters count",
+        3,
+        1,
+    )
+
+
+def test_every_line_that_cant_be_read_is_named():
+    text = ".PROGRAM\nMOVE\n.END\n.FOO\n.PROGRAM b\nx = (\nIF a\n.END\n.PROGRAM b\n.END\n.REALS\nx y\n"
+    source, findings = check_text(text, "t")
+    assert source is None
+    assert [(f.error.what, f.place.line) for f in findings] == [
+        ("Syntax error", 1),
+        ("Missing argument", 2),
+        ("Undefined directive", 4),
+        ("Syntax error", 6),
+        ("Control structure error", 7),
+        ("Undefined value", 7),
+        ("Duplicate program", 9),
+        ("Syntax error", 12),
+    ]
+
+
+def test_a_file_without_a_program_is_an_error():
+    assert [f.error.what for f in check_text("; nothing\n", "t")[1]] == ["Undefined program"]
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_the_examples_are_sound(path):
+    assert check_text(path.read_text(), path.name)[1] == []
+
+
+def test_old_programs_have_warnings_at_most():
+    for stem in ("val1", "val2", "vplus"):
+        text = (HERE / "programs" / f"{stem}.v2").read_bytes().decode()
+        assert [f for f in check_text(text, stem)[1] if f.severity == "error"] == []
+
+
+def test_vrs_check_says_what_is_wrong_and_exits_2(tmp_path, capsys):
+    path = tmp_path / "bad.v2"
+    path.write_text(".PROGRAM main\n  MOVE p\n ATTACH 3\n.END\n")
+    assert _status(["check", str(path)]) == 2
+    said = capsys.readouterr().out.splitlines()
+    assert said == [
+        f"{path}:2:8: error: *Undefined location* p; nothing in the file sets it (program main, step 1)",
+        f"{path}:3:2: warning: *No meaning here* ATTACH 3 is passed over (program main, step 2)",
+        "1 error, 1 warning.",
+    ]
+    assert _status(["check", str(path), "--json"]) == 2
+    report = json.loads(capsys.readouterr().out)
+    assert report["findings"][0] == {
+        "severity": "error",
+        "what": "Undefined location",
+        "detail": "p; nothing in the file sets it",
+        "program": "main",
+        "step": 1,
+        "line": 2,
+        "column": 8,
+    }
+
+
+def test_vrs_check_plans_the_first_program(tmp_path, capsys):
+    path = tmp_path / "far.v2"
+    path.write_text(".PROGRAM main\n  FOR i = 1 TO 3\n    MOVE TRANS(5000, 0, 0)\n  END\n.END\n")
+    assert _status(["check", str(path)]) == 2
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith(f"{path}:3:")
+    assert "*Location out of range*" in said[0]
+    assert said[-1] == "1 error, no warnings."
+    assert _status(["check", str(path), "--static"]) == 0
+    assert capsys.readouterr().out == "no errors, no warnings.\n"
+
+
+def test_vrs_check_of_what_isnt_there_is_one_line(tmp_path, capsys):
+    assert _status(["check", str(tmp_path / "no.v2")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "can't be read" in said

@@ -1,0 +1,63 @@
+"""The tables of the language: sound in themselves, and the reference tells the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from interfaces.val2 import forms
+from interfaces.val2.errors import ValError
+from interfaces.val2.parser import parse_expression, parse_line
+from interfaces.val2.syntax import Ignored
+
+REFERENCE = (Path(__file__).parents[3] / "docs" / "val2.md").read_text()
+ROWS = [*forms.INSTRUCTIONS.values(), *(row for row in forms.FUNCTIONS.values() if not row.idle)]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.usage)
+def test_the_reference_has_every_word(row):
+    usage, said = row.usage.replace("|", "\\|"), row.help.replace("|", "\\|")
+    assert f"| `{usage}` | {said} | {row.origin} |" in REFERENCE
+
+
+def test_the_reference_has_switches_parameters_and_what_is_passed_over():
+    for switch in forms.SWITCHES.values():
+        assert (
+            f"| `{switch.name}` | {'on' if switch.default else 'off'} | {switch.help} | {switch.origin} |"
+            in REFERENCE
+        )
+    for one in forms.PARAMETERS.values():
+        assert (
+            f"| `{one.name}` | {one.default:g} {one.unit} | {one.low:g} to {one.high:g} {one.unit} |" in REFERENCE
+        )
+    for word in (*forms.IGNORED, *(row.name for row in forms.FUNCTIONS.values() if row.idle)):
+        assert f"`{word}`" in REFERENCE
+
+
+def test_no_word_is_two_things():
+    assert not forms.IGNORED & forms.INSTRUCTIONS.keys()
+    assert not forms.OPERATORS.keys() & forms.FUNCTIONS.keys()
+    assert forms.OPERATORS.keys() - {"NOT", "COM"} <= forms.LEVELS.keys()
+    assert set(forms.ALIASES.values()) <= forms.FUNCTIONS.keys()
+
+
+@pytest.mark.parametrize("row", forms.INSTRUCTIONS.values(), ids=lambda row: row.keyword)
+def test_every_instruction_is_known_to_the_parser(row):
+    known = True
+    try:
+        known = not isinstance(parse_line(row.keyword).statement, Ignored)
+    except ValError as error:
+        known = error.what != "Undefined instruction"
+    assert known
+
+
+@pytest.mark.parametrize("row", forms.FUNCTIONS.values(), ids=lambda row: row.name)
+def test_functions_count_their_arguments(row):
+    least = sum(slot.required for slot in row.slots)
+    if least:
+        with pytest.raises(ValError, match="Missing argument"):
+            parse_expression(f"{row.name}({', '.join('x' * (least - 1))})")
+    if not row.repeats:
+        with pytest.raises(ValError, match="Too many arguments"):
+            parse_expression(f"{row.name}({', '.join('x' * (len(row.slots) + 1))})")

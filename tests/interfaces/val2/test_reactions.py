@@ -1,0 +1,167 @@
+"""REACT and REACTI: programs that signals call."""
+
+from __future__ import annotations
+
+import pytest
+
+from interfaces.val2.errors import ValError
+from interfaces.val2.events import Ended
+from interfaces.val2.interpreter import State
+from tests.interfaces.val2.rig import FakeArm, Rig, body
+
+ALARM = ".PROGRAM alarm()\n TYPE TIMER(0)\n.END\n"
+
+
+def at(t: float, *more: tuple[float, int]) -> str:
+    """A cell that pulses 1001 at a time, and other signals."""
+    pulses = [(t, 1001), *more]
+    lines = [f"{n} = {value} AT {u + later:g}" for u, n in pulses for value, later in (("ON", 0.0), ("OFF", 0.01))]
+    return "\n".join([".SIGNALS", *lines, ".END", ""])
+
+
+def times(rig: Rig) -> list[float]:
+    """The numbers that were typed."""
+    return [float(t) for t in rig.typed().split()]
+
+
+def test_react_comes_after_the_present_step() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm", "MOVE TRANS(1)", "BREAK", "TYPE 99") + ALARM + at(0.4))
+    assert times(rig) == [pytest.approx(1.0, abs=1e-3), 99.0]
+    assert "brake" not in rig.arm.names()
+
+
+def test_react_comes_amid_a_wait_which_goes_on() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm", "WAIT SIG(1002)", "TYPE TIMER(0)") + ALARM + at(1.0, (3.0, 1002)))
+    assert times(rig) == [pytest.approx(1.0, abs=1e-3), pytest.approx(3.0, abs=1e-3)]
+
+
+def test_react_comes_amid_computing() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm", "n = 0", "WHILE n < 500000 DO", "n = n + 1", "END") + ALARM + at(1.0))
+    assert times(rig) == [pytest.approx(1.0, abs=3e-3)]
+
+
+def test_reacti_brakes_at_once() -> None:
+    rig = Rig()
+    rig.run(
+        body("REACTI 1001, alarm", "MOVE TRANS(50)", "MOVE TRANS(100)", "BREAK", "TYPE DX(HERE)") + ALARM + at(0.4)
+    )
+    braked = next(a.t for a in rig.arm.asked if a.what == "brake")
+    assert braked == pytest.approx(0.4)
+    assert times(rig) == [pytest.approx(0.4, abs=1e-3), 100.0]
+
+
+def test_reacti_gives_up_the_motion_under_way_and_the_next_one_is_asked_anew() -> None:
+    rig = Rig()
+    rig.run(body("REACTI 1001, alarm", "MOVE TRANS(50)", "MOVE TRANS(100)", "TYPE DX(DEST)") + ALARM + at(0.4))
+    assert times(rig) == [pytest.approx(0.4, abs=1e-3), 100.0]
+    assert [round(a.t, 2) for a in rig.arm.asked if a.what == "move"] == [0.0, 0.0, 0.4]
+    assert rig.when(Ended)[0][0] == pytest.approx(1.4, abs=1e-2)
+
+
+def test_a_reaction_is_done_once_or_always() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm", "WAIT.EVENT , 5") + ALARM + at(1.0, (2.0, 1001)))
+    assert len(times(rig)) == 1
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm ALWAYS", "WAIT.EVENT , 5") + ALARM + at(1.0, (2.0, 1001)))
+    assert times(rig) == [pytest.approx(1.0, abs=1e-3), pytest.approx(2.0, abs=1e-3)]
+
+
+def test_it_s_the_turning_that_counts() -> None:
+    rig = Rig()
+    rig.controller.signals.force(1001)
+    rig.run(body("REACT 1001, alarm", "WAIT.EVENT , 1") + ALARM)
+    assert times(rig) == []
+
+
+def test_reactions_to_turning_off() -> None:
+    rig = Rig()
+    rig.run(body("REACT -1001, alarm", "WAIT.EVENT , 5") + ALARM + at(1.0))
+    assert times(rig) == [pytest.approx(1.01, abs=1e-3)]
+
+
+def test_ignore() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm ALWAYS", "WAIT.EVENT , 1.5", "IGNORE 1001", "WAIT.EVENT , 5") + ALARM
+            + at(1.0, (2.0, 1001)))  # fmt: skip
+    assert times(rig) == [pytest.approx(1.0, abs=1e-3)]
+
+
+def test_a_program_reacts_to_its_own_signals() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1, alarm", "SIGNAL 1", "TYPE 99") + ALARM)
+    assert times(rig) == [pytest.approx(0.0, abs=1e-3), 99.0]
+
+
+def test_reactions_wait_for_each_other_but_reacti_doesnt() -> None:
+    text = (
+        body("REACT 1001, slow", "REACT 1002, slow2", "REACTI 1003, alarm", "WAIT.EVENT , 5", "TYPE 99")
+        + ".PROGRAM slow()\n TYPE 1\n WAIT.EVENT , 2\n TYPE 2\n.END\n.PROGRAM slow2()\n TYPE 3\n.END\n"
+        + ALARM
+    )
+    rig = Rig()
+    rig.run(text + at(0.5, (1.0, 1002), (1.5, 1003)))
+    assert times(rig) == [1.0, pytest.approx(1.5, abs=1e-3), 2.0, 3.0, 99.0]
+
+
+def test_without_a_program_it_returns_from_the_one_that_runs() -> None:
+    text = body("CALL loop()", "TYPE 99") + ".PROGRAM loop()\n REACT 1001\n WHILE TRUE DO\n  WAIT\n END\n.END\n"
+    rig = Rig()
+    rig.run(text + at(1.0))
+    assert times(rig) == [99.0]
+    assert rig.now == pytest.approx(1.0, abs=0.02)
+    rig = Rig()
+    rig.run(body("REACTI 1001", "MOVE NULL", "BREAK", "TYPE 99") + at(0.3))
+    assert times(rig) == []
+    assert [e.word for _, e in rig.when(Ended)] == ["END"]
+    assert rig.when(Ended)[0][0] == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_reaction_may_end_or_stop_the_program() -> None:
+    rig = Rig()
+    rig.run(
+        body("REACTI 1001, stop", "MOVE NULL", "BREAK", "TYPE 99") + ".PROGRAM stop()\n HALT\n.END\n" + at(0.3),
+        cycles=5,
+    )
+    assert times(rig) == []
+    assert [e.word for _, e in rig.when(Ended)] == ["HALT"]
+
+
+def test_a_reaction_moves_and_the_program_goes_on() -> None:
+    text = body("REACTI 1001, away", "MOVE TRANS(1)", "MOVE TRANS(2)", "BREAK", "TYPE DX(HERE)")
+    rig = Rig()
+    rig.run(text + ".PROGRAM away()\n MOVE TRANS(500)\n BREAK\n TYPE DX(HERE)\n.END\n" + at(0.5))
+    assert times(rig) == [500.0, 2.0]
+    rig = Rig(FakeArm(latency=0.1))
+    rig.run(text + ".PROGRAM away()\n TYPE 7\n.END\n" + at(1.5))
+    assert times(rig) == [7.0, 1.0]
+
+
+def test_a_missing_program_is_said_at_the_react() -> None:
+    with pytest.raises(ValError, match=r"\*Undefined program name\* nowhere, program main, step 1"):
+        Rig().run(body("REACT 1001, nowhere"))
+    with pytest.raises(ValError, match="Illegal digital signal"):
+        Rig().run(body("REACT 5000"))
+
+
+def test_an_error_in_a_reaction_stops_the_program_there() -> None:
+    rig = Rig()
+    with pytest.raises(ValError, match=r"\*Undefined value\* x, program bad, step 1"):
+        rig.run(body("REACT 1001, bad", "WAIT.EVENT , 5") + ".PROGRAM bad()\n TYPE x\n.END\n" + at(1.0))
+    assert rig.controller.status().state is State.PAUSED
+    assert rig.controller.status().stack == (("main", 2), ("bad", 1))
+    rig.controller.proceed(now=rig.now)
+    rig.advance()
+    assert rig.when(Ended)
+    assert rig.now == pytest.approx(5.0, abs=1e-3)
+
+
+def test_reactions_end_with_the_program() -> None:
+    rig = Rig()
+    rig.run(body("REACTI 1001, alarm") + ALARM)
+    rig.controller.signals.force(1001)
+    rig.advance()
+    assert "brake" not in rig.arm.names()

@@ -1,0 +1,331 @@
+"""Terminals over TCP: bytes to lines, telnet, who is in control, slow and vanished readers, a whole server."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from interfaces.stream import sockets
+from interfaces.val2.controller import Controller
+from interfaces.val2.monitor.desk import Said, Style
+from interfaces.val2.monitor.files import Files
+from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, Monitor
+from interfaces.val2.monitor.switchboard import Free, Switchboard
+from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
+from interfaces.val2.motion import arm_for
+from interfaces.val2.tcp import MOST, TRIES, UNREAD, ValDoor
+from robots import puma560
+from vrs.clock import ManualClock, WallClock
+from vrs.engine import Engine
+
+MODEL = puma560.model()
+WAIT = 60.0
+"""Longest that an answer may take on a busy machine [s]."""
+
+
+# Bytes and lines.
+
+
+@pytest.mark.parametrize("size", [1, 3, 1000])
+def test_every_end_of_line_ends_one_line_however_it_comes(size):
+    data = b"a\rb\nc\r\nd\r\0e\n\nf\r\rg\n"
+    reader = Input()
+    found = [line for k in range(0, len(data), size) for line in reader.feed(data[k : k + size])]
+    assert found == ["a", "b", "c", "d", "e", "", "f", "", "g"]
+    assert reader.feed(b"rest") == []
+    assert reader.end() == ["rest"]
+
+
+@pytest.mark.parametrize("size", [1, 2, 1000])
+def test_telnet_negotiation_is_passed_over(size):
+    data = b"\xff\xfb\x01w\xff\xfd\x03h\xff\xfa\x18\x00xterm\r\n\xff\xf0e\xff\xf1re\r\n\xff\xf4no\x03x\r\n"
+    reader = Input()
+    found = [line for k in range(0, len(data), size) for line in reader.feed(data[k : k + size])]
+    assert found == ["where", INTERRUPT, INTERRUPT, "x"]
+
+
+def test_a_line_without_an_end_takes_no_room_and_is_an_error():
+    reader = Input()
+    for _ in range(1000):
+        assert reader.feed(b"x" * 1000) == []
+    assert len(reader._line) <= 4 * LONGEST
+    assert reader.feed(b"\nwhere\n") == [OVERLONG, "where"]
+
+
+def test_backspaces_erase_and_bytes_that_are_no_text_do_no_harm():
+    assert Input().feed(b"wha\x7f\x08\x08where\x00\n") == ["where"]
+    assert Input().feed(b"\x80\xfe\n") == ["\ufffd\ufffd"]
+
+
+def test_the_prompt_is_given_once_and_again_behind_what_is_said():
+    output = Output("\r\n")
+    assert output.give([Said("hello\n", Style.NOTE)], ".") == "hello\r\n."
+    assert output.give([], ".") == ""
+    output.took()
+    assert output.give([Said("a\nb\n", Style.ANSWER)], ".") == "a\r\nb\r\n."
+    output.took()
+    assert output.give([], "*") == "*"
+    assert output.give([Said("tick\n", Style.TYPED)], "*") == "\r\ntick\r\n"
+    assert output.give([Said("tick\n", Style.TYPED)], "*") == "tick\r\n"
+    assert output.give([], ".") == "."
+    output.took()
+    assert output.give([Said("n =", Style.TYPED)], "how many? ") == "n =how many? "
+
+
+# A door on an arm in this process.
+
+
+CLIENTS = []
+"""To be closed in the end."""
+
+
+class Client:
+    """A terminal."""
+
+    def __init__(self, reader, writer):
+        self.reader, self.writer = reader, writer
+        self.heard = ""
+
+    @classmethod
+    async def at(cls, door, until="\\.$", **options):
+        client = cls(*await asyncio.open_connection("127.0.0.1", door.port, **options))
+        CLIENTS.append(client)
+        if until:
+            await client.until(until)
+        return client
+
+    async def until(self, pattern):
+        """Read until something was heard; what was."""
+        async with asyncio.timeout(WAIT):
+            while not re.search(pattern, self.heard):
+                data = await self.reader.read(65536)
+                assert data, f"closed after {self.heard!r}"
+                self.heard += data.decode()
+        heard, self.heard = self.heard, ""
+        return heard
+
+    async def say(self, text, until="\\.$"):
+        self.writer.write(text.encode() if isinstance(text, str) else text)
+        return await self.until(until)
+
+
+@contextlib.asynccontextmanager
+async def door_here(tmp_path, *, secret=""):
+    engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
+    arm, clock = arm_for(engine), WallClock()
+    controller = Controller(arm, parameters=arm.parameters)
+    board = Switchboard(controller, Free())
+
+    def terminal(token):
+        rights = {"": "", secret: "", "look": "this token only looks"} if secret else {"": ""}
+        if secret and token not in {secret, "look"}:
+            return None
+        return Monitor(board, Files(tmp_path), "a test", barred=rights[token])
+
+    door = ValDoor(board, clock, terminal, locked=bool(secret))
+    async with door.listening(sockets.bind("127.0.0.1", 0)):
+        door.controller = controller
+        yield door
+
+
+def live(scenario):
+    async def closed():
+        try:
+            await asyncio.wait_for(scenario, 120.0)
+        finally:
+            while CLIENTS:
+                writer = CLIENTS.pop().writer
+                writer.close()
+                with contextlib.suppress(OSError):
+                    await writer.wait_closed()
+
+    asyncio.run(closed())
+
+
+def test_a_dialogue_with_edit_and_prompt(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door)
+            assert "919.85" in await client.say("where\r\n")
+            assert await client.say("edit ask\r", "1\\.\\? $") == ".PROGRAM ask()\r\n1.? "
+            await client.say('prompt "n? ", n\rtype n * 2\re\r')
+            await client.say("execute ask\r", "n\\? $")
+            assert "\r\n 42\r\n" in "\r\n" + await client.say("21\r", "ended[^.]*\\.$")
+            await client.say("do drive 1,10,100\n")
+            assert " 10.000" in await client.say("where\n")
+
+    live(scenario())
+
+
+def test_one_is_in_control_and_others_look_until_it_has_gone(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            first, second = await Client.at(door), await Client.at(door)
+            await first.say("edit loop\nwhile true do\ndelay 0.1\nend\ne\nexecute loop\n", "\\*$")
+            assert "*No control*" in await second.say("do ready\n", "control[^*]*\\*$")
+            assert "loop, step" in await second.say("status\n", "time[^*]*\\*$")
+            first.writer.close()
+            await second.until("\\.$")
+            assert not door.controller.running
+            assert "*" not in await second.say("do drive 1,5,100\n")
+
+    live(scenario())
+
+
+def test_ctrl_c_aborts_and_a_client_that_vanished_is_noticed_after_its_end_of_input(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door)
+            await client.say("edit loop\nwhile true do\ndelay 0.1\nend\ne\nexecute loop\n", "\\*$")
+            assert "(ABORT)" in await client.say(b"\x03")
+            await client.say("execute loop\n", "\\*$")
+            client.writer.write_eof()
+            await asyncio.sleep(0.3)
+            assert door.controller.running
+            client.writer.transport.abort()
+            async with asyncio.timeout(WAIT):
+                while door.controller.running:
+                    await asyncio.sleep(0.02)
+
+    live(scenario())
+
+
+def test_the_end_of_input_lets_what_was_typed_be_done(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door)
+            client.writer.write(b"do drive 1,10,100\nwhere\ndo x = 3\nlistr")
+            client.writer.write_eof()
+            async with asyncio.timeout(WAIT):
+                heard = (await client.reader.read()).decode()
+            assert " 10.000" in heard
+            assert "x = 3" in heard
+
+    live(scenario())
+
+
+def test_who_reads_nothing_loses_output_and_holds_up_nobody(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door, "", limit=1)
+            reader, writer = client.reader, client.writer
+            writer.write(b'edit flood\nwhile true do\ntype "0123456789012345678901234567890123456789"\nend\ne\n')
+            writer.write(b"execute flood\n")
+            (connection,) = door._connections
+            waiting = connection._writer.transport.get_write_buffer_size
+            async with asyncio.timeout(WAIT):
+                while not connection._lost:
+                    await asyncio.sleep(0.02)
+            assert waiting() <= UNREAD
+            begun = time.monotonic()
+            second = await Client.at(door, "")
+            assert "919.85" in await second.say("where\n", "919.85")
+            assert time.monotonic() - begun < WAIT / 2
+            heard = b""
+            async with asyncio.timeout(WAIT):
+                while b"*Output lost*" not in heard:
+                    heard = heard[-100:] + await reader.read(65536)
+
+    live(scenario())
+
+
+def test_too_long_a_line_too_many_lines_and_too_many_terminals_are_errors(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door)
+            assert "*Line too long*" in await client.say(b"x" * 100_000 + b"\n")
+            assert "919.85" in await client.say("where\n")
+            await client.say("do drive 1,90,10\n" + "do x = 1\n" * 500 + "do y = 2\n", "Too many lines waiting")
+            await client.say("abort\n")
+            others = [await Client.at(door) for _ in range(MOST - 1)]
+            assert "*Too many terminals*" in await (await Client.at(door, "")).until("most")
+            assert len(others) == MOST - 1
+
+    live(scenario())
+
+
+def test_tokens_open_what_they_open(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path, secret="secret") as door:
+            client = await Client.at(door, "Token: $")
+            assert "*Invalid token*" in await client.say("where\n", "Token: $")
+            await client.say("secret\n")
+            assert "*" not in await client.say("do drive 1,5,100\n")
+            looker = await Client.at(door, "Token: $")
+            assert "only looks" in await looker.say("look\n")
+            client.writer.close()
+            assert "*No control*" in await looker.say("do ready\n")
+            wrong = await Client.at(door, "Token: $")
+            wrong.writer.write(b"guess\n" * TRIES)
+            async with asyncio.timeout(WAIT):
+                heard = (await wrong.reader.read()).decode()
+            assert heard.count("*Invalid token*") == TRIES
+
+    live(scenario())
+
+
+# A whole server.
+
+
+def test_a_port_that_is_taken_is_one_line_and_exit_code_2():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        done = subprocess.run(
+            [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0",
+             "--val-port", str(taken.getsockname()[1])],
+            capture_output=True, text=True, timeout=WAIT, check=False,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_server_with_a_port_for_val(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--val-port", "0", "--body", "exact",
+         "--link-loss", "hold",
+         "--val-files", str(tmp_path), "--until-eof"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    try:
+        said = [process.stdout.readline(), process.stdout.readline()]
+        found = re.search(r"VAL-II on 127\.0\.0\.1 port (\d+)", said[1])
+        assert found, said
+        with socket.create_connection(("127.0.0.1", int(found[1])), timeout=WAIT) as client:
+            client.settimeout(WAIT)
+
+            def say(text):
+                client.sendall(text.encode())
+                heard = ""
+                while not heard.endswith("."):
+                    data = client.recv(65536)
+                    assert data, heard
+                    heard += data.decode()
+                return heard
+
+            say("")
+            assert "*" not in say("do ready\r\n")
+            heard = say("where\r\n")
+            for text in ("-20.30", "150.05", "919.85", "90.000", "-90.000"):
+                assert text in heard, heard
+            assert "-20.30" in heard
+            assert "X/JT1" in say("where real\r\n")
+            say("edit go\r\nmove trans(400,0,200,90,0,0)\r\nready\r\ne\r\n")
+            say("store go\r\n")
+            assert (tmp_path / "go.v2").read_text().startswith(".PROGRAM go")
+        process.stdin.close()
+        assert process.wait(timeout=WAIT) == 0
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+        process.stdout.close()

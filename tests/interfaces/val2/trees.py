@@ -1,0 +1,210 @@
+"""Trees as the parser makes them, for Hypothesis."""
+
+from __future__ import annotations
+
+import string
+
+from hypothesis import strategies as st
+
+from interfaces.val2 import forms
+from interfaces.val2.parser import LONGEST_LINE
+from interfaces.val2.printer import print_step
+from interfaces.val2.syntax import (
+    AnyValue,
+    Apply,
+    Assign,
+    Binary,
+    Blank,
+    Call,
+    Case,
+    Compound,
+    Decompose,
+    Do,
+    Else,
+    End,
+    Exit,
+    For,
+    Format,
+    Goto,
+    If,
+    IfGoto,
+    Ignored,
+    Instruction,
+    Local,
+    Next,
+    Number,
+    Program,
+    Prompt,
+    React,
+    Return,
+    Set,
+    Step,
+    Text,
+    Type,
+    Unary,
+    Until,
+    Value,
+    Variable,
+    While,
+)
+
+RESERVED = forms.CONSTANTS | forms.OPERATORS.keys() | {"ALWAYS", "MMPS", "IPS", "MONITOR"}
+LETTERS = string.ascii_lowercase
+bodies = st.builds(
+    lambda first, rest: (first + rest)[:15], st.sampled_from(LETTERS), st.text(LETTERS + "0129_.", max_size=16)
+)
+words = st.sampled_from(["step", "to", "of", "then", "do", "by", "speed", "value", "end", "goto", "for", "at", "x"])
+plain = (bodies | words).filter(lambda name: name.upper() not in RESERVED)
+names = st.builds(str.__add__, st.sampled_from(["", "", "", "#", "$"]), plain)
+labels = st.integers(0, 65535)
+counts = st.integers(1, 100)
+numbers = st.builds(Number, st.floats(0, 1e12) | st.integers(0, 9999).map(float))
+unbroken = st.text(st.characters(blacklist_characters='"\r\n', blacklist_categories=["Cs"]), max_size=12)
+texts = st.builds(Text, unbroken.filter(lambda text: text.upper() not in RESERVED))
+formats = st.builds(
+    Format,
+    st.sampled_from(sorted(forms.FORMATS)),
+    st.none() | st.integers(0, 999),
+    st.none() | st.integers(0, 99),
+)
+OPERATORS = sorted(forms.LEVELS)
+
+
+def variables(inner, named=names):
+    """A name, an element, or a whole array."""
+    some = st.lists(inner, min_size=1, max_size=3).map(tuple)
+    return (
+        st.builds(Variable, named)
+        | st.builds(Variable, named, some)
+        | st.builds(lambda name: Variable(name, array=True), named)
+    )
+
+
+def targets(inner, prefixes=("", "$", "#")):
+    """What may be set."""
+    return variables(inner).filter(lambda v: v.prefix in prefixes)
+
+
+@st.composite
+def applications(draw, inner):
+    """A function with as many arguments as it takes."""
+    row = forms.FUNCTIONS[draw(st.sampled_from(sorted(forms.FUNCTIONS)))]
+    least = sum(slot.required for slot in row.slots)
+    most = 6 if row.repeats else len(row.slots)
+    arguments = []
+    for i in range(draw(st.integers(least, most))):
+        required = bool(row.slots) and row.slots[min(i, len(row.slots) - 1)].required
+        choice = inner | formats if row.name == "$ENCODE" else inner
+        arguments.append(draw(choice if required else choice | st.none()))
+    return Apply(row.name, () if arguments == [None] else tuple(arguments))
+
+
+def larger(inner):
+    """Expressions of others."""
+    loose = inner.filter(lambda e: not isinstance(e, Compound))
+    return (
+        st.builds(Unary, st.sampled_from(["-", "NOT", "COM"]), inner)
+        | st.builds(Binary, st.sampled_from(OPERATORS), inner, inner)
+        | st.builds(Compound, st.lists(loose, min_size=2, max_size=4).map(tuple))
+        | variables(inner)
+        | applications(inner)
+    )
+
+
+expressions = st.recursive(numbers | texts | st.builds(Variable, names), larger, max_leaves=6)
+optional = st.none() | expressions
+
+
+def _located(value):
+    return (
+        isinstance(value, Compound)
+        or (isinstance(value, Apply) and forms.FUNCTIONS[value.function].gives in ("frame", "location"))
+        or (isinstance(value, Variable) and value.prefix == "#")
+    )
+
+
+@st.composite
+def instructions(draw):
+    """An instruction that has no node of its own."""
+    row = draw(st.sampled_from([row for row in forms.INSTRUCTIONS.values() if not row.own]))
+    match row.keyword:
+        case "TIMER":
+            return Instruction("TIMER", (draw(numbers | st.builds(Variable, plain)), draw(expressions)))
+        case "PARAMETER":
+            return Instruction(
+                "PARAMETER", (draw(expressions),), (draw(st.sampled_from(sorted(forms.PARAMETERS))),)
+            )
+        case "ENABLE" | "DISABLE":
+            switches = st.lists(st.sampled_from(sorted(forms.SWITCHES)), min_size=1, max_size=3)
+            return Instruction(row.keyword, (), tuple(draw(switches)))
+        case "GRASP":
+            label = draw(labels.map(lambda n: (Number(float(n)),)) | st.just(()))
+            return Instruction("GRASP", (draw(expressions), *label))
+        case "WAIT":
+            return Instruction(
+                "WAIT", draw(st.just(()) | st.tuples(st.builds(Binary, st.just("<"), expressions, expressions)))
+            )
+    operands = []
+    count = len(row.slots) + (draw(st.integers(0, 3)) if row.repeats else 0)
+    for i in range(count):
+        required = row.slots[min(i, len(row.slots) - 1)].required
+        operands.append(draw(expressions if required else optional))
+    while operands and operands[-1] is None:
+        operands.pop()
+    chosen = [draw(st.sampled_from(["", *group])) for group in row.words]
+    return Instruction(row.keyword, tuple(operands), tuple(filter(None, chosen)))
+
+
+programs_called = plain
+ignored = st.sampled_from(sorted(forms.IGNORED))
+rests = st.text(LETTERS + "0123456789 ,+()", max_size=12).map(lambda s: f"unknown{s}".strip())
+statements = st.one_of(
+    st.just(Blank()),
+    st.builds(Assign, targets(expressions, ("", "$")), expressions.filter(lambda e: not _located(e))),
+    st.builds(Set, targets(expressions), expressions),
+    st.builds(Decompose, targets(expressions), expressions),
+    instructions(),
+    st.builds(If, expressions),
+    st.builds(IfGoto, expressions, labels),
+    st.sampled_from([Else(), End(), Do(), AnyValue(), Return()]),
+    st.builds(While, expressions),
+    st.builds(Until, expressions),
+    st.builds(For, targets(expressions), expressions, expressions, optional),
+    st.builds(Case, expressions),
+    st.builds(Value, st.lists(expressions, min_size=1, max_size=3).map(tuple)),
+    st.builds(Exit, counts),
+    st.builds(Next, counts),
+    st.builds(Goto, labels),
+    st.builds(
+        Call,
+        programs_called,
+        st.lists(optional, max_size=3).filter(lambda given: given != [None]).map(tuple),
+        st.sampled_from(["CALL", "GOSUB"]),
+    ),
+    st.builds(React, expressions, st.just("") | programs_called, st.booleans(), st.booleans()),
+    st.builds(Type, st.lists(expressions | formats, max_size=4).map(tuple)),
+    st.builds(
+        Prompt, expressions, st.lists(targets(expressions).filter(lambda v: not v.array), max_size=3).map(tuple)
+    ),
+    st.builds(
+        Local,
+        st.sampled_from(["AUTO", "LOCAL", "GLOBAL"]),
+        st.lists(variables(numbers), min_size=1, max_size=3).map(tuple),
+        st.sampled_from(["", "REAL", "LOC"]),
+    ),
+    st.builds(Ignored, ignored, rests),
+    st.just(Ignored("DISABLE", "color.speed, CP")),
+    st.just(Ignored("PARAMETER", "vscale = 3")),
+)
+comments = st.none() | st.text(
+    st.characters(blacklist_characters="\r\n", blacklist_categories=["Cs"]), max_size=20
+).map(str.rstrip)
+steps = st.builds(Step, statements, st.none() | labels, comments).filter(
+    lambda step: len(print_step(step)) < LONGEST_LINE - 200
+)
+parameters = st.lists(
+    st.builds(lambda name, array: Variable(name, array=array), names, st.booleans()),
+    max_size=4,
+    unique_by=lambda v: v.name,
+).map(tuple)
+programs = st.builds(Program, plain, parameters, st.lists(steps, max_size=12).map(tuple), comments)
