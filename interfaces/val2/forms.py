@@ -29,7 +29,8 @@ _MOTION: Final = (
     form("DELAY", "seconds", "Stand still for a time, as a motion.", "VAL", "motion"),
     form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", "motion"),
     form("BRAKE", "", "Stop the present motion at once.", "V+", "motion"),
-    form("AT", "time", "The next motion begins at a time of the session [s].", "ours", "motion"),
+    form("AT", "time", "The next motion begins at a time of the session [s].", "ours", "motion",
+         usage="AT time [motion]"),
 )  # fmt: skip
 
 _SETTINGS: Final = (

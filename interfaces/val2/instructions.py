@@ -16,7 +16,7 @@ from interfaces.val2.expressions import Expressions
 from interfaces.val2.memory import where
 from interfaces.val2.motions import MOTIONS
 from interfaces.val2.operands import Ask, Operands
-from interfaces.val2.operations import Slots
+from interfaces.val2.operations import Real, Slots
 from interfaces.val2.settings import AT_ONCE, AT_REST
 from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Instruction, Number, Unary, Variable
 
@@ -138,6 +138,25 @@ def _grasp(o: Operands, c: Context, following: int, label: int | None) -> StepFu
     return lambda s: _special(c, Waiting(grasping(least(s))))
 
 
+def _timed(c: Context, time: Real, prepare: Callable[[Slots], Ask]) -> Callable[[Slots], Ask]:
+    """Ask for a motion at a time; where it can't be, the time isn't for the next one."""
+
+    def timed(s: Slots) -> Ask:
+        begins, ask = time(s), prepare(s)
+
+        def both() -> None:
+            c.arm.at(begins)
+            try:
+                ask()
+            except ValError:
+                c.arm.at(None)
+                raise
+
+        return both
+
+    return timed
+
+
 def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) -> StepFunction:
     """The closure of an instruction.
 
@@ -152,7 +171,7 @@ def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) ->
     """
     c, o, following = x.context, Operands(x, i), index + 1
     if (motion := MOTIONS.get(i.keyword)) is not None:
-        prepare = motion(o, c)
+        prepare = motion(o, c) if i.begins is None else _timed(c, x.real(i.begins), motion(o, c))
         return lambda s: _special(c, Waiting(_moving(c, prepare(s), following)))
     if (at_once := AT_ONCE.get(i.keyword)) is not None:
         prepare = at_once(o, c)

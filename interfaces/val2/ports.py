@@ -146,8 +146,8 @@ class ArmPort(Protocol):
     def set_dry_run(self, on: bool) -> None:
         """ENABLE DRY.RUN: motions take no time and move nothing."""
 
-    def at(self, t: float) -> None:
-        """AT, ours: execution time of the next motion [s]."""
+    def at(self, t: float | None) -> None:
+        """AT, ours: execution time of the next motion [s]; None for as soon as it can."""
 
     def alter(self, values: tuple[float, ...], *, now: float) -> None:
         """ALTOUT: correct the path by X, Y, Z [mm] and turns about x, y, z [deg]."""

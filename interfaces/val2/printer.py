@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from interfaces.val2 import forms
@@ -223,6 +224,8 @@ def _other(statement: Statement) -> str:
 
 
 def _instruction(statement: Instruction) -> str:
+    if statement.begins is not None:
+        return f"AT {print_expression(statement.begins)} {_instruction(replace(statement, begins=None))}"
     keyword, operands = statement.keyword, statement.operands
     match keyword:
         case "PARAMETER":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from interfaces.val2 import forms, grammar
@@ -56,6 +57,10 @@ _CHANNEL: Final = re.compile(
 _KIND: Final = re.compile(r"\s*(REAL|DOUBLE|LOC)\s+(?=[A-Za-z#$])", re.IGNORECASE | re.ASCII)
 _SETTING: Final = re.compile(r"\s*([A-Za-z][A-Za-z0-9_.]*)\s*(=(?!=))?")
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
+_TIMED: Final = re.compile(
+    r"(.*?[^\s+\-*/^(,:<>=])\s+(MOVES?T?|APPROS?|DEPARTS?|DRIVE|DRAW|READY|NEST|ALIGN)(?![A-Za-z0-9_.])",
+    re.IGNORECASE | re.ASCII,
+)
 
 
 def statement(keyword: str, rest: Rest) -> Statement:
@@ -126,6 +131,25 @@ def _channel_wait(condition: Expression | None) -> Expression | None:
     channel = Number(inner.value + 1000 if inner.value <= 32 else inner.value, inner.at)
     signed = channel if inner is condition else Unary("-", channel, inner.at)
     return Apply("SIG", (signed,), inner.at)
+
+
+def timed(text: str) -> tuple[int, int, int] | None:
+    """Where the time of `AT time motion` ends, and its motion's keyword begins and ends; None without a motion."""
+    found = _TIMED.match(text)
+    return None if found is None else (found.end(1), found.start(2), found.end(2))
+
+
+def _at(keyword: str, rest: Rest) -> Statement:
+    """`AT time`, or with a motion behind it."""
+    row, places = forms.INSTRUCTIONS[keyword], timed(rest.text)
+    if places is None:
+        return _instruction(row, rest)
+    end, begin, behind = places
+    time = grammar.read(rest.text[:end], "expression", rest.line)
+    motion = forms.INSTRUCTIONS[rest.text[begin:behind].upper()]
+    made = _instruction(motion, Rest(rest.text, behind, Place(rest.line, begin + 1)))
+    assert isinstance(made, Instruction)
+    return replace(made, begins=rest.expression(time))
 
 
 def _nothing(make: Callable[[], Statement]) -> Callable[[str, Rest], Statement]:
@@ -334,6 +358,7 @@ def _local(keyword: str, rest: Rest) -> Statement:
 
 
 _OWN: Final[dict[str, Callable[[str, Rest], Statement]]] = {
+    "AT": _at,
     "SET": _set,
     "DECOMPOSE": _decompose,
     "SHIFT": _shift,

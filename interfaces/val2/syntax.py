@@ -122,6 +122,8 @@ class Instruction:
     words: tuple[str, ...] = ()
     """Words after them, upper case, in the order of `forms.py`: `MMPS`, `ALWAYS`; a switch's name for `ENABLE`."""
     at: Place = field(default=NOWHERE, compare=False)
+    begins: Expression | None = None
+    """Time of `AT time` before a motion, on the same line."""
 
 
 @dataclass(frozen=True, slots=True)

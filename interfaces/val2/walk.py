@@ -94,6 +94,8 @@ def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
             yield from ((item, "any") for item in items if not isinstance(item, Format))
         case Prompt(text):
             yield text, "string"
+    if isinstance(statement, Instruction) and statement.begins is not None:
+        yield statement.begins, "real"
     for target in writes(statement):
         yield from ((index, "real") for index in target.indices)
 

@@ -55,7 +55,8 @@ _LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
 
 _TABLE: Final = (
     Command("ABORT", "", "Stop the program and the arm, within its limits; Ctrl-C does the same."),
-    Command("AT", "t | +t", "The next motion begins at a time, or so long from now [s].", idle=True, ours=True),
+    Command("AT", "t | +t [motion]", "The next motion begins at a time, or so long from now [s].", idle=True,
+            ours=True),
     Command("BASE", "| dx,dy,dz,turn", "Show the base, or set it: mm, and deg about Z.", need=_ARGUMENT, idle=True),
     Command("CALIBRATE", "", "Make joint values valid; asks first.", idle=True),
     Command("COPY", "new=old", "Copy a program."),

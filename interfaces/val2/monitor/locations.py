@@ -36,7 +36,10 @@ def rewind(desk: Desk, rest: str, *, now: float) -> None:
     t = desk.number(rest, now=now)
     t = now + t if rest.startswith("-") else t
     past = desk.controller.arm.past(t, now=now)
-    desk.say(f"At {layout.fixed(t, 3)} s, {layout.fixed(now - t, 3)} s ago", *layout.where(past))
+    apart = (
+        f"{layout.fixed(now - t, 3)} s ago" if t <= now else f"{layout.fixed(t - now, 3)} s from now, as planned"
+    )
+    desk.say(f"At {layout.fixed(t, 3)} s, {apart}", *layout.where(past))
 
 
 def here(desk: Desk, rest: str, *, now: float) -> Dialogue:

@@ -11,6 +11,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.desk import Desk, Style
 from interfaces.val2.monitor.text import integer, named, nothing, pieces
+from interfaces.val2.statements import timed
 from interfaces.val2.syntax import Blank, Call, Expression
 
 FOREVER: Final = -1
@@ -30,14 +31,18 @@ def do(desk: Desk, rest: str, *, now: float) -> None:
 
 
 def at(desk: Desk, rest: str, *, now: float) -> None:
-    """AT t, AT +t, before the next motion; AT t DO motion in one line."""
-    together = _AT.fullmatch(rest)
-    when = together[1] if together else rest
+    """AT t, AT +t, before the next motion; AT t motion, AT t DO motion in one line."""
+    together, places = _AT.fullmatch(rest), timed(rest)
+    when, motion = rest, ""
+    if together is not None:
+        when, motion = together[1], together[2]
+    elif places is not None:
+        when, motion = rest[: places[0]], rest[places[1] :]
     t = desk.number(when.removeprefix("+"), now=now)
     desk.controller.arm.at(now + t if when.startswith("+") else t)
     desk.scheduling = True
-    if together:
-        do(desk, together[2], now=now)
+    if motion:
+        do(desk, motion, now=now)
 
 
 def execute(desk: Desk, rest: str, *, now: float) -> None:

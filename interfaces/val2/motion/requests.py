@@ -87,9 +87,9 @@ class Requests(Progress):
         elif not on:
             self._dry = None
 
-    def at(self, t: float) -> None:
+    def at(self, t: float | None) -> None:
         """AT."""
-        if not math.isfinite(t):
+        if t is not None and not math.isfinite(t):
             raise ValError("Illegal value", "a time is finite")
         self._at = t
 

@@ -234,7 +234,7 @@ class FakeArm:
         """DRY.RUN."""
         self._note(self._seen, "set_dry_run", on)
 
-    def at(self, t: float) -> None:
+    def at(self, t: float | None) -> None:
         """AT."""
         self._note(self._seen, "at", t)
 

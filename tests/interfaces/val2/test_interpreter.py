@@ -375,6 +375,26 @@ def test_motions_and_settings_reach_the_arm() -> None:
     assert PrecisionPoint((1.0, 0.0, 0.0, 0.0, 0.0, 0.0)) in [a.values[0] for a in rig.arm.asked if a.values]
 
 
+def test_a_time_before_a_motion_is_for_that_one() -> None:
+    rig = Rig()
+    rig.run(body("t = 3", "AT t+1.5 MOVE #PPOINT(1)", "AT 9 DRIVE 2, 5, 50"))
+    assert [(a.what, a.values[0]) for a in rig.arm.asked if a.what in {"at", "drive"}] == [
+        ("at", 4.5), ("at", 9.0), ("drive", 2),
+    ]  # fmt: skip
+
+
+def test_a_time_is_taken_back_with_its_motion() -> None:
+    rig = Rig()
+
+    def refuse(*_, **__) -> None:
+        raise ValError("Location out of range")
+
+    rig.arm.move = refuse
+    with pytest.raises(ValError, match="out of range"):
+        rig.run(body("AT 4 MOVE NULL"))
+    assert [a.values for a in rig.arm.asked if a.what == "at"] == [(4.0,), (None,)]
+
+
 def test_a_joint_that_doesnt_exist() -> None:
     assert failure(body("DRIVE 7, 10, 50")).what == "Illegal joint number"
 

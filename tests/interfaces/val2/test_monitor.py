@@ -431,6 +431,18 @@ def test_at_schedules_a_motion_undo_takes_it_back(sitting):
     assert 2.0 < sitting.now - begun < 4.0
 
 
+def test_at_takes_a_motion_on_its_line(sitting):
+    sitting.line("AT +1 DRIVE 1,20,100")
+    sitting.pass_time(0.9)
+    assert sitting.joints()[0] == pytest.approx(0.0)
+    sitting.until(lambda: abs(sitting.joints()[0] - 20.0) < 1e-6)
+
+
+def test_rewind_tells_past_from_plan(sitting):
+    assert "0.000 s ago" in sitting.line("REWIND 0")
+    assert "5.000 s from now, as planned" in sitting.line("REWIND 5")
+
+
 # Memory and files.
 
 

@@ -123,6 +123,13 @@ def _located(value):
     )
 
 
+TIMED = (
+    "MOVE", "MOVES", "MOVET", "MOVEST", "APPRO", "APPROS", "DEPART", "DEPARTS", "DRIVE", "DRAW", "READY", "NEST",
+    "ALIGN",
+)  # fmt: skip
+"""What AT may stand before."""
+
+
 @st.composite
 def instructions(draw):
     """An instruction that has no node of its own."""
@@ -152,7 +159,9 @@ def instructions(draw):
     while operands and operands[-1] is None:
         operands.pop()
     chosen = [draw(st.sampled_from(["", *group])) for group in row.words]
-    return Instruction(row.keyword, tuple(operands), tuple(filter(None, chosen)))
+    times = numbers | st.builds(Variable, plain)
+    begins = draw(st.none() | times) if row.keyword in TIMED else None
+    return Instruction(row.keyword, tuple(operands), tuple(filter(None, chosen)), begins=begins)
 
 
 programs_called = plain
