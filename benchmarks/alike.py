@@ -15,7 +15,8 @@ from interfaces.lab.statistics import bootstrap
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
-from interfaces.runtime.live.robot import LARGEST, LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.plan import Plan, PlannedMotion
 from interfaces.runtime.virtual import run_twins
 from interfaces.stream import sockets
