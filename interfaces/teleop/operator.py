@@ -35,6 +35,8 @@ from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
+NOT_FOLLOWING = "the robot doesn't follow"
+"""How refusals begin while the real robot has stopped by itself."""
 _SAME = 1e-9
 """Joints nearer than this [rad] are one."""
 _UNDER_WAY_MOST = 4096
@@ -191,7 +193,7 @@ class OperatorSite:
     def _refusal(self) -> str:
         """Why the robot can't be commanded; empty if it can."""
         if self.halted:
-            return f"the robot doesn't follow: {self.halted}; resume first"
+            return f"{NOT_FOLLOWING}: {self.halted}; resume first"
         if len(self._under_way) >= _UNDER_WAY_MOST:
             return f"{_UNDER_WAY_MOST} commands wait to be acknowledged"
         return ""

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion.altering import Alterations
 from interfaces.val2.motion.hand import Gripped, Hand
@@ -201,6 +202,9 @@ def _refusal(fate: Fate, straight: bool) -> ValError:
     """What a refusal is in VAL's words."""
     if fate.receipt is None:
         return ValError("Command refused", fate.reason)
+    if fate.reason.startswith(NOT_FOLLOWING):
+        why = fate.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
+        return ValError("Robot halted", f"{why}; ENABLE POWER lets it go on")
     if straight:
         return ValError("Straight line not possible", fate.reason)
     return location_error(fate.reason)

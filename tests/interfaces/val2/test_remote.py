@@ -11,10 +11,10 @@ import pytest
 
 from interfaces import Designer, Viewer, connect
 from interfaces.stream.control import Lease
-from interfaces.teleop import RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotSiteConfig
 from interfaces.val2.errors import ValError
 from interfaces.val2.geometry import from_oat, to_oat
-from interfaces.val2.motion import Arm, arm_for
+from interfaces.val2.motion import Arm, SiteRobot, arm_for
 from interfaces.val2.motion.places import READY
 from interfaces.val2.motion.remote import RemoteRobot
 from tests.interfaces.joined import MODEL, Joined, bad, constant
@@ -115,6 +115,12 @@ def test_what_is_refused_raises_once_and_changes_nothing(line):
         line.until(arm.answered)
     line.until(arm.settled)
     assert off(arm, NEAR, line.now) < 1e-9
+
+
+def test_a_robot_that_has_halted_says_how_it_goes_on():
+    site = OperatorSite(MODEL, MODEL.poses["nominal"], now=0.0, halted="nothing fresh came")
+    with pytest.raises(ValError, match=r"\*Robot halted\* nothing fresh came; ENABLE POWER lets it go on"):
+        Arm(SiteRobot(site)).go_ready(now=0.0)
 
 
 def test_braking_and_going_on(line):
