@@ -8,7 +8,7 @@ from array import array
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,13 @@ Places: TypeAlias = tuple["array[float]", list["Index"], list[Node]]
 
 _Integers: TypeAlias = NDArray[np.int64]
 
+_VERSIONS = 2
+"""Stacks, and indexes, that are kept of nodes that begin with the same leaf: most are of older timelines."""
+
 _stacked: deque[weakref.ref[Node]] = deque()
 _indexed: deque[weakref.ref[Index]] = deque()
+_stacked_from: dict[int, list[weakref.ref[Node]]] = {}
+_indexed_from: dict[int, list[weakref.ref[Index]]] = {}
 
 
 class Stack:
@@ -136,6 +141,9 @@ class Index:
         if self.missed < 16:
             return None
         self.columns = columns = _columns(node, self.offset, n)
+        older = _older(_indexed_from, node, self)
+        if older is not None:
+            older.columns, older.missed = None, 0
         _indexed.append(weakref.ref(self))
         while len(_indexed) > INDEXES:
             oldest = _indexed.popleft()()
@@ -143,6 +151,26 @@ class Index:
                 # What doesn't fit in is made again seldom, so that making it doesn't cost more than it saves.
                 oldest.columns, oldest.missed = None, -1000
         return columns
+
+
+_Kept = TypeVar("_Kept")
+
+
+def _older(kept: dict[int, list[weakref.ref[_Kept]]], node: Node, newest: _Kept) -> _Kept | None:
+    """Note what is kept for a node; the one that is too much now, if there's one.
+
+    Leaves are told apart by their addresses: another leaf at the address of one that's gone costs but a cache.
+    """
+    if len(kept) > 2 * (STACKS + INDEXES):
+        kept.clear()
+    first = id(node.children[0])
+    older: list[_Kept] = []
+    for found in kept.pop(first, []):
+        there = found()
+        if there is not None and there is not newest:
+            older.append(there)
+    kept[first] = [weakref.ref(version) for version in [*older[-_VERSIONS + 1 :], newest]]
+    return older[0] if len(older) >= _VERSIONS else None
 
 
 def _columns(node: Node, offset: float, n: int) -> Columns:
@@ -196,6 +224,9 @@ def stack_of(node: Node, n: int, times: int) -> Stack | None:
             return None
         stack = node.stack = Stack(node, n)
         node.asked = 0
+        older = _older(_stacked_from, node, node)
+        if older is not None:
+            older.stack = None
         _stacked.append(weakref.ref(node))
         while len(_stacked) > STACKS:
             oldest: Any = _stacked.popleft()()

@@ -87,6 +87,25 @@ def test_caches_are_bounded(monkeypatch: pytest.MonkeyPatch):
     assert np.array_equal([timeline.sample(x) for x in t.tolist()], each)
 
 
+def test_of_a_plan_that_grows_the_newest_versions_alone_keep_caches(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(tree, "LEAF", 32)
+    rng = np.random.default_rng(6)
+    timeline = Timeline(np.zeros(N))
+    for k in range(60):
+        timeline = timeline.edited(timeline.end, [piece(rng, k + 1, 5)])
+    versions = []
+    for k in range(12):
+        timeline = timeline.edited(timeline.end, [piece(rng, 100 + k, 1)])
+        versions.append(timeline)
+        t = np.linspace(timeline.start, timeline.end, 400)
+        many = timeline.sample(t)
+        each = np.array([timeline.sample(x) for x in t.tolist()])
+        assert (np.abs(many - each) <= 1e-14 * np.maximum(1, np.abs(many))).all()
+    nodes = [node for tau in versions for node in evaluation.places_of(tau._root, len(tau._levels))[2]]
+    assert 1 <= len({id(node) for node in nodes if node.stack is not None}) <= 4
+    assert 1 <= len({id(node) for node in nodes if node.index and node.index.columns}) <= 4
+
+
 def test_threads_sample_one_timeline_at_once():
     rng = np.random.default_rng(5)
     timeline = Timeline(np.zeros(N))
