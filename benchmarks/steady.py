@@ -79,8 +79,9 @@ def main() -> None:
             if robot.state is not None and robot.state.halted != halted:
                 halted = robot.state.halted
                 print(f"{time.monotonic() - begin:6.0f} s  the robot {halted or 'goes on'}", flush=True)
-                if halted:
-                    robot.resume()
+            if halted:
+                # Refused until the virtual robot has come to where the real one stands.
+                robot.resume()
             if time.monotonic() >= looked + PERIOD:
                 looked = time.monotonic()
                 sites = [server, *server.children(recursive=True)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import ADAPTIVE, DEFAULT_DELAY, DEFAULT_SEED, explained, prepare, show, write
-from vrs.errors import FormatError
+from interfaces.files import read_within
 
 if TYPE_CHECKING:
     from interfaces.val2.source import SourceFile
@@ -96,13 +96,7 @@ def text_of(path: Path) -> str:
     Raises:
         FormatError: If it can't be read, or is longer than 4 MiB.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
-    if len(data) > MAX_BYTES:
-        raise FormatError(str(path), f"is longer than the {MAX_BYTES} bytes allowed")
+    data = read_within(path, MAX_BYTES)
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:

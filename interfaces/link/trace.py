@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from interfaces.files import read_within
 from interfaces.link.delay import MAX_DELAY, DelaySource, share_of
 from vrs.checks import number_in
 from vrs.errors import FormatError, InvalidValueError
@@ -71,14 +72,7 @@ def read_trace(path: Path, *, longest: float) -> tuple[float | None, ...]:
         FormatError: If the file can't be read, or a row holds anything else.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
-    if len(data) > MAX_BYTES:
-        raise FormatError(str(path), f"is longer than the {MAX_BYTES} bytes allowed")
-    try:
-        text = data.decode("utf-8-sig")
+        text = read_within(path, MAX_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise FormatError(str(path), "isn't UTF-8 text") from None
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias
 import msgspec
 import numpy as np
 
+from interfaces.files import read_within
 from vrs.checks import one_of
 from vrs.commands import (
     Insertion,
@@ -129,12 +130,7 @@ def read_plan(path: Path, model: RobotModel) -> Plan:
         FormatError: If it can't be read, or a line is not what it should be; the message names file, line
             and what is allowed.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
-    return parse_plan(data, str(path), model)
+    return parse_plan(read_within(path, MAX_BYTES), str(path), model)
 
 
 def parse_plan(data: bytes, name: str, model: RobotModel) -> Plan:
