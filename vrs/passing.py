@@ -21,6 +21,8 @@ from vrs.tooled import tooled
 if TYPE_CHECKING:
     from vrs.scheduler import Scheduler
 
+_SAME = 1e-15
+"""Times that differ by less, as a share of them or of a second, are one."""
 STOPS = "stops at the via: no overlap keeps the limits"
 
 
@@ -103,7 +105,7 @@ class _Passer:
 
     def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> _Way:
         """Overlap as far as the deviation and the limits allow."""
-        plan, command, pace = self.plan, self.command, self.command.pace
+        plan, command = self.plan, self.command
         quick = self.at_full_pace(first)
 
         def plans(limits: Limits) -> tuple[Plan, Plan, str]:
@@ -117,7 +119,7 @@ class _Passer:
         way = rounding.rounded(plans, command.deviation, model, plan.limits, command.profile)
         if way.first is not quick:
             return _Way(begin, self.at_pace(way.whole), way.note)
-        start = max(self.t - way.delta / pace, begin)
+        start = max(self._before(way.delta), begin)
         rest = rounding.later(way.whole, way.first.duration - way.delta)
         return _Way(start, self.at_pace(rest), way.note)
 
@@ -133,7 +135,7 @@ class _Passer:
         most = inf if self.now is None else (t - self.now) * pace
         found = continuous(quick, onward, most, (braking(quick, limits, known), ready), limits, jerk=self.jerky)
         if found.delta > 0.0:
-            return self._at(max(t - found.delta / pace, begin), found.plan, found.delta, notes)
+            return self._at(max(self._before(found.delta), begin), found.plan, found.delta, notes)
         again = None
         if self.before is not None and self.before.deviation < inf and (self.now is None or begin >= self.now):
             again = self.slower_first(eased(limits, 0.5), begin)
@@ -144,6 +146,15 @@ class _Passer:
                 lead = _until(slow, slow.duration - found.delta)
                 return self._at(begin, lead.then(found.plan), found.delta, joined(more, notes))
         return _Way(t, second, joined(notes, STOPS))
+
+    def _before(self, delta: float) -> float:
+        """The time from which an overlap [s] is left; a knot where one is as near as rounding leaves it."""
+        timeline, start = self.plan.timeline, self.t - delta / self.command.pace
+        index = timeline.index_at(start)
+        for knot in (timeline.start_of(max(index, 0)), timeline.start_of(min(index + 1, len(timeline)))):
+            if abs(knot - start) <= _SAME * max(1.0, abs(start)):
+                return knot
+        return start
 
     def _at(self, start: float, plan: Plan, delta: float, notes: str) -> _Way:
         passed = f"begins {delta / self.command.pace:.3g} s before command {self.passed_by} is over"

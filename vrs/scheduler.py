@@ -187,8 +187,11 @@ class Scheduler:
 
     def profile(self, command_id: int) -> Profile:
         """By which profile a command moves the arm."""
+        made = self.profiles.get(command_id)
+        if made is not None:
+            return made
         command = self.ledger.command(command_id)
-        return self.profiles.get(command_id, Profile.PARABOLIC) if command is None else command.profile
+        return Profile.PARABOLIC if command is None else command.profile
 
     def smooth(self, command_id: int) -> bool:
         """Whether a command moves the arm with bounded jerk throughout."""

@@ -363,3 +363,16 @@ class TestContinuous:
                 assert engine.execute(command).stands
             lawful(engine, range(1, 4) if profile is Profile.JERK_LIMITED else ())
         assert np.abs(along(engines[0]) - along(engines[1])).max() <= 1e-9
+
+
+def test_an_overlap_begins_at_a_knot_where_rounding_alone_keeps_them_apart():
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        engine = Engine(MODEL, q=HOME)
+        for _ in range(3):
+            target = JointTarget(HOME + rng.uniform(-0.5, 0.5, 6))
+            profile, pace = rng.choice(list(Profile)), float(rng.choice([1.0, 0.3]))
+            engine.execute(
+                MotionCommand(target, profile=profile, insertion=Insertion.APPEND, deviation=inf, pace=pace)
+            )
+        assert min(segment.duration for segment in engine.timeline.segments) > 1e-12

@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 
 from tests.vrs.plans import MODEL, PROFILES, A, B, C, D, check, plan, to
-from vrs import Engine, Insertion, Lateness, ManualClock, Profile, Retime, Status, SteerCommand, Stop
+from vrs import (
+    Engine,
+    Insertion,
+    JointTarget,
+    Lateness,
+    ManualClock,
+    Motion,
+    MotionCommand,
+    Profile,
+    Retime,
+    Status,
+    SteerCommand,
+    Stop,
+)
 
 
 def curve(engine: Engine, start: float, end: float) -> np.ndarray:
@@ -210,4 +223,28 @@ def test_a_stop_of_what_moved_before_another_stop_resumes_behind_it():
     assert [s.command_id for s in moves] == [1] * len(moves)
     assert np.abs(engine.joints(engine.timeline.end) - B).max() < 1e-9
     assert engine.timeline.end < 2 * end
+    check(engine)
+
+
+def test_what_an_undo_brakes_smoothly_a_stop_brakes_smoothly_though_the_undone_move_was_of_parabolas():
+    clock = ManualClock()
+    engine = Engine(MODEL, q=np.array([-1.542, 3.791, -0.624, 2.945, -1.55, 1.185]), clock=clock)
+    engine.execute(to(np.array([-1.548, -0.194, -2.55, 1.499, -0.167, 1.107]), 0.0))
+    clock.set(0.315)
+    engine.execute(SteerCommand(rates=np.array([-0.21, -0.85, -0.61, -2.39, -3.54, -1.84])))
+    clock.set(0.348)
+    line = np.array([-1.571, 3.335, -0.865, 2.59, -1.558, 1.006])
+    move = engine.execute(
+        MotionCommand(JointTarget(line), None, 0.515, speed=0.36, motion=Motion.LINE, insertion=Insertion.REPLACE)
+    )
+    assert "braked first" in move.reason
+    clock.set(0.454)
+    engine.execute(Retime(move.command_id, 0.551))
+    clock.set(0.692)
+    engine.undo()
+    clock.set(0.72)
+    engine.execute(Stop())
+    knots = [segment.start for segment in engine.timeline.segments if segment.start >= clock.now()]
+    before = engine.timeline.sample(np.nextafter(knots, 0.0), derivative=2)
+    assert np.abs(before - engine.timeline.sample(np.array(knots), derivative=2)).max() <= 1e-9
     check(engine)
