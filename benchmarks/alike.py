@@ -18,6 +18,7 @@ from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.plan import Plan, PlannedMotion
+from interfaces.runtime.session import SETTLE
 from interfaces.runtime.virtual import run_twins
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
@@ -101,19 +102,21 @@ async def live(seed: int) -> tuple[float, ...]:
             while waiting and clock.now() >= waiting[0][0]:
                 site.execute(waiting.pop(0)[1], now=clock.now())
             facts = robot.health()
-            asked = robot.host.reference(np.array([facts["measured_at"]])).q[0]
+            reference = robot.host.reference(np.array([facts["measured_at"]])).q[0]
             t_now = facts["measured_at"] + apart
             if not rows or t_now > rows[-1][0]:
-                rows.append((t_now, facts["q"], asked.tolist()))
+                rows.append((t_now, facts["q"], reference.tolist()))
             await asyncio.sleep(STEP)
-        t = np.array([row[0] for row in rows])
-        keep = t >= begin - 0.5
+        t, asked = np.array([row[0] for row in rows]), np.array([row[2] for row in rows])
+        # Means are over the same phases as in the laboratory, whose record ends so long after the last motion.
+        rests = t[np.flatnonzero((np.diff(asked, axis=0) != 0).any(axis=1))[-1] + 1]
+        keep = (t >= begin - 0.5) & (t <= rests + SETTLE)
         if site.halted or robot.faults:
             print(
                 f"live run {seed}: {site.halted}, {robot.faults} faults, {robot.health()['timer_late']:.3f} s late"
             )
-        real, reference = (np.array([row[i] for row in rows])[keep] for i in (1, 2))
-        return figures(t[keep], site.engine.timeline.sample(t[keep]), real, reference)
+        real = np.array([row[1] for row in rows])[keep]
+        return figures(t[keep], site.engine.timeline.sample(t[keep]), real, asked[keep])
 
 
 def main() -> None:
