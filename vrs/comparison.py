@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
+_STILL = 1e-6
+"""Values that change by no more are at rest [rad, or their unit]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Agreement:
@@ -102,7 +105,7 @@ def shifted(t: Array, values: Array, offset: float) -> Array:
     return values[np.clip(np.arange(len(t)) + whole, 0, len(t) - 1)]
 
 
-def best_lag(t: ArrayLike, q_leader: ArrayLike, q_follower: ArrayLike, longest: float = 10.0) -> float:
+def best_lag(t: ArrayLike, q_leader: ArrayLike, q_follower: ArrayLike, longest: float = 10.0) -> float | None:
     """Constant lag L that brings q_follower(t + L) nearest to q_leader(t), in the joints' squared error.
 
     Args:
@@ -112,18 +115,21 @@ def best_lag(t: ArrayLike, q_leader: ArrayLike, q_follower: ArrayLike, longest: 
         longest: Largest lag looked at, either way [s]; at most half of the record.
 
     Returns:
-        L [s], positive where the follower is late, refined below a step by a parabola.
+        L [s], positive where the follower is late, refined below a step by a parabola; None where either of
+        them stays in its place, which fits every lag.
 
     Raises:
         InvalidValueError: If the shapes differ or a value isn't finite.
     """
     a, b = _histories(q_leader, q_follower)
+    if min(float(np.ptp(q, axis=0).max()) for q in (a, b)) <= _STILL:
+        return None
     times = np.asarray(t, dtype=np.float64)
     step = float(times[-1] - times[0]) / (len(times) - 1)
     reach = min(round(longest / step), len(times) // 2)
     lags = np.arange(-reach, reach + 1)
     cost = np.array([_lag_cost(a, b, int(lag)) for lag in lags])
-    # A robot at rest fits every lag: of equal costs the smallest lag is meant.
+    # Of equal costs the smallest lag is meant.
     i = int(np.lexsort((np.abs(lags), cost))[0])
     offset = 0.0
     if 0 < i < len(lags) - 1:

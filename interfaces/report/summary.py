@@ -41,7 +41,7 @@ def summarize(
         A JSON value; `docs/summary.md` describes its fields. The same run gives the same value.
     """
     lag, D = best_lag(run.t, run.q_matched, run.q_real), float(run.D.mean())
-    aligned = shifted(run.t, run.q_matched, -lag)
+    aligned = run.q_matched if lag is None else shifted(run.t, run.q_matched, -lag)
     errors = {
         "timeline_time": agreement(run.model, run.q_matched, run.q_real),
         "lag_removed": agreement(run.model, aligned, run.q_real),
@@ -64,7 +64,7 @@ def summarize(
         "commands": _commands(run),
         "errors": {name: _errors(value) for name, value in errors.items()},
         "lag_timeline_s": lag,
-        "lag_user_s": lag - D,
+        "lag_user_s": None if lag is None else lag - D,
         "path": _path(run),
         "attribution_order": list(CAUSES),
         "attribution": [_attribution(item) for item in attributions],

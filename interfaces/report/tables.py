@@ -97,10 +97,12 @@ MEASURES = {
 def time_lines(summary: Json) -> list[str]:
     """Time difference, path error and what became of the commands, a sentence each."""
     path, commands, behind = summary["path"], summary["commands"], summary["behind"]
+    lag = summary["lag_timeline_s"]
+    control = "a robot that stands has no lag" if lag is None else f"its joints lag another {_seconds(lag)}"
     lines = [
         f"Network: the robot played {_seconds(behind['mean_s'])} behind the operator on average, at most "
         f"{_seconds(behind['max_s'])} (offset {summary['offset']}); it slowed down {behind['slowed']} times and "
-        f"waited {behind['waited']} times. Control: its joints lag another {_seconds(summary['lag_timeline_s'])}.",
+        f"waited {behind['waited']} times. Control: {control}.",
         f"Time difference along the tool path: mean {_seconds(path['time_difference_mean'])}, "
         f"sd {_seconds(path['time_difference_sd'])}, max {_seconds(path['time_difference_max'])}.",
         f"Tool path error: mean {_millimetres(path['path_error_mean'])}, "

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
+from interfaces.val2.errors import ValError, robot_halted
 from robots.onboard.lease import LeaseState
 
 if TYPE_CHECKING:
@@ -15,6 +17,8 @@ MEETING: Final = 10.0
 """How long a robot is waited for that doesn't follow a new lease yet [s]."""
 _AGAIN: Final = 0.25
 """Time between two requests [s]."""
+_LOOKS: Final = 0.1
+"""Time between two looks at how the robot is [s]."""
 
 
 class LeaseControl:
@@ -31,6 +35,7 @@ class LeaseControl:
         self._asked = 0.0
         self._granted: float | None = None
         """When the lease was first seen to be there [s]."""
+        self._resumed = self._resume_until = -math.inf
 
     def wanted(self, *, now: float) -> str | None:
         """Ask for the lease: empty if it's there, why not, or None while nothing is known yet.
@@ -70,8 +75,26 @@ class LeaseControl:
         """Give the lease back; the robot stops."""
         self._connection.release(wait=0.0)
 
-    def resume(self, *, now: float) -> None:  # noqa: ARG002 - the connection has its clock
-        """Let a robot go on that stopped by itself."""
-        state = self._connection.state
-        if state is not None and state.halted:
-            self._connection.resume(wait=0.0)
+    def resume(self, *, now: float) -> None:
+        """Let a robot go on that stopped by itself, as soon as it can within a while."""
+        self._resumed, self._resume_until = -math.inf, now + PATIENCE
+        self.trouble(now=now)
+
+    def trouble(self, *, now: float) -> ValError | None:
+        """What is wrong with the robot or the way to it."""
+        connection, state, lease = self._connection, self._connection.state, self._connection.lease
+        if not connection.is_connected:
+            return ValError("No connection", "to the robot's server; it's taken up again by itself")
+        if state is None or not state.halted:
+            self._resume_until = -math.inf
+            return None
+        commanded = lease is not None and lease.yours and lease.state is LeaseState.HELD
+        if commanded and self._resumed + _AGAIN <= now < self._resume_until:
+            self._resumed = now
+            connection.resume(wait=0.0)
+        return robot_halted(state.halted, commanded=commanded)
+
+    @property
+    def looks(self) -> float:
+        """How often it's to be asked for trouble [s]."""
+        return _LOOKS

@@ -63,3 +63,13 @@ class ValError(VrsError):
             step=self.step if self.step is not None else step,
             place=self.place if self.place is not None else place,
         )
+
+
+def robot_halted(why: str, *, commanded: bool = True) -> ValError:
+    """The error of a real robot that stopped by itself.
+
+    Args:
+        why: Why it did.
+        commanded: Whether whoever is told may let it go on.
+    """
+    return ValError("Robot halted", f"{why}; ENABLE POWER lets it go on" if commanded else why)

@@ -29,7 +29,7 @@ def real_function(x: Expressions, e: Apply) -> Real:
     Raises:
         ValError: If there's none of this name, or its arguments aren't what it takes.
     """
-    make = _REAL.get(e.function)
+    make = REALS.get(e.function)
     if make is not None:
         inner = make(x, e)
     elif e.function in arithmetic.FUNCTIONS:
@@ -130,12 +130,6 @@ def _component(i: int) -> Callable[[Expressions, Apply], Real]:
 def _distance(x: Expressions, e: Apply) -> Real:
     a, b = (x.transformation(p) for p in arguments(e, 2, 2) if p is not None)
     return lambda s: float(np.linalg.norm(a(s).X[:3, 3] - b(s).X[:3, 3]))
-
-
-def _hand(x: Expressions, e: Apply) -> Real:
-    arguments(e, 0, 0)
-    context = x.context
-    return lambda _: context.arm.here(now=context.now).hand
 
 
 def _inrange(x: Expressions, e: Apply) -> Real:
@@ -241,13 +235,14 @@ def _pos(x: Expressions, e: Apply) -> Real:
     return lambda s: float(text(s).find(part(s), max(0, whole(first(s)) - 1)) + 1)
 
 
-_REAL: Final[dict[str, Callable[[Expressions, Apply], Real]]] = {
+REALS: Final[dict[str, Callable[[Expressions, Apply], Real]]] = {
     "ASC": _asc, "BITS": _bits, "BMASK": _bmask, "DEFINED": _defined, "DISTANCE": _distance, "DX": _component(0),
-    "DY": _component(1), "DZ": _component(2), "HAND": _hand, "INRANGE": _inrange, "LAST": _last, "LEN": _len,
+    "DY": _component(1), "DZ": _component(2), "INRANGE": _inrange, "LAST": _last, "LEN": _len,
     "PARAMETER": _parameter,
     "POS": _pos, "RANDOM": _random, "SIG": _sig, "SPEED": _speed, "SWITCH": _switch, "TIMER": _timer, "VAL": _val,
     **dict.fromkeys((name for name, f in FUNCTIONS.items() if f.idle and f.gives == "real"), _idle),
 }  # fmt: skip
+"""What functions that give reals are made by, but for those of `arithmetic`."""
 
 
 # Strings.
@@ -339,6 +334,6 @@ _STRING: Final[dict[str, Callable[[Expressions, Apply], String]]] = {
 RESULTS: Final[dict[str, Kind]] = {
     **dict.fromkeys(_STRING, Kind.STRING),
     **dict.fromkeys(FRAMES, Kind.TRANSFORMATION),
-    **dict.fromkeys(("#PPOINT", "#HERE", "#DEST", "PPOINT"), Kind.POINT),
+    **dict.fromkeys(("#PPOINT", "#HERE", "#DEST"), Kind.POINT),
 }
 """What functions give that aren't reals."""

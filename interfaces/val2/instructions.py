@@ -8,7 +8,7 @@ destination. RIGHTY and its like let the next motion begin at rest.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 from interfaces.val2.context import ARM, SLICE, SPECIAL, Action, Context, Finish, Suspend, Waiting
 from interfaces.val2.errors import ValError
@@ -23,29 +23,27 @@ from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Instruct
 StepFunction: TypeAlias = Callable[[Slots], int]
 """Does a step and returns the next one's index, or SPECIAL."""
 Pause: TypeAlias = Generator[float, None, None]
-_CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "HAND", "RANDOM", "SPEED", "TOOL", "BASE"}
+_CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "RANDOM", "SPEED"}
 """Functions whose values change with time alone."""
 
 
-def begun(context: Context) -> Pause:
-    """Wait until what was asked is answered, and the last motion has begun.
+class _Look(Protocol):
+    """A look at the arm: `ready`, the last motion has begun, or `settled`, it stands."""
+
+    def __call__(self, *, now: float) -> bool: ...
+
+
+def until(context: Context, look: _Look) -> Pause:
+    """Wait until what was asked is answered, and the arm is as it's to be.
+
+    Args:
+        context: Of the arm.
+        look: `ready` or `settled` of the arm.
 
     Raises:
-        ValError: If it was refused.
+        ValError: If what was asked was refused.
     """
-    arm = context.arm
-    while not arm.answered(now=context.now) or not arm.ready(now=context.now):
-        yield ARM
-
-
-def settled(context: Context) -> Pause:
-    """Wait until what was asked is answered, and the arm stands.
-
-    Raises:
-        ValError: If it was refused.
-    """
-    arm = context.arm
-    while not arm.answered(now=context.now) or not arm.settled(now=context.now):
+    while not context.arm.answered(now=context.now) or not look(now=context.now):
         yield ARM
 
 
@@ -57,22 +55,22 @@ def _special(context: Context, action: Action) -> int:
 def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None, int]:
     """Ask for a motion, and wait until it has begun; what a REACTI dropped before it began is asked for again."""
     while True:
-        yield from settled(context) if context.stop_first else begun(context)
+        yield from until(context, context.arm.settled if context.stop_first else context.arm.ready)
         context.powered()
         ask()
         context.stop_first = False
         dropped = context.dropped
-        yield from begun(context)
+        yield from until(context, context.arm.ready)
         if context.dropped == dropped:
             return following
 
 
 def _standing(context: Context, ask: Ask | None, following: Any) -> Generator[float, None, Any]:
     """Wait for the arm to stand, ask, and wait again."""
-    yield from settled(context)
+    yield from until(context, context.arm.settled)
     if ask is not None:
         ask()
-        yield from settled(context)
+        yield from until(context, context.arm.settled)
     return following
 
 

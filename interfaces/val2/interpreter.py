@@ -22,7 +22,7 @@ from interfaces.val2.context import (
 )  # fmt: skip
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Ended, Failed, Paused
-from interfaces.val2.instructions import settled
+from interfaces.val2.instructions import until
 from interfaces.val2.memory import Slot, where
 from interfaces.val2.reactions import Reaction
 from vrs.errors import VrsError
@@ -292,5 +292,5 @@ class Task:
 
 
 def _resting(context: Context, word: str) -> Generator[float, None, Finished]:
-    yield from settled(context)
+    yield from until(context, context.arm.settled)
     return Finished(word)

@@ -106,7 +106,6 @@ def _standing(pose: Callable[[Expressions], Transformation]) -> Callable[[Expres
 
 
 FRAMES: Final[dict[str, Callable[[Expressions, Apply], Frame]]] = {
-    "BASE": _standing(lambda x: x.context.arm.base()),
     "DEST": _standing(lambda x: x.context.arm.destination(now=x.context.now).tool),
     "FRAME": _frame,
     "HERE": _standing(lambda x: x.context.arm.here(now=x.context.now).tool),
@@ -116,7 +115,6 @@ FRAMES: Final[dict[str, Callable[[Expressions, Apply], Frame]]] = {
     "RY": _turn(about_y),
     "RZ": _turn(about_z),
     "SHIFT": _shift,
-    "TOOL": _standing(lambda x: x.context.arm.tool()),
     "TRANS": _trans,
 }
 

@@ -12,7 +12,7 @@ from interfaces.val2.errors import Place, ValError
 from interfaces.val2.printer import print_step
 from interfaces.val2.rest import HIGHEST_LABEL, Rest
 from interfaces.val2.slots import nearest
-from interfaces.val2.syntax import Blank, Expression, Instruction, Program, Statement, Step, Variable
+from interfaces.val2.syntax import Blank, Expression, Program, Step, Variable
 
 LONGEST_LINE: Final = 1000
 MOST_LINES: Final = 100_000
@@ -250,8 +250,3 @@ def _parameters(code: str, begin: int, line: int) -> tuple[tuple[Variable, ...],
         parameters.append(variable)
         position = found.end() + 1
     return tuple(parameters), closing + 1
-
-
-def is_motion(statement: Statement) -> bool:
-    """Whether a statement is a motion."""
-    return isinstance(statement, Instruction) and forms.INSTRUCTIONS[statement.keyword].group == "motion"

@@ -78,11 +78,14 @@ class Player:
         """When something is due [s]; infinity where nothing will ever be."""
         return math.inf if self.done else self._controller.next_deadline()
 
-    def give_up(self, error: ValError, now: float) -> None:
-        """End it for a reason of its surroundings."""
+    def give_up(self, error: ValError, now: float) -> ValError:
+        """End it for a reason of its surroundings; the error, with the step at which the program is."""
+        status = self._controller.status()
+        error = error.at(program=status.program, step=status.step)
         self.errors.append(error)
         self._controller.abort(now=now)
         self.done = True
+        return error
 
     def _take(self, event: Event, now: float) -> None:
         match event:

@@ -75,8 +75,7 @@ def rehearse(
         if len(player.errors) >= MOST:
             break
         if deadline == math.inf or now >= limit or computed >= COMPUTING:
-            given_up = stuck() if deadline == math.inf else endless(now)
-            player.give_up(given_up, now)
+            given_up = player.give_up(stuck() if deadline == math.inf else endless(now), now)
             break
         # The steps of one call take little more than this; longer pauses are waits.
         computed += deadline - now if deadline - now <= 4 * TURN * STATEMENT else 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from interfaces.report.html import render, write_report
 from interfaces.report.plots import plots
 from interfaces.report.scene import revolute_chain, scene
 from interfaces.report.summary import summarize
+from interfaces.report.tables import time_lines
 from interfaces.runtime.run import Event, Packet, TwinRun
 from interfaces.teleop import Correction
 from robots import puma560
@@ -130,6 +132,19 @@ def test_the_summary_takes_the_clock_offset_out_and_says_what_it_was() -> None:
         "count": 3, "lost": 1, "delay_mean_s": 0.4, "delay_p95_s": 0.4, "delay_max_s": 0.4
     }  # fmt: skip
     assert value["corrections"][0]["error_deg"] == pytest.approx([np.degrees(0.1)] * 6)
+
+
+def test_robots_that_stand_have_no_lag() -> None:
+    run = make_run()
+    rest = np.broadcast_to(curve(np.zeros(1)), run.q_real.shape)
+    hum = np.random.default_rng(4).uniform(0.0, 1e-7, rest.shape)
+    value = summarize(replace(run, q_virtual=rest, q_shown=rest, q_matched=rest, q_real=rest + hum))
+    assert value["lag_timeline_s"] is None
+    assert value["lag_user_s"] is None
+    assert value["errors"]["lag_removed"] == value["errors"]["timeline_time"]
+    assert "Control: a robot that stands has no lag." in time_lines(value)[0]
+    assert "Control: its joints lag another 0.000 s." in time_lines(summarize(run))[0]
+    assert "control: the joints' lag" not in render(run, value)
 
 
 def test_plots_cover_the_offset_errors_and_every_joint() -> None:

@@ -88,8 +88,20 @@ def test_best_lag_is_found_below_a_step(lag):
     assert best_lag(t, q(t), q(t - lag)) == pytest.approx(lag, abs=5e-4)
 
 
-def test_best_lag_of_robots_at_rest_is_zero():
-    assert best_lag(t, np.ones((len(t), 2)), np.ones((len(t), 2))) == 0
+@pytest.mark.parametrize("standing", ["leader", "follower", "both"])
+def test_robots_at_rest_have_no_lag(standing):
+    moving = np.stack((np.sin(0.7 * t), np.cos(0.3 * t)), axis=1)
+    # Noise as that of a simulated servo, which makes one lag or another the best.
+    rest = 1.0 + np.random.default_rng(5).uniform(0, 1e-7, (len(t), 2))
+    leader, follower = (rest if standing in (who, "both") else moving for who in ("leader", "follower"))
+    assert best_lag(t, leader, follower) is None
+
+
+def test_one_joint_that_moves_a_little_is_enough_for_a_lag():
+    def q(t):
+        return np.stack((1.0 + 0 * t, 1e-4 * np.sin(0.7 * t)), axis=1)
+
+    assert best_lag(t, q(t), q(t - 0.3)) == pytest.approx(0.3, abs=5e-4)
 
 
 def test_shifting_by_whole_steps_moves_rows():

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, played, tool
@@ -112,18 +113,24 @@ def drag(seed: int, length: float) -> Seen:
     return Seen(
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
-        best_lag(t, pointer, virtual, 1.0),
+        _lag(t, pointer, virtual, 1.0),
         max(begun, default=np.inf),
         float(max(used)),
         len(rejected),
         len(offsets),
         float(aside.max()),
-        best_lag(t, pointer, real[rows], 2.0),
+        _lag(t, pointer, real[rows], 2.0),
         np.asarray(t - start),
         pointer,
         virtual,
         real[rows],
     )
+
+
+def _lag(t: ArrayLike, hand: ArrayLike, tool: ArrayLike, longest: float) -> float:
+    """Best lag of a tool behind the hand [s]; without end where the tool never moved."""
+    lag = best_lag(t, hand, tool, longest)
+    return np.inf if lag is None else lag
 
 
 def work(study: Study, case: str) -> Seen | None:

@@ -144,17 +144,6 @@ class Desk:
             raise ValError("Invalid argument", f"{text}: a number is wanted")
         return value
 
-    def transformation(self, text: str, *, now: float) -> Transformation:
-        """A transformation of the line.
-
-        Raises:
-            ValError: If it's something else.
-        """
-        value = self.value(text, now=now)
-        if not isinstance(value, Transformation):
-            raise ValError("Invalid argument", f"{text}: a transformation is wanted")
-        return value
-
     def variable(self, text: str, *, now: float) -> Variable:
         """A variable of the line, its indices worked out.
 

@@ -11,6 +11,7 @@ from interfaces.val2.memory import MOST_VALUES
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.desk import Desk, as_location
 from interfaces.val2.monitor.text import is_pattern, nothing, pieces
+from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
 from interfaces.val2.syntax import Program
 from interfaces.val2.values import Location, Value
@@ -35,10 +36,10 @@ def listl(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - comma
 
 def listr(desk: Desk, rest: str, *, now: float) -> None:
     """LISTR: reals, or an expression."""
-    if _computed(rest):
+    known = {name: value for name, value in desk.controller.memory.listing("real") if isinstance(value, float)}
+    if _computed(rest) or _product(rest, known):
         desk.say(layout.number(desk.number(rest, now=now)))
         return
-    known = {name: value for name, value in desk.controller.memory.listing("real") if isinstance(value, float)}
     desk.say_all(layout.reals(chosen(known, rest, "value")), "No reals")
 
 
@@ -57,6 +58,17 @@ def lists(desk: Desk, rest: str, *, now: float) -> None:
 def _computed(rest: str) -> bool:
     """Whether there's something to compute, not names alone."""
     return not all(is_pattern(piece) for piece in pieces(rest))
+
+
+def _product(rest: str, known: Mapping[str, float]) -> bool:
+    """Whether a `*` multiplies: no name is meant by it, and it's between two operands."""
+    if "*" not in rest or any(matcher(piece).fullmatch(name) for piece in pieces(rest) for name in known):
+        return False
+    try:
+        parse_expression(rest)
+    except ValError:
+        return False
+    return True
 
 
 def locations(desk: Desk) -> dict[str, Location]:

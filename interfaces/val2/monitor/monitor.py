@@ -56,6 +56,7 @@ class Monitor:
         self._greeting = False
         self._ended = False
         self._due = math.inf
+        self._trouble, self._looked = "", -math.inf
         self.done = False
         """Whether it's over: QUIT, or the end of the input."""
 
@@ -284,6 +285,7 @@ class Monitor:
         self._board.advance(now=now)
         if self._greeting or now >= self._due:
             self._settle_control(now)
+        self._look(now)
         if isinstance(self._dialogue, Watch):
             self._dialogue.advance(now=now)
         self._step_on(now)
@@ -312,6 +314,21 @@ class Monitor:
             self._greeting = False
             if answer:
                 self.desk.say(f"*No control* {answer}: looking only", style=Style.NOTE)
+
+    def _look(self, now: float) -> None:
+        """Say when the robot has stopped by itself, or can't be reached; and when that's over."""
+        self._looked = now
+        if self._greeting:
+            return
+        trouble = self._board.trouble(now=now)
+        text = "" if trouble is None else str(trouble)
+        if text == self._trouble:
+            return
+        self._trouble = text
+        if text:
+            self.desk.say(text, style=Style.ERROR)
+        else:
+            self.desk.say("The robot follows again", style=Style.NOTE)
 
     def _step_on(self, now: float) -> None:
         """The next of the steps that NEXT is to do."""
@@ -343,4 +360,4 @@ class Monitor:
     def next_deadline(self) -> float:
         """When to call `advance` next [s]; infinity for not before a line comes."""
         watched = self._dialogue.due if isinstance(self._dialogue, Watch) else math.inf
-        return min(self._board.next_deadline(), self._due, watched)
+        return min(self._board.next_deadline(), self._due, watched, self._looked + self._board.looks)

@@ -6,6 +6,7 @@ import math
 from typing import Protocol
 
 from interfaces.val2.controller import Controller
+from interfaces.val2.errors import ValError
 from interfaces.val2.events import Event
 
 
@@ -21,6 +22,13 @@ class Control(Protocol):
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself."""
 
+    def trouble(self, *, now: float) -> ValError | None:
+        """What is wrong with the robot or the way to it; None where nothing is."""
+
+    @property
+    def looks(self) -> float:
+        """How often it's to be asked for trouble [s]; infinity for never."""
+
 
 class Free:
     """Control over what nobody else can reach."""
@@ -34,6 +42,15 @@ class Free:
 
     def resume(self, *, now: float) -> None:
         """It doesn't stop by itself."""
+
+    def trouble(self, *, now: float) -> ValError | None:  # noqa: ARG002 - there's never any
+        """Nothing."""
+        return None
+
+    @property
+    def looks(self) -> float:
+        """Never."""
+        return math.inf
 
 
 class Terminal(Protocol):
@@ -69,6 +86,15 @@ class Switchboard:
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself."""
         self._control.resume(now=now)
+
+    def trouble(self, *, now: float) -> ValError | None:
+        """What is wrong with the robot or the way to it; None where nothing is."""
+        return self._control.trouble(now=now)
+
+    @property
+    def looks(self) -> float:
+        """How often it's to be asked for trouble [s]."""
+        return self._control.looks
 
     def leave(self, terminal: Terminal, *, now: float) -> None:
         """A terminal is gone: what it ran is stopped."""

@@ -110,6 +110,7 @@ class Arm(Requests):
                 command = self._stretched(command, near, manner.duration)
             number = self._send(command, straight, now)
             self._recent.append((number, command))
+            self._bound = number
             self._hand.ask(number, hand)
             self._hand.begin(self._begins, now)
         self._made, self._made_words, self._delay, self._at = manner, words, None, None
@@ -149,18 +150,7 @@ class Arm(Requests):
     def brake(self, *, now: float) -> None:
         """BRAKE, REACTI, ABORT; what was asked for a motion that hasn't begun is for the next one again."""
         self._look(now)
-        motions = [(command, self._begins(number)) for number, command in self._recent]
-        ends = [math.inf if begins is None else begins for _, begins in motions[1:]] + [self.robot.timeline.end]
-        self._interrupted = tuple(
-            command
-            for (command, begins), end in zip(motions, ends, strict=False)
-            if begins is not None and begins <= now < end
-        )
-        if motions and (motions[-1][1] is None or motions[-1][1] > now):
-            self._manners.next, self._words = self._made, self._made_words
-            self._hand.give_back()
-        self._recent.clear()
-        self._delay = self._at = None
+        self._give_up(now, self.robot.timeline.end)
         if now < self.robot.timeline.end or self._open:
             self._send(Stop(), False, now)
 
@@ -172,6 +162,7 @@ class Arm(Requests):
             again = replace(command, execute_at=None, pace=bounded(self._pace.pace))
             number = self._send(again, command.motion is Motion.LINE, now)
             self._recent.append((number, again))
+            self._bound = number
         return bool(interrupted)
 
     # The timeline.
@@ -179,7 +170,7 @@ class Arm(Requests):
     def undo(self, *, now: float) -> str:
         """UNDO."""
         self._look(now)
-        self._interrupted, self._delay = (), None
+        self._interrupted, self._delay, self._bound = (), None, None
         self._hand.forget()
         number = self.robot.ask(None, now=now)
         fate = self.robot.fate(number, now=now)

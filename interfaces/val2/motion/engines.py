@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -73,6 +74,20 @@ class EngineRobot:
             return fate
         return Fate(self.engine.receipt(receipt.command_id))
 
+    def trouble(self) -> str:
+        """None: there's no other twin."""
+        return ""
+
+    @property
+    def lost(self) -> bool:
+        """It's here."""
+        return False
+
+    @property
+    def looks(self) -> float:
+        """It's never in trouble."""
+        return math.inf
+
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
         """Receipts of what isn't over."""
         newest = self.engine.newest
@@ -105,6 +120,10 @@ class SiteRobot(EngineRobot):
         if self._told is not None and answer.status is not Status.REJECTED:
             self._told(now, command, answer)
         return answer
+
+    def trouble(self) -> str:
+        """Why the real robot stopped by itself."""
+        return self._site.halted
 
     def real(self, *, now: float) -> Array | None:  # noqa: ARG002 - the newest report counts
         """Joints that the newest report gives."""

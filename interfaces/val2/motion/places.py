@@ -26,11 +26,18 @@ _MODELS: Final = {"FLIP": "NOFLIP", "NOFLIP": "FLIP"}
 
 _OUTSIDE: Final = re.compile(r"joint (\d) would be at \S+ deg, (\S+ deg) outside its limits \[[^]]*\] deg")
 """What the model says of joint angles, which have other zeros."""
+_METRES: Final = re.compile(r"(?<![\w.])(\d+(?:\.\d*)?(?:e[+-]?\d+)?) m\b")
 _WRIST: Final = re.compile(r"\b(NO)?FLIP\b")
+
+
+def in_millimetres(text: str) -> str:
+    """A text of the planner, its lengths in VAL's unit."""
+    return _METRES.sub(lambda found: f"{1000.0 * float(found[1]):.6g} mm", text)
 
 
 def location_error(detail: str) -> ValError:
     """A location that the arm can't reach; the model's words of a configuration become VAL's."""
+    detail = in_millimetres(detail)
     detail = _OUTSIDE.sub(r"Jt \1 would be \2 outside its limits", detail)
     return ValError("Location out of range", _WRIST.sub(lambda found: _MODELS[found[0]], detail))
 

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 
 from interfaces.teleop.operator import NOT_FOLLOWING
-from interfaces.val2.errors import ValError
+from interfaces.val2.errors import ValError, robot_halted
 from interfaces.val2.motion.altering import Alterations
 from interfaces.val2.motion.hand import Gripped, Hand
 from interfaces.val2.motion.pacing import MonitorSpeed
-from interfaces.val2.motion.places import Frames, location_error
+from interfaces.val2.motion.places import Frames, in_millimetres, location_error
 from interfaces.val2.motion.robot import Fate, Robot
 from interfaces.val2.motion.speeds import Manner, Manners
 from interfaces.val2.ports import Where
@@ -31,6 +31,8 @@ _NULL_PATIENCE: Final = 5.0
 _FINE: Final = math.radians(0.2)
 """100 % of FINE: errors of joints that count as none [rad]."""
 _COARSE: Final = math.radians(2.0)
+_ELSEWHERE: Final = 1e-5
+"""Joints of an end that differ by more from the destination [rad]."""
 _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
 
@@ -70,6 +72,8 @@ class Progress:
         """What has no answer yet, and whether it's a straight line."""
         self._recent: deque[tuple[int, MotionCommand]] = deque(maxlen=_RECENT)
         self._interrupted: tuple[MotionCommand, ...] = ()
+        self._bound: int | None = None
+        """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
         self._made = Manner()
         """How the newest motion was asked for."""
         self._made_words: tuple[str, ...] = ()
@@ -144,7 +148,53 @@ class Progress:
             self._open.pop(0)
             if fate.reason:
                 raise _refusal(fate, straight)
+        self._follow_up(now)
         return not self._pace.waits
+
+    def _follow_up(self, now: float) -> None:
+        """See that nothing else has stopped the arm.
+
+        Raises:
+            ValError: If the real arm stopped on the way, or the way ends somewhere else. RETRY is for the motion.
+        """
+        if self._bound is None or (fate := self.robot.fate(self._bound, now=now)) is None:
+            return
+        receipt, why = fate.receipt, self.robot.trouble()
+        if receipt is None or receipt.q is None or receipt.undone:
+            self._bound = None
+            return
+        ends = math.inf if receipt.end is None else receipt.end
+        if why and now < ends:
+            self._give_up(now, ends)
+            raise ValError("Motion interrupted", f"the real arm has stopped: {why}")
+        if now >= self._end():
+            if self.robot.lost:
+                self._give_up(now, math.inf)
+                raise ValError("Motion interrupted", "there's no connection: where the arm is isn't known")
+            if np.abs(self.robot.timeline.final() - receipt.q).max() > _ELSEWHERE:
+                self._give_up(now, math.inf)
+                raise ValError("Motion interrupted", "the arm was stopped before its destination")
+            self._bound = None
+
+    def _give_up(self, now: float, end: float) -> None:
+        """Ask for nothing more; what isn't over is for RETRY, what was for a motion to come is for the next one.
+
+        Args:
+            now: Session time [s].
+            end: When the newest motion ends, or would [s].
+        """
+        motions = [(command, self._begins(number)) for number, command in self._recent]
+        ends = [math.inf if begins is None else begins for _, begins in motions[1:]] + [end]
+        self._interrupted = tuple(
+            command
+            for (command, begins), over in zip(motions, ends, strict=False)
+            if begins is not None and begins <= now < over
+        )
+        if motions and (motions[-1][1] is None or motions[-1][1] > now):
+            self._manners.next, self._words = self._made, self._made_words
+            self._hand.give_back()
+        self._recent.clear()
+        self._delay = self._at = self._bound = None
 
     def ready(self, *, now: float) -> bool:
         """Whether the next motion may be asked for: the last has begun, and all has been answered."""
@@ -175,6 +225,8 @@ class Progress:
         """When any of these may change by itself [s]; infinity for never."""
         now, (delayed, ends) = self._now, self._delay_span()
         times = [self.robot.timeline.end, self._hand.end, self._pace.next_deadline(), delayed, ends]
+        if self._bound is not None:
+            times.append(now + self.robot.looks)
         if self._recent:
             begins = self._begins(self._recent[-1][0])
             times.append(now + _POLL if begins is None else begins)
@@ -204,7 +256,9 @@ def _refusal(fate: Fate, straight: bool) -> ValError:
         return ValError("Command refused", fate.reason)
     if fate.reason.startswith(NOT_FOLLOWING):
         why = fate.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
-        return ValError("Robot halted", f"{why}; ENABLE POWER lets it go on")
+        return robot_halted(why)
     if straight:
-        return ValError("Straight line not possible", fate.reason)
+        return ValError(
+            "Straight line not possible", in_millimetres(fate.reason.removeprefix("no straight line: "))
+        )
     return location_error(fate.reason)

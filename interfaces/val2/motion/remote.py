@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from interfaces.designer import Issued
 from interfaces.val2.motion.engines import standing
 from interfaces.val2.motion.robot import Fate
 from vrs.commands import Command, MotionCommand
@@ -16,9 +17,12 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from interfaces.stream.connect import Connection
+    from interfaces.stream.control import State
 
 _PATIENCE: Final = 2.0
-"""How long an answer waits for the edit that it speaks of to come, too [s]."""
+"""How long an answer waits for the edit that it speaks of to come, too [s]: a motion's from its end on."""
+_LOOKS: Final = 0.05
+"""How often it's looked whether the real robot has stopped by itself [s]."""
 _FETCHED: Final = 10.0
 """How long the timeline may take to come at first [s]."""
 _SAME: Final = 1e-6
@@ -41,6 +45,10 @@ class RemoteRobot:
         self._connection, self._model = connection, model
         self._viewer = connection.viewer(rate=10.0)
         self._asked: dict[int, tuple[Command | None, Timeline]] = {}
+        self._open: int | None = None
+        """The newest that has no answer yet."""
+        self._outdated: State | None = None
+        """What was heard of the real robot when that was answered: an answer is newer."""
         if not self._viewer.wait(lambda viewer: viewer.timeline is not None, _FETCHED):
             self._viewer.close()
             raise InvalidValueError("timeline", None, f"sent by the server within {_FETCHED:g} s")
@@ -69,6 +77,7 @@ class RemoteRobot:
         designer = self._connection.designer
         number = (designer.undo() if command is None else designer.issue(command)).number
         self._asked[number] = command, before
+        self._open = number
         return number
 
     def fate(self, number: int, *, now: float) -> Fate | None:
@@ -79,23 +88,54 @@ class RemoteRobot:
             return Fate()
         if issued.answered_at is None:
             return None
+        if number == self._open:
+            self._open, self._outdated = None, self._connection.state
         fate = Fate(issued.receipt, issued.refusal)
         if fate.reason or number not in self._asked:
             return fate
         command, before = self._asked[number]
-        if now - issued.answered_at < _PATIENCE and not self._shows(command, issued.receipt, before):
-            return None
+        if not (self._shows(command, issued.receipt, before) or self.trouble()):
+            if now < self._patience(issued) + _PATIENCE:
+                return None
+            if isinstance(command, MotionCommand) and not self._leads_to(issued.receipt):
+                fate = Fate(refusal="the server took it, but doesn't show what the arm does")
         del self._asked[number]
         return fate
+
+    @staticmethod
+    def _patience(issued: Issued) -> float:
+        """From when on an answer waits no longer than that for its edit [s]."""
+        end = None if issued.receipt is None else issued.receipt.end
+        assert issued.answered_at is not None
+        return issued.answered_at if end is None else max(issued.answered_at, end)
 
     def _shows(self, command: Command | None, receipt: Receipt | None, before: Timeline) -> bool:
         timeline = self.timeline
         if timeline is not before:
-            if not isinstance(command, MotionCommand) or receipt is None or receipt.q is None:
+            if not isinstance(command, MotionCommand) or receipt is None or not receipt.stands:
                 return True
-            there = bool(np.abs(timeline.final() - receipt.q).max() <= _SAME)
-            return there and (receipt.end is None or timeline.end >= receipt.end - _SAME)
+            return self._leads_to(receipt) and (receipt.end is None or timeline.end >= receipt.end - _SAME)
         return receipt is None or receipt.is_still
+
+    def _leads_to(self, receipt: Receipt | None) -> bool:
+        """Whether the timeline ends where a receipt says."""
+        q = None if receipt is None else receipt.q
+        return q is None or bool(np.abs(self.timeline.final() - q).max() <= _SAME)
+
+    def trouble(self) -> str:
+        """Why the real robot stopped by itself, as far as it's known."""
+        state = self._connection.state
+        return "" if state is None or state is self._outdated else state.halted
+
+    @property
+    def lost(self) -> bool:
+        """Whether there's no connection to its server."""
+        return not self._connection.is_connected
+
+    @property
+    def looks(self) -> float:
+        """Nobody else asks."""
+        return _LOOKS
 
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
         """Receipts of this client's commands that aren't over."""

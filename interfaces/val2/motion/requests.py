@@ -100,6 +100,7 @@ class Requests(Progress):
             raise ValError("Robot is moving", "the path is altered between motions: BREAK comes first")
         command = self._alterations.steering(values, self._frames)
         self._recent.clear()
+        self._bound = None
         if self._dry is None:
             self._send(command, False, now)
 

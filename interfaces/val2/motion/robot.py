@@ -49,6 +49,17 @@ class Robot(Protocol):
     def fate(self, number: int, *, now: float) -> Fate | None:
         """What became of it by now; None while nothing was heard."""
 
+    def trouble(self) -> str:
+        """Why the other twin doesn't follow, having stopped by itself; empty while it does."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether nothing can be heard of it now."""
+
+    @property
+    def looks(self) -> float:
+        """How often it's to be asked for trouble while it moves [s]; infinity where its driver does so anyway."""
+
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
         """Receipts of what isn't over, in the order of their beginning."""
 

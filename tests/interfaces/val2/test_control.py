@@ -83,3 +83,44 @@ def test_a_lost_connection_is_said():
     server = Server(MINE)
     server.is_connected = False
     assert "no connection" in LeaseControl(server).wanted(now=0.0)
+
+
+def test_a_robot_that_stopped_by_itself_is_told_of_and_resumed_until_it_follows():
+    server = Server(MINE, halted="nothing came")
+    control = LeaseControl(server)
+    assert str(control.trouble(now=0.0)) == "*Robot halted* nothing came; ENABLE POWER lets it go on"
+    assert server.resumed == 0
+    control.resume(now=1.0)
+    assert server.resumed == 1
+    control.trouble(now=1.1)
+    assert server.resumed == 1
+    control.trouble(now=1.3)
+    assert server.resumed == 2
+    server.state = SimpleNamespace(connected=True, halted="")
+    assert control.trouble(now=1.6) is None
+    server.state = SimpleNamespace(connected=True, halted="again")
+    assert control.trouble(now=2.0) is not None
+    assert server.resumed == 2
+
+
+def test_resuming_is_given_up_after_a_while():
+    server = Server(MINE, halted="nothing came")
+    control = LeaseControl(server)
+    control.resume(now=0.0)
+    for k in range(1, 200):
+        control.trouble(now=0.1 * k)
+    assert 5 <= server.resumed <= PATIENCE / 0.25 + 1
+
+
+def test_who_only_looks_is_told_no_way_to_go_on_and_asks_for_none():
+    server = Server(THEIRS, halted="nothing came")
+    control = LeaseControl(server)
+    control.resume(now=0.0)
+    assert str(control.trouble(now=0.1)) == "*Robot halted* nothing came"
+    assert server.resumed == 0
+
+
+def test_a_server_that_is_gone_is_told_of():
+    server = Server(MINE)
+    server.is_connected = False
+    assert LeaseControl(server).trouble(now=0.0).what == "No connection"

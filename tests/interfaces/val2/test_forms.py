@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.val2 import forms
+from interfaces.val2 import arithmetic, forms, functions
 from interfaces.val2.errors import ValError
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.syntax import Ignored
@@ -40,6 +40,11 @@ def test_no_word_is_two_things():
     assert not forms.OPERATORS.keys() & forms.FUNCTIONS.keys()
     assert forms.OPERATORS.keys() - {"NOT", "COM"} <= forms.LEVELS.keys()
     assert set(forms.ALIASES.values()) <= forms.FUNCTIONS.keys()
+
+
+def test_functions_that_are_listed_are_those_that_are_made():
+    made = {*arithmetic.FUNCTIONS, *functions.REALS, *functions.RESULTS}
+    assert made == forms.FUNCTIONS.keys()
 
 
 @pytest.mark.parametrize("row", forms.INSTRUCTIONS.values(), ids=lambda row: row.keyword)

@@ -466,6 +466,9 @@ def test_delete_and_zero_ask_and_only_y_does_it(sitting):
 def test_lists_take_names_patterns_and_expressions(sitting):
     sitting.type("DO pa = 1", "DO pb = 2", "DO q = 0.1", "DO a[1,2] = 5", 'DO $x = "hi"')
     assert sitting.type("LISTR p*") == "pa = 1\npb = 2\n"
+    assert sitting.type("LISTR pb*pb") == "4\n"
+    assert sitting.type("LISTR pi*pb").startswith("6.28318")
+    assert sitting.type("LISTR z*") == "*Undefined value* z*\n"
     assert sitting.type("LISTR a") == "a[1,2] = 5\n"
     assert sitting.type("LISTR a[1,2], q") == "a[1,2] = 5\nq      = 0.1\n"
     assert sitting.type("LISTR pa + pb") == "3\n"
@@ -650,10 +653,16 @@ def test_no_line_ends_the_monitor(sitting):
 
 
 class Held:
-    """Control that somebody else has, or that takes time to come."""
+    """Control that somebody else has, or that takes time to come; of a robot that may be in trouble."""
+
+    looks = 0.1
 
     def __init__(self, *answers):
         self.answers, self.released = list(answers), 0
+        self.wrong = None
+
+    def trouble(self, *, now):
+        return self.wrong
 
     def wanted(self, *, now):
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
@@ -684,6 +693,36 @@ def test_a_command_waits_until_control_has_come(tmp_path):
     assert sitting.monitor.prompt == ""
     sitting.until(lambda: sitting.monitor.prompt == ".")
     assert sitting.type("LISTR x") == "x = 1\n"
+
+
+def test_a_robot_in_trouble_is_told_of_at_once_and_once(tmp_path):
+    control = Held("")
+    sitting = Sitting(tmp_path, control=control)
+    second = sitting.terminal()
+    sitting.pass_time(1.0)
+    control.wrong = ValError("Robot halted", "nothing came")
+    assert sitting.monitor.next_deadline() <= sitting.now + 0.1
+    sitting.pass_time(0.15)
+    assert sitting.shown == "*Robot halted* nothing came\n"
+    assert sitting.monitor.prompt == "."
+    second.advance(now=sitting.now)
+    assert "".join(piece.text for piece in second.output()) == "*Robot halted* nothing came\n"
+    sitting.shown = ""
+    sitting.pass_time(5.0)
+    assert sitting.shown == ""
+    control.wrong = None
+    sitting.pass_time(0.15)
+    assert sitting.shown == "The robot follows again\n"
+
+
+def test_trouble_before_control_has_come_is_no_news(tmp_path):
+    control = Held(None, None, None, "")
+    control.wrong = ValError("Robot halted", "it hasn't been met yet")
+    sitting = Sitting(tmp_path, control=control)
+    sitting.pass_time(0.03)
+    control.wrong = None
+    sitting.pass_time(1.0)
+    assert sitting.shown == ""
 
 
 def test_a_second_terminal_looks_until_the_first_has_left(sitting):

@@ -218,6 +218,30 @@ def test_monitor_speed_changed_in_mid_motion_keeps_the_path(monitor, change):
     assert end_of - start_of > 1.05 * (end - start)
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_a_motion_that_is_asked_for_late_while_the_pace_changes_has_its_corner_rounded_less_and_no_other(late):
+    whole, start, end = square()
+    bench = Bench()
+    bench.move(SQUARE[0])
+    start_of = bench.settle()
+    for k in (1, 2, 3, 0):
+        bench.arm.move(SQUARE[k], straight=True, now=bench.now)
+        bench.until(bench.arm.ready)
+        if k == 2:
+            # The line to the third corner brakes 0.27 s after it begins.
+            bench.sleep(0.17 if late else 0.0)
+            bench.arm.set_monitor_speed(10.0, now=bench.now)
+            bench.sleep(0.0 if late else 0.4)
+    end_of = bench.settle()
+    assert slowest(bench, start_of, end_of) > 0.3 * 50.0 * 0.9
+    usual, here = corner_distance(whole, start, end), corner_distance(bench, start_of, end_of)
+    changed = [k for k in range(3) if abs(usual[k] - here[k]) > 0.02]
+    assert changed == ([1] if late else [])
+    assert here[1] > 1.0
+    assert here[1] <= usual[1] + 0.02
+    assert off_path(whole, (start, end), bench, (start_of, end_of)) < (0.02 if late else 1e-9)
+
+
 def test_a_faster_monitor_speed_that_is_refused_on_the_way_to_a_slower_one_comes_after_it():
     refused = 0
     whole, start, end = square()
@@ -428,6 +452,8 @@ def test_what_cant_be_reached_changes_nothing():
     before = bench.engine.timeline
     bench.arm.set_speed(10, turn=None, unit="%", always=False)
     bench.arm.set_hand(False)
+    with pytest.raises(ValError, match=r"beyond the reach of 864\.077 mm"):
+        bench.arm.move(from_oat(900, 900, 0, *DOWN), straight=False, now=bench.now)
     for target in (from_oat(900, 900, 0, *DOWN), PrecisionPoint((0, 60, 0, 0, 0, 0))):
         with pytest.raises(ValError, match=r"\*Location out of range\*"):
             bench.arm.move(target, straight=False, now=bench.now)

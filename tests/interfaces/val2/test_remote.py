@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from interfaces.val2.motion.places import READY
 from interfaces.val2.motion.remote import RemoteRobot
 from tests.interfaces.joined import MODEL, Joined, bad, constant
 from tests.interfaces.live_rig import operator_here, robot_here
+from vrs.commands import Stop
 
 NEAR = from_oat(-100, 550, 0, 90, 90, 0)
 CORNER = from_oat(100, 550, 0, 90, 90, 0)
@@ -28,18 +30,23 @@ FAR = from_oat(0, -500, 0, 90, 90, 0)
 class Line:
     """A connection as `connect` makes it, over an emulated link in virtual time."""
 
-    def __init__(self, link):
+    def __init__(self, link, seen=0.3):
         self.joined = Joined()
         self._designer = self.joined.add(Designer(self.joined.remote(link, link, seed=3)))
-        self._seen_by = self.joined.remote(constant(0.3), constant(0.3), seed=4)
+        self._seen_by = self.joined.remote(constant(seen), constant(seen), seed=4)
         """What the timeline crosses is a connection of its own, and slower."""
         self.designer = self
-        self.state = SimpleNamespace(q=MODEL.poses["ready"])
+        self.heard()
         self.history = ()
+        self.is_connected = True
 
     @property
     def now(self):
         return self.joined.now
+
+    def heard(self, halted=""):
+        """Something new of the real robot."""
+        self.state = SimpleNamespace(q=MODEL.poses["ready"], halted=halted)
 
     def issue(self, command):
         return self._designer.issue(command, now=self.now)
@@ -111,10 +118,106 @@ def test_what_is_refused_raises_once_and_changes_nothing(line):
     arm.move(NEAR, straight=False, now=line.now)
     line.until(arm.settled)
     arm.move(FAR, straight=True, now=line.now)
-    with pytest.raises(ValError, match=r"\*Straight line not possible\*"):
+    with pytest.raises(ValError, match=r"^\*Straight line not possible\* (?!no straight line)") as caught:
         line.until(arm.answered)
+    assert re.search(r"at [0-9.]+ mm from the beginning", caught.value.detail)
     line.until(arm.settled)
     assert off(arm, NEAR, line.now) < 1e-9
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_real_robot_that_stops_by_itself_interrupts_the_motion_at_once_and_retry_goes_on(line, straight):
+    arm = Arm(RemoteRobot(line, MODEL))
+    arm.move(NEAR, straight=False, now=line.now)
+    line.until(arm.settled)
+    arm.move(CORNER, straight=straight, now=line.now)
+    line.until(arm.ready)
+    line.joined.run(0.2)
+    stopped = line.now
+    line.joined.engine.execute(Stop())
+    line.heard("nothing fresh came")
+    assert arm.next_deadline() <= line.now + 0.06
+    with pytest.raises(ValError, match=r"^\*Motion interrupted\* the real arm has stopped: nothing fresh came$"):
+        line.until(arm.settled)
+    assert line.now <= stopped + 0.06
+    line.joined.run(0.5)
+    line.until(arm.settled)
+    assert off(arm, CORNER, line.now) > 1.0
+    line.heard()
+    assert arm.retry(now=line.now)
+    line.until(arm.settled)
+    assert off(arm, CORNER, line.now) < 1e-9
+
+
+def test_an_arm_that_something_else_stops_has_not_arrived(line):
+    arm = Arm(RemoteRobot(line, MODEL))
+    arm.move(NEAR, straight=False, now=line.now)
+    line.until(arm.ready)
+    line.joined.run(0.2)
+    line.joined.engine.execute(Stop())
+    with pytest.raises(ValError, match=r"^\*Motion interrupted\* the arm was stopped before its destination$"):
+        line.until(arm.settled)
+    line.until(arm.settled)
+    assert off(arm, NEAR, line.now) > 1.0
+    assert arm.retry(now=line.now)
+    line.until(arm.settled)
+    assert off(arm, NEAR, line.now) < 1e-9
+
+
+def test_an_arrival_that_nothing_is_heard_of_is_none(line):
+    arm = Arm(RemoteRobot(line, MODEL))
+    arm.move(NEAR, straight=False, now=line.now)
+    line.until(arm.ready)
+    line.is_connected = False
+    line.joined.run(0.2)
+    assert not arm.settled(now=line.now)
+    line.is_connected = True
+    line.until(arm.settled)
+    arm.move(CORNER, straight=False, now=line.now)
+    line.until(arm.ready)
+    line.is_connected = False
+    with pytest.raises(ValError, match=r"^\*Motion interrupted\* there's no connection"):
+        line.until(arm.settled)
+    assert line.now >= line.joined.engine.timeline.end
+
+
+def test_a_halt_after_the_arrival_interrupts_nothing(line):
+    arm = Arm(RemoteRobot(line, MODEL))
+    arm.move(NEAR, straight=False, now=line.now)
+    line.until(arm.ready)
+    line.joined.run(line.joined.engine.timeline.end - line.now + 0.05)
+    line.heard("nothing fresh came")
+    assert arm.settled(now=line.now)
+
+
+def test_what_was_heard_before_an_answer_says_nothing_of_it(line):
+    arm = Arm(RemoteRobot(line, MODEL))
+    line.heard("it hasn't gone on yet")
+    arm.move(NEAR, straight=False, now=line.now)
+    line.until(arm.ready)
+    line.heard("nothing fresh came")
+    with pytest.raises(ValError, match="nothing fresh came"):
+        line.until(arm.settled)
+
+
+def test_a_motion_that_is_seen_late_lasts_to_its_end():
+    line = Line(constant(0.02), seen=2.5)
+    arm = Arm(RemoteRobot(line, MODEL))
+    line.until(arm.settled)
+    arm.move(NEAR, straight=False, now=line.now)
+    line.until(arm.settled)
+    assert line.now >= line.joined.engine.timeline.end
+    assert off(arm, NEAR, line.now) < 1e-9
+
+
+def test_a_motion_that_is_never_seen_ends_as_an_error_a_while_after_its_end(line):
+    robot = RemoteRobot(line, MODEL)
+    arm = Arm(robot)
+    robot._viewer = SimpleNamespace(timeline=robot.timeline)
+    arm.move(NEAR, straight=False, now=line.now)
+    with pytest.raises(ValError, match=r"\*Command refused\* the server took it, but doesn't show"):
+        line.until(arm.settled)
+    assert line.joined.engine.timeline.end <= line.now <= line.joined.engine.timeline.end + 3.0
 
 
 def test_a_robot_that_has_halted_says_how_it_goes_on():

@@ -106,9 +106,9 @@ def test_an_error_stops_the_program_and_not_the_record():
 @pytest.mark.parametrize(
     ("lines", "error"),
     [
-        (["WAIT SIG(1001)"], r"\*Waits for ever\*"),
+        (["TYPE 1", "WAIT SIG(1001)"], r"\*Waits for ever\*.*, program main, step 2$"),
         (["WHILE TRUE DO", "DELAY 1", "END"], r"\*Program given up\*"),
-        (['PROMPT "how many", n'], r"\*No answer\*"),
+        (['PROMPT "how many", n'], r"\*No answer\*.*, program main, step 1$"),
     ],
 )
 def test_what_would_never_end_is_given_up(lines, error):
@@ -141,6 +141,7 @@ def test_a_rehearsal_finds_what_is_out_of_reach_with_line_and_column():
 def test_where_a_rehearsal_sees_no_farther_isnt_an_error(line):
     rehearsal = rehearse(parse_file(program("READY", line, "MOVE nowhere"), "test.v2"), model)
     assert [finding.grave for finding in rehearsal.findings] == [False]
+    assert [finding.place.line for finding in rehearsal.findings] == [3]
 
 
 def test_a_rehearsal_ends_where_a_program_computes_for_ever(monkeypatch):
