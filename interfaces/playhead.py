@@ -1,16 +1,20 @@
-"""A viewer's own place in time: play, pause, rewind, seek, rate, go live."""
+"""A viewer's own place in time: play, pause, step, rewind, seek, rate, loop, go live."""
 
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
-SLOWEST, FASTEST = 0.1, 10.0
-"""Rates of play [timeline s / user s]; to rewind they are negative."""
+FASTEST = 10.0
+"""Quickest rate of play [timeline s / user s]; to rewind rates are negative."""
+
+SHORTEST = 0.01
+"""A loop is at least so long [s]."""
 
 QUICKEST = 0.5
 """Going live takes at least so long [s]."""
@@ -79,6 +83,20 @@ class _Run:
     since: float
     place: float
     rate: float
+    loop: tuple[float, float] | None = None
+    """A range that it doesn't leave once it's there [s]."""
+
+    def at(self, now: float) -> float:
+        """Where it is [s]."""
+        place = self.place + self.rate * (now - self.since)
+        if self.loop is None:
+            return place
+        start, end = self.loop
+        if self.rate > 0 and place >= end:
+            return start + (place - end) % (end - start)
+        if self.rate < 0 and place < start:
+            return end - (start - place) % (end - start)
+        return place
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +122,9 @@ class PlayHead:
 
     While it goes live it doesn't jump: its rate stays within ±10, but for the live edge's own corrections, and from
     behind it never runs back. Played on to the live edge, it stays there, live.
+
+    In a loop what runs forwards goes on from the loop's start when it comes to its end, and backwards the other way
+    round; what is sought behind the end runs on freely, and so does what is sought before the start and runs back.
     """
 
     def __init__(
@@ -112,12 +133,14 @@ class PlayHead:
         """Begin at the live edge.
 
         Args:
-            live: The newest time [s] at a user's time [s]; None while that isn't known.
+            live: The newest time [s] at a user's time [s]; None while that isn't known, −∞ where nothing is live:
+                then it begins at the start, and never goes live.
             span: Start and end of the timeline [s]; None while that isn't known.
         """
         self._live, self._span = live, span
         self._motion: _Run | _Chase | None = None
         self._mode = Mode.LIVE
+        self._loop: tuple[float, float] | None = None
         self.rate = 1.0
         """Rate of play [timeline s / user s], negative to rewind."""
 
@@ -125,6 +148,11 @@ class PlayHead:
     def mode(self) -> Mode:
         """What it does."""
         return self._mode
+
+    @property
+    def loop(self) -> tuple[float, float] | None:
+        """Start and end of the loop [s]; None without one."""
+        return self._loop
 
     def position(self, now: float) -> float | None:
         """The time to show [s] at the user's time now [s]; None while nothing is known of the live edge."""
@@ -141,15 +169,25 @@ class PlayHead:
         """Where it is, and whether it has come to the live edge."""
         live, motion = self._live(now), self._motion
         if live is None or motion is None:
-            return live, False
+            return (self._start() if live == -math.inf else live), False
         if isinstance(motion, _Chase) and now >= motion.since:
             arrived = now >= motion.since + motion.duration
             return (live if arrived else live - motion.left(now)), arrived
         run = motion.before if isinstance(motion, _Chase) else motion
-        place = run.place + run.rate * (now - run.since)
-        if run.rate > 1 and run.place < live <= place:
+        place = run.at(now)
+        if run.rate > 1 and run.loop is None and run.place < live <= place:
             return live, True
         return self._within(place, live), False
+
+    def _start(self) -> float | None:
+        span = self._span()
+        return None if span is None else span[0]
+
+    def _run(self, now: float, place: float, rate: float) -> _Run:
+        """A run from a place, bound by the loop unless it has left that behind."""
+        loop = self._loop
+        bound = loop is not None and (place <= loop[1] if rate > 0 else place >= loop[0])
+        return _Run(now, place, rate, loop if bound and rate else None)
 
     def _within(self, place: float, live: float) -> float:
         span = self._span()
@@ -160,14 +198,14 @@ class PlayHead:
 
         Args:
             now: The user's time [s].
-            rate: ±0.1 to ±10; the rate that was last set unless given.
+            rate: −10 to 10, but not 0: `pause` is for that; the rate that was last set unless given.
 
         Raises:
-            InvalidValueError: If rate is out of range.
+            InvalidValueError: If rate is out of range, or 0.
         """
-        allowed = "0.1 to 10, or −10 to −0.1 to rewind"
+        allowed = "−10 to 10, but not 0"
         rate = finite("rate", self.rate if rate is None else rate, allowed)
-        if not SLOWEST <= abs(rate) <= FASTEST:
+        if rate == 0 or abs(rate) > FASTEST:
             raise InvalidValueError("rate", rate, allowed)
         self.rate = rate
         self._move(now, rate, Mode.PLAYING)
@@ -176,8 +214,52 @@ class PlayHead:
         """Stand where it is."""
         self._move(now, 0.0, Mode.PAUSED)
 
+    def step(self, dt: float, *, now: float) -> None:
+        """Stand dt [s] further on, or back where it's negative."""
+        dt = finite("dt", dt, "finite seconds")
+        self.pause(now=now)
+        if self._mode is Mode.PAUSED:
+            place = self.position(now)
+            assert place is not None
+            self.seek(place + dt, now=now)
+
+    def set_loop(self, start: float, end: float, *, now: float) -> None:
+        """Loop a range. What is outside goes to its start, or to its end where it rewinds; what was live plays.
+
+        Args:
+            start: Where the range begins [s]; what lies outside the timeline is left out.
+            end: Where it ends [s].
+            now: The user's time [s].
+
+        Raises:
+            InvalidValueError: If less than 0.01 s is left of it.
+        """
+        allowed = f"a range of at least {SHORTEST} s in the timeline"
+        start, end = finite("loop", start, allowed), finite("loop", end, allowed)
+        live, span = self._live(now), self._span()
+        if span is not None:
+            low, high = span[0], span[1] if live is None else max(span[1], live)
+            given, start, end = (start, end), max(start, low), min(end, high)
+        else:
+            given = start, end
+        if end - start < SHORTEST - 1e-9:
+            raise InvalidValueError("loop", given, allowed)
+        place = self.position(now)
+        self._loop = start, end
+        if place is None:
+            return
+        inside = self._mode in {Mode.PAUSED, Mode.PLAYING} and start <= place <= end
+        self.seek(place if inside else end if self.rate < 0 else start, now=now)
+
+    def clear_loop(self, *, now: float) -> None:
+        """Loop no more; it goes on as it does."""
+        place = self.position(now)
+        self._loop = None
+        if place is not None and self._mode is Mode.PLAYING:
+            self._motion = _Run(now, place, self.rate)
+
     def rewind(self, *, now: float, rate: float = 1.0) -> None:
-        """Run backwards at a rate, 0.1 to 10."""
+        """Run backwards at a rate above 0, 10 at most."""
         self.play(now=now, rate=-abs(rate))
 
     def set_rate(self, rate: float, *, now: float) -> None:
@@ -204,10 +286,10 @@ class PlayHead:
         self._mode = Mode.PAUSED if standing else Mode.PLAYING
         live = self._live(now)
         place = t if live is None else self._within(t, live)
-        self._motion = _Run(now, place, 0.0 if standing else self.rate)
+        self._motion = self._run(now, place, 0.0 if standing else self.rate)
 
     def go_live(self, *, now: float, wait: float = 0.0) -> float:
-        """Catch up with the live edge.
+        """Catch up with the live edge, and loop no more. Where nothing is live, nothing happens.
 
         A gap g, in the past or ahead, takes max(0.5 s, 1.5 g / 8).
 
@@ -219,6 +301,9 @@ class PlayHead:
             The user's time when it will be live [s].
         """
         place, live = self.position(now), self._live(now)
+        if live == -math.inf:
+            return now
+        self._loop = None
         if place is None or live is None or self._mode is Mode.LIVE:
             self._motion, self._mode = None, Mode.LIVE
             return now
@@ -248,4 +333,4 @@ class PlayHead:
             self._motion = None
             self._mode = Mode.LIVE
         else:
-            self._motion = _Run(now, place, rate)
+            self._motion = self._run(now, place, rate)

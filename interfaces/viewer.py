@@ -50,7 +50,7 @@ class Shown:
 
 
 class Viewer:
-    """An observer that asks periodically, with play-back: play, pause, rewind, seek, rate, go live.
+    """An observer that asks periodically, with play-back: play, pause, step, rewind, seek, rate, loop, go live.
 
     It begins live. In the form of segments it holds the whole timeline and evaluates it itself; in the form of
     frames it shows a broadcaster's while live, and asks for others. Nothing but its own user moves it away from
@@ -120,7 +120,7 @@ class Viewer:
         return self.head.mode
 
     def play(self, *, now: float, rate: float | None = None) -> None:
-        """Run from here at a rate, 0.1 to 10, or negative to rewind; see `PlayHead.play`."""
+        """Run from here at a rate, −10 to 10 but not 0, negative to rewind; see `PlayHead.play`."""
         self.head.play(now=now, rate=rate)
 
     def pause(self, *, now: float) -> None:
@@ -128,8 +128,12 @@ class Viewer:
         self.head.pause(now=now)
 
     def rewind(self, *, now: float, rate: float = 1.0) -> None:
-        """Run backwards at a rate, 0.1 to 10."""
+        """Run backwards at a rate above 0, 10 at most."""
         self.head.rewind(now=now, rate=rate)
+
+    def step(self, frames: float = 1.0, *, now: float) -> None:
+        """Stand so many of its own frames further on, or back where that's negative."""
+        self.head.step(finite("frames", frames) / self.rate, now=now)
 
     def set_rate(self, rate: float, *, now: float) -> None:
         """Change the rate of play."""
@@ -138,6 +142,14 @@ class Viewer:
     def seek(self, t: float, *, now: float) -> None:
         """Go to a time [s] at once; see `PlayHead.seek`."""
         self.head.seek(t, now=now)
+
+    def set_loop(self, start: float, end: float, *, now: float) -> None:
+        """Loop a range [s]; see `PlayHead.set_loop`."""
+        self.head.set_loop(start, end, now=now)
+
+    def clear_loop(self, *, now: float) -> None:
+        """Loop no more."""
+        self.head.clear_loop(now=now)
 
     def go_live(self, *, now: float) -> float:
         """Catch up with the newest there is, smoothly; when it will be there [s]. See `PlayHead.go_live`."""

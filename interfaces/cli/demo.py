@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from interfaces.cli.options import Delay, Offset, Order, Out
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from interfaces.link import DelayProfile, Service
+    from interfaces.recording.runs import RunRecorder
     from interfaces.runtime import TwinRun
     from interfaces.runtime.attribution import Attribution, OffsetOutcome
     from interfaces.runtime.plan import Plan
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 ADAPTIVE = "adaptive"
 DEFAULT_DELAY = "thu"
+RECORDING = "run.mcap"
+"""Name of a run's recording."""
 DEFAULT_SEED = 6
 """With it the default link stalls four times in mid-motion, so that the report has something to explain."""
 
@@ -30,35 +34,18 @@ def demo(
         Path | None,
         typer.Option("--commands", metavar="FILE", help="Plan file, JSON lines; the demo's own without it."),
     ] = None,
-    delay: Annotated[
-        str,
-        typer.Option(
-            "--delay",
-            metavar="PROFILE",
-            help="none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar or trace:FILE.csv.",
-        ),
-    ] = DEFAULT_DELAY,
-    offset: Annotated[
-        str,
-        typer.Option(
-            "--offset",
-            metavar="OFFSET",
-            help="How far the real robot plays behind: adaptive, fixed (the profile's 95 % quantile) or fixed:S.",
-        ),
-    ] = ADAPTIVE,
-    service: Annotated[
-        str, typer.Option("--service", metavar="ORDER", help="Delivery on the link: datagram or in-order.")
-    ] = "datagram",
+    delay: Delay = DEFAULT_DELAY,
+    offset: Offset = ADAPTIVE,
+    service: Order = "datagram",
     seed: Annotated[
         int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random.")
     ] = DEFAULT_SEED,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Where report.html and summary.json go.")
-    ] = Path("out"),
+    out: Out = Path("out"),
     as_json: Annotated[bool, typer.Option("--json", help="Write the summary as JSON on standard output.")] = False,
 ) -> None:
     """Run virtual and real robot on one plan across an emulated internet, and compare them."""
     from interfaces.link import Conditions, delay_profile
+    from interfaces.recording.runs import RunRecorder
     from interfaces.report.summary import summarize
     from interfaces.runtime.offset import fixed_offset
     from interfaces.runtime.plan import default_plan, read_plan
@@ -69,9 +56,12 @@ def demo(
     model = puma560.model()
     plan = default_plan(model) if commands is None else read_plan(commands, model)
     prepare(out)
-    run, attributions, offsets = explained(plan, None, model, profile, seed, D, order)
+    recorder = RunRecorder(out / RECORDING)
+    run, attributions, offsets = explained(plan, recorder, model, profile, seed, D, order)
+    recorder.finish(attributions, offsets)
     summary = summarize(run, attributions, offsets)
     text = write(summary, run, out)
+    complain(recorder)
     if as_json:
         typer.echo(text, nl=False)
     else:
@@ -92,9 +82,15 @@ def prepare(out: Path) -> None:
         raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
 
 
+def complain(recorder: RunRecorder) -> None:
+    """Say why a recording isn't whole, where it isn't."""
+    if recorder.problem:
+        typer.echo(f"vrs: {recorder.problem}", err=True)
+
+
 def explained(
     plan: Plan,
-    whole: TwinRun | None,
+    whole: TwinRun | RunRecorder,
     model: RobotModel,
     profile: DelayProfile,
     seed: int,
@@ -105,7 +101,7 @@ def explained(
 
     Args:
         plan: What the operator does.
-        whole: The run itself, where it has been made.
+        whole: The run itself, where it has been made; else what records it.
         model: The robot.
         profile: The link's delay.
         seed: Seed of the link.
@@ -115,6 +111,7 @@ def explained(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
+    from interfaces.runtime import TwinRun
     from interfaces.runtime.attribution import CAUSES, attribute, measures, offset_outcome, run_without
     from interfaces.runtime.offset import FIXED, fixed_offset, spelled
 
@@ -129,13 +126,14 @@ def explained(
         for off in range(len(CAUSES) + 1):
             name = f"without {CAUSES[off - 1].replace('_', ' ')}" if off else "both twins"
             causes = frozenset(CAUSES[:off])
-            run = (
-                run_without(
-                    causes, plan, model, profile, seed=seed, offset=D, service=service, progress=shown(name)
-                )
-                if whole is None or off
-                else whole
-            )
+            if not off and isinstance(whole, TwinRun):
+                run = whole
+            else:
+                keeper = None if off or isinstance(whole, TwinRun) else whole
+                run = run_without(
+                    causes, plan, model, profile,
+                    seed=seed, offset=D, service=service, progress=shown(name), keeper=keeper,
+                )  # fmt: skip
             stages.append((run, measures(run)))
         for other in (None, fixed_offset(FIXED, profile) if D is None else D):
             progress = shown(f"offset {spelled(other)}")
@@ -171,6 +169,13 @@ def write(summary: dict[str, Any], run: TwinRun, out: Path) -> str:
 
 
 def show(summary: dict[str, Any], out: Path, *, err: bool = False) -> None:
+    """Show a summary's tables, on standard error if asked for, and where the results are."""
+    tables(summary, err=err)
+    names = [str(out / name) for name in ("report.html", "summary.json", RECORDING)]
+    typer.echo(f"Wrote {names[0]}, {names[1]} and {names[2]}", err=err)
+
+
+def tables(summary: dict[str, Any], *, err: bool = False) -> None:
     """Show a summary's tables, on standard error if asked for."""
     from rich.console import Console
 
@@ -184,4 +189,3 @@ def show(summary: dict[str, Any], out: Path, *, err: bool = False) -> None:
         console.print(offset_table(summary))
     for line in time_lines(summary):
         console.print(line, highlight=False)
-    typer.echo(f"Wrote {out / 'report.html'} and {out / 'summary.json'}", err=err)

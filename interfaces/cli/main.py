@@ -9,11 +9,14 @@ from typing import Annotated
 import typer
 
 from interfaces.cli.check import check
+from interfaces.cli.compare import compare
 from interfaces.cli.console import console
 from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
 from interfaces.cli.doors import version
+from interfaces.cli.export import export
 from interfaces.cli.link import link
+from interfaces.cli.replay import replay
 from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
 from interfaces.cli.run import run
@@ -31,10 +34,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(check)
+app.command()(compare)
 app.command()(console)
 app.command()(demo)
 app.command()(doctor)
+app.command()(export)
 app.command()(link)
+app.command()(replay)
 app.command()(reproduce)
 app.command()(robot)
 app.command()(run)

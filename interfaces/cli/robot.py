@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from interfaces.runtime.live.robot import LiveRobot
 
 
-BEAT = 1.0 / 30.0
-"""Time between two reports [s]."""
-
-
 def robot(
     listen: Annotated[
         str,
@@ -60,6 +56,9 @@ def robot(
     ] = "puma560",
     friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
     pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = "nominal",
+    reports: Annotated[
+        float, typer.Option("--reports", metavar="N", help="How often it says where it is [1/s], 1 to 200.")
+    ] = 30.0,
     token_file: TokenFile = None,
     until_eof: Annotated[
         bool, typer.Option("--until-eof", help="End when standard input does, once the robot rests.")
@@ -81,9 +80,10 @@ def robot(
     q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], BodyKind(one_of("body", body, BodyKind))
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("lead", lead, 0.01, 0.3, unit=" s")
+    beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
     watchdog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
     site = RobotSiteConfig(
-        fixed_offset=_offset(offset), beat=BEAT, watchdog=watchdog if policy is LossPolicy.HALT else None
+        fixed_offset=_offset(offset), beat=beat, watchdog=watchdog if policy is LossPolicy.HALT else None
     )
     config = LiveRobotConfig(model, q, RobotHostConfig(site=site, lead=lead), kind, friction, version())
     access = access_for(address.host, token_file, free={Role.SITE})

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.demo import ADAPTIVE, DEFAULT_DELAY, DEFAULT_SEED, explained, prepare, show, write
+from interfaces.cli.demo import (
+    ADAPTIVE,
+    DEFAULT_DELAY,
+    DEFAULT_SEED,
+    RECORDING,
+    complain,
+    explained,
+    prepare,
+    show,
+    write,
+)
+from interfaces.cli.options import Delay, Offset, Order, Out
 from interfaces.files import read_within
 
 if TYPE_CHECKING:
@@ -21,31 +32,13 @@ def run(
     program: Annotated[
         Path, typer.Argument(metavar="PROGRAM.v2", help="File of VAL-II programs; its first is run.")
     ],
-    delay: Annotated[
-        str,
-        typer.Option(
-            "--delay",
-            metavar="PROFILE",
-            help="none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar or trace:FILE.csv.",
-        ),
-    ] = DEFAULT_DELAY,
-    offset: Annotated[
-        str,
-        typer.Option(
-            "--offset",
-            metavar="OFFSET",
-            help="How far the real robot plays behind: adaptive, fixed (the profile's 95 % quantile) or fixed:S.",
-        ),
-    ] = ADAPTIVE,
-    service: Annotated[
-        str, typer.Option("--service", metavar="ORDER", help="Delivery on the link: datagram or in-order.")
-    ] = "datagram",
+    delay: Delay = DEFAULT_DELAY,
+    offset: Offset = ADAPTIVE,
+    service: Order = "datagram",
     seed: Annotated[
         int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random, RANDOM too.")
     ] = DEFAULT_SEED,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Where report.html and summary.json go.")
-    ] = Path("out"),
+    out: Out = Path("out"),
     limit: Annotated[
         float, typer.Option("--limit", min=1, max=3600, metavar="S", help="When the program is given up [s].")
     ] = 600.0,
@@ -55,6 +48,7 @@ def run(
     Standard output is what the program TYPEs; PROMPT reads standard input.
     """
     from interfaces.link import Conditions, delay_profile
+    from interfaces.recording.runs import RunRecorder
     from interfaces.report.summary import summarize
     from interfaces.runtime.bodies import simulated_puma
     from interfaces.runtime.offset import fixed_offset
@@ -66,13 +60,17 @@ def run(
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     source, model = read(program), puma560.model()
     prepare(out)
+    recorder = RunRecorder(out / RECORDING)
     played = play(
         source, model, profile, simulated_puma(),
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
+        keeper=recorder,
     )  # fmt: skip
     whole, attributions, offsets = explained(played.plan, played.run, model, profile, seed, D, order)
+    recorder.finish(attributions, offsets)
     summary = summarize(whole, attributions, offsets)
     write(summary, whole, out)
+    complain(recorder)
     show(summary, out, err=True)
     if played.error is not None:
         raise played.error

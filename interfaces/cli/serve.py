@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of, version
+from interfaces.cli.options import PROFILES, Host, Port
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
@@ -17,25 +18,20 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from interfaces.link import LinkConditions
+    from interfaces.recording.live import LiveRecording
     from interfaces.stream.access import Access
 
 
 def serve(
-    host: Annotated[
-        str,
-        typer.Option("--host", metavar="HOST", help="Address to listen on; off loopback with --token-file only."),
-    ] = "127.0.0.1",
-    port: Annotated[
-        int, typer.Option("--port", min=0, max=65535, metavar="N", help="0 for any that's free.")
-    ] = 8600,
+    host: Host = "127.0.0.1",
+    port: Port = 8600,
     robot: Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560.")] = "puma560",
     delay: Annotated[
         str,
         typer.Option(
             "--delay",
             metavar="PROFILE",
-            help="Emulated on the way to the robot: none, constant:S, domain, country, mon, tue, wed, thu, fri, "
-            "lunar or trace:FILE.csv.",
+            help=f"Emulated on the way to the robot: {PROFILES}",
         ),
     ] = "none",
     loss: Annotated[
@@ -85,6 +81,10 @@ def serve(
     val_files: Annotated[
         Path, typer.Option("--val-files", metavar="DIR", help="Where that monitor's LOAD and STORE find files.")
     ] = Path(),
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", metavar="FILE.mcap", help="Record everything; vrs replay and compare read it."),
+    ] = None,
     until_eof: Annotated[bool, typer.Option("--until-eof", help="End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
@@ -92,6 +92,8 @@ def serve(
 
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
+    from interfaces.recording.live import RATE, LiveRecording
+    from interfaces.recording.sink import Sink
     from interfaces.runtime.offset import QUANTILE, fixed_offset, spelled
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
@@ -102,8 +104,15 @@ def serve(
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     profile = delay_profile(delay)
     way = Conditions(delay=profile, loss=loss_model(loss), service=service)  # type: ignore[arg-type]
-    options = ["--offset", spelled(fixed_offset(offset, profile)), "--link-loss", policy, "--body", body]
-    options += ["--max-age", f"{max_age:g}"]
+    behind = spelled(fixed_offset(offset, profile))
+    options = ["--offset", behind, "--link-loss", policy, "--body", body, "--max-age", f"{max_age:g}"]
+    recording = None
+    if record is not None:
+        # Before a robot is started.
+        Sink.create(record).close()
+        options += ["--reports", f"{RATE:g}"]
+        facts = (behind, str(policy)) if robot_at is None else ("the robot's own", "the robot's own")
+        recording = LiveRecording(record, *facts, _recording_failed)
     # Half a round trip isn't known of the clocks, and counts as age.
     usual = 2.0 * profile.quantile(QUANTILE)
     if policy is LossPolicy.HALT and usual > max_age:
@@ -128,8 +137,13 @@ def serve(
             None if at is None else f"ws://{at}/site",
             token,
             options,
+            recording,
         )
     )
+
+
+def _recording_failed(problem: str) -> None:
+    typer.echo(f"vrs: {problem}", err=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +168,7 @@ async def _serve(
     robot_at: str | None,
     robot_token: str | None,
     options: Sequence[str],
+    recording: LiveRecording | None,
 ) -> None:
     """Run until a signal comes."""
     import asyncio
@@ -180,8 +195,9 @@ async def _serve(
             stack.callback(val_listening.close)
         url = await stack.enter_async_context(local_robot(options)) if robot_at is None else robot_at
         config = LiveOperatorConfig(
-            model, model.poses["nominal"], url, conditions, robot_token, seed, server=version()
-        )
+            model, model.poses["nominal"], url, conditions, robot_token, seed,
+            server=version(), recording=recording,
+        )  # fmt: skip
         operator = LiveOperator(config, access)
         app = application(operator.routes, hosts(names_of(host), port))
         await stack.enter_async_context(sockets.serve(app, listening))

@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.link.channel import Channel
 from interfaces.link.conditions import Conditions, LinkConditions, Service
-from interfaces.link.packets import Totals
+from interfaces.link.packets import MAX_RECORDS, PacketLog, Totals
 from interfaces.link.path import Path
 from interfaces.link.stream import Stream
 
@@ -34,13 +34,15 @@ class Link(Generic[T, U]):
     Args:
         conditions: What each direction does; `service` says whether it is a `Channel` or a `Stream`.
         rng: Source of everything random in it; the directions draw independently.
+        keep: Most records that each direction's log keeps until they're taken.
     """
 
-    def __init__(self, conditions: LinkConditions, rng: np.random.Generator) -> None:
+    def __init__(self, conditions: LinkConditions, rng: np.random.Generator, *, keep: int = MAX_RECORDS) -> None:
         there, back = rng.spawn(2)
         self.conditions = conditions
         self.forward: Direction[T] = direction(conditions.forward, there)
         self.backward: Direction[U] = direction(conditions.backward, back)
+        self.forward.log, self.backward.log = PacketLog(keep), PacketLog(keep)
 
     def next_deadline(self) -> float | None:
         """When the next packet arrives in either direction, or is sent again [s]; None when both are idle."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from interfaces.link import ConstantDelay, DelayProfile, Service
 from interfaces.runtime.bodies import exact_arm, simulated_puma
+from interfaces.runtime.keeping import RunKeeper
 from interfaces.runtime.plan import Plan
 from interfaces.runtime.run import TwinRun
 from interfaces.runtime.session import Progress
@@ -79,6 +80,7 @@ def run_without(
     offset: float | None = None,
     service: Service = Service.DATAGRAM,
     progress: Progress | None = None,
+    keeper: RunKeeper | None = None,
 ) -> TwinRun:
     """Run a plan with some causes of error switched off.
 
@@ -93,6 +95,7 @@ def run_without(
         offset: A fixed D [s], ≤ 0, unless the network is switched off; None adapts it.
         service: Order of delivery on the link.
         progress: Called now and then with the user time reached [s].
+        keeper: Who writes the run down while it goes on.
     """
     if "network" in causes:
         profile, offset = ConstantDelay("none", 0.0), 0.0
@@ -100,7 +103,9 @@ def run_without(
     if free:
         plan = replace(plan, payloads=())
     arm = exact_arm if "servo" in causes else simulated_puma(friction=not free)
-    return run_twins(plan, model, profile, arm, seed=seed, offset=offset, service=service, progress=progress)
+    return run_twins(
+        plan, model, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
+    )
 
 
 def offset_outcome(

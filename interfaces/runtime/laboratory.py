@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import count
 from typing import Any, Protocol, TypeAlias
 
@@ -163,6 +163,15 @@ class Laboratory:
             self._followed.append(Reference(*(column[rows].copy() for column in reference)))
             self._measured.append(measured[rows].copy())
             self.robot.measured(measured[-1], now=float(t[-1]))
+
+    def blocks(self, since: int) -> Iterator[tuple[Array, Array, Array]]:
+        """What a body's record got, block by block: rows of `play`, references and measured joints [rad], (k, n).
+
+        Args:
+            since: How many blocks are known.
+        """
+        references = (reference.q for reference in self._followed[since:])
+        return zip(self._play[since:], references, self._measured[since:], strict=True)
 
     @property
     def t(self) -> Array:

@@ -28,7 +28,7 @@ class Packet:
     """Whether the link lost the first message with it; later messages repeat it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, order=True)
 class Event:
     """Something that happened to the real robot or the link."""
 
@@ -89,7 +89,7 @@ class TwinRun:
     corrections: tuple[Correction, ...]
     """When the virtual robot was put where the real one was going."""
     events: tuple[Event, ...]
-    """Everything else that happened, by time."""
+    """Everything else that happened, by time, kind and text."""
 
     def __post_init__(self) -> None:
         for name in ("t", "play", "messages"):

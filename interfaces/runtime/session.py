@@ -7,20 +7,23 @@ and its body follows at 1 kHz.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, suppress
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link import Conditions, LinkConditions, PacketRecord
+from interfaces.link import LinkConditions, PacketRecord
 from interfaces.runtime.happenings import command_events, correction_events, waits
+from interfaces.runtime.keeping import RunFacts, RunKeeper, Turn
 from interfaces.runtime.laboratory import Body, Laboratory
 from interfaces.runtime.offset import spelled
 from interfaces.runtime.plan import PlannedCommand
 from interfaces.runtime.run import Event, Packet, TwinRun
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from vrs import Engine, Lateness, ManualClock, Receipt, Status
+from vrs.commands import Cancel, Command, InsertVia, Retime
+from vrs.errors import VrsError
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
@@ -66,8 +69,10 @@ class TwinSession:
         conditions: LinkConditions,
         body: Arm,
         *,
+        title: str,
         seed: int,
         offset: float | None,
+        keeper: RunKeeper | None = None,
     ) -> None:
         """Put both twins at rest.
 
@@ -76,8 +81,10 @@ class TwinSession:
             model: The robot.
             conditions: What the link does.
             body: The real robot's.
+            title: What the run is called.
             seed: Seed of the link, ≥ 0.
             offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
+            keeper: Who writes it down while it goes on.
         """
         self._start, self._model, self._offset, self._body = start, model, offset, body
         self.operator = OperatorSite(model, start, now=0.0, lateness=Lateness.POSTPONE)
@@ -90,13 +97,28 @@ class TwinSession:
         self._sent: list[tuple[float, PlannedCommand, Receipt]] = []
         self._messages: list[PacketRecord] = []
         self._events: list[Event] = []
+        self._lost: set[float] = set()
+        self._packets: list[Packet | None] = []
+        self._unsettled: dict[int, None] = {}
+        self._told = self._corrected = self._blocks = self._rows = 0
+        self._halted: set[int] = set()
         self._cues, self._handled = 0, 0.0
+        self._first_play = self._robot.play_at(np.zeros(1)).p
         self.last_action = 0.0
         """When the operator did something last, or will [s]; infinity while that's unknown."""
+        link = conditions.forward
+        self._facts = RunFacts(
+            model, start, title, seed, link.delay.name, spelled(offset), str(link.service), LINK_LOSS, STEP
+        )
+        self._keeper = keeper
+        if keeper is not None:
+            keeper.begin(self._facts, self.operator)
 
     def sent(self, now: float, command: PlannedCommand, receipt: Receipt) -> None:
         """Write down a command that the virtual robot took, and the operator's site sent on."""
         self._sent.append((now, command, receipt))
+        self._packets.append(None)
+        self._unsettled[len(self._sent)] = None
 
     def hand(self, t: float, mass: float | None) -> None:
         """Let the real hand take a load [kg], or release it, when the robot's own clock reads t [s]."""
@@ -116,7 +138,7 @@ class TwinSession:
         lab = self.lab
         while True:
             lab.run(lab.now + TURN)
-            self._messages += lab.link.forward.log.take()
+            self._take_down()
             progress(lab.now)
             rest = max(self.last_action, self._handled, self.operator.engine.timeline.end)
             arrived = self._robot_rests() if lab.now >= rest else None
@@ -129,9 +151,35 @@ class TwinSession:
                 break
         end = STEP * math.ceil((rest + SETTLE) / STEP - 1e-9)
         lab.run(max(end, lab.now))
-        self._messages += lab.link.forward.log.take()
+        self._take_down()
         progress(lab.now)
         return end
+
+    def _take_down(self) -> None:
+        """Note what has happened since the last time, and have it written down."""
+        lab, corrections = self.lab, self.operator.corrections
+        there, back = lab.link.forward.log.take(), lab.link.backward.log.take()
+        self._messages += there
+        self._lost |= {m.sent for m in there if m.lost is not None or m.attempts > 1}
+        packets = self._settle()
+        self._events += correction_events(corrections[self._corrected :])
+        self._corrected = len(corrections)
+        for epoch in sorted(lab.halts.keys() - self._halted):
+            self._halted.add(epoch)
+            at, why = lab.halts[epoch]
+            self._tell(at, "halted", f"the real robot stopped: {why}")
+        if self._keeper is None:
+            return
+        blocks = list(lab.blocks(self._blocks))
+        first, self._blocks = self._rows, self._blocks + len(blocks)
+        if not first:
+            blocks.insert(0, (np.array([[0.0, self._first_play[0]]]), self._start[None], self._start[None]))
+        play = np.concatenate([block[:, 1] for block, _, _ in blocks]) if blocks else np.empty(0)
+        self._rows += len(play)
+        none = np.empty((0, len(self._start)))
+        reference, real = (np.concatenate([none, *(block[i] for block in blocks)]) for i in (1, 2))
+        events, self._told = tuple(self._events[self._told :]), len(self._events)
+        self._keeper.turn(Turn(lab.now, first, play, real, reference, there, back, events, packets))
 
     def _robot_rests(self) -> float | None:
         """When the robot had done everything that it was told [s]; None if it hasn't."""
@@ -149,7 +197,7 @@ class TwinSession:
 
     def _play(self) -> Array:
         """Play time in each row of the record, the first moment included [s]."""
-        return np.concatenate([self._robot.play_at(np.zeros(1)).p, self.lab.play[:, 1]])
+        return np.concatenate([self._first_play, self.lab.play[:, 1]])
 
     def _handle(self, mass: float | None, t: float) -> None:
         self._cues, self._handled = self._cues - 1, max(self._handled, t)
@@ -163,7 +211,7 @@ class TwinSession:
     def _tell(self, t: float, kind: str, text: str) -> None:
         self._events.append(Event(t, kind, text))
 
-    def record(self, end: float, title: str, link: Conditions, seed: int) -> TwinRun:
+    def record(self, end: float) -> TwinRun:
         """Write down what happened up to the end [s]."""
         rows = round(end / STEP) + 1
         t, play = STEP * np.arange(rows, dtype=np.float64), self._play()[:rows]
@@ -171,24 +219,18 @@ class TwinSession:
         commanded = self._commanded() if self.operator.corrections else shown
         reference = np.vstack([self._start, self.lab.reference.q])[:rows]
         corrections = tuple(self.operator.corrections)
-        packets = self._packets()
-        fates = zip(packets, (receipt for _, _, receipt in self._sent), self._answers(), strict=True)
-        events = [
-            *self._events,
-            *(event for fate in fates for event in command_events(*fate, play_at=self._play_at)),
-            *waits(t, play, reference, slowest=1.0 - self._robot.config.playout.slew),
-            *correction_events(corrections),
-            *(Event(at, "halted", f"the real robot stopped: {why}") for at, why in self.lab.halts.values()),
-        ]
+        self._settle(all_of_them=True)
+        events = [*self._events, *waits(t, play, reference, slowest=1.0 - self._robot.config.playout.slew)]
         arrivals = [(m.sent, math.nan if m.arrived is None else m.arrived) for m in self._messages]
-        return TwinRun(
-            model=self._model,
-            title=title,
-            seed=seed,
-            delay=link.delay.name,
-            offset=spelled(self._offset),
-            service=str(link.service),
-            link_loss=LINK_LOSS,
+        facts = self._facts
+        run = TwinRun(
+            model=facts.model,
+            title=facts.title,
+            seed=facts.seed,
+            delay=facts.delay,
+            offset=facts.offset,
+            service=facts.service,
+            link_loss=facts.link_loss,
             t=t,
             play=play,
             q_virtual=commanded.sample(t),
@@ -198,11 +240,14 @@ class TwinSession:
             q_reference=reference,
             receipts_virtual=self.operator.engine.receipts,
             receipts_real=self._receipts(),
-            packets=packets,
+            packets=tuple(packet for packet in self._packets if packet is not None),
             messages=np.array(arrivals, dtype=np.float64).reshape(-1, 2),
             corrections=corrections,
-            events=tuple(sorted((e for e in events if e.t <= end), key=lambda event: event.t)),
+            events=tuple(sorted(event for event in events if event.t <= end)),
         )
+        if self._keeper is not None:
+            self._keeper.end(run)
+        return run
 
     def _play_at(self, t: float) -> float:
         return float(self._robot.play_at(np.array([t])).p[0])
@@ -211,20 +256,23 @@ class TwinSession:
         """What the robot's engine answered to each command that was sent."""
         return [self.lab.answers.get((1, number)) for number in range(1, len(self._sent) + 1)]
 
-    def _packets(self) -> tuple[Packet, ...]:
-        lost = {m.sent for m in self._messages if m.lost is not None or m.attempts > 1}
-        return tuple(
-            Packet(
-                receipt.command_id,
-                sent,
-                self.lab.arrivals.get((1, number)),
-                None if answer is None else answer.command_id,
-                sent in lost,
+    def _settle(self, *, all_of_them: bool = False) -> tuple[tuple[int, Packet], ...]:
+        """Find out what became of commands that weren't answered before, if they are now; at the end, of all."""
+        found = []
+        for number in list(self._unsettled):
+            answer = self.lab.answers.get((1, number))
+            if answer is None and not all_of_them:
+                continue
+            del self._unsettled[number]
+            sent, _, receipt = self._sent[number - 1]
+            real_id = None if answer is None else answer.command_id
+            arrived = self.lab.arrivals.get((1, number))
+            packet = self._packets[number - 1] = Packet(
+                receipt.command_id, sent, arrived, real_id, sent in self._lost
             )
-            for number, ((sent, _, receipt), answer) in enumerate(
-                zip(self._sent, self._answers(), strict=True), start=1
-            )
-        )
+            self._events += command_events(packet, receipt, answer, play_at=self._play_at)
+            found.append((number, packet))
+        return tuple(found)
 
     def _receipts(self) -> tuple[Receipt, ...]:
         """The truth about every command at the robot; of those before a stop, what was answered then."""
@@ -234,16 +282,38 @@ class TwinSession:
 
     def _commanded(self) -> Timeline:
         """What the commands alone make of the virtual robot."""
-        clock = ManualClock(0.0)
-        engine = Engine(self._model, q=self._start, clock=clock, lateness=Lateness.POSTPONE)
-        for now, command, _ in self._sent:
-            clock.set(now)
-            engine.execute(command)
-        return engine.timeline
+        return commands_alone(self._model, self._start, self._sent)
 
 
 def unheard(t: float) -> None:
     """Report no progress."""
+
+
+def commands_alone(
+    model: RobotModel,
+    start: Array,
+    sent: Iterable[tuple[float, Command | None, Receipt | None]],
+    *,
+    now: float = 0.0,
+) -> Timeline:
+    """What commands make of a virtual robot that nothing corrects.
+
+    Args:
+        model: The robot.
+        start: Joints at the start [rad], (n,).
+        sent: What the engine that was corrected took: when [s], the command (None for an undo), and its receipt.
+        now: When that engine began [s].
+    """
+    clock = ManualClock(now)
+    engine = Engine(model, q=start, clock=clock, lateness=Lateness.POSTPONE)
+    for at, command, receipt in sent:
+        clock.set(at)
+        # Edits name commands by the ids that these got, and some ids were given to what was refused.
+        if command is not None and receipt is not None and not isinstance(command, Retime | Cancel | InsertVia):
+            engine.count_from(receipt.command_id - 1)
+        with suppress(VrsError):
+            engine.undo() if command is None else engine.execute(command)  # type: ignore[arg-type]
+    return engine.timeline
 
 
 def status_counts(receipts: tuple[Receipt, ...]) -> dict[str, int]:

@@ -8,6 +8,7 @@ Zikos, Delopoulos, section IV-A): commands that take longer are then postponed.
 from __future__ import annotations
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
+from interfaces.runtime.keeping import RunKeeper
 from interfaces.runtime.offset import QUANTILE
 from interfaces.runtime.plan import Plan, PlannedMotion
 from interfaces.runtime.run import TwinRun
@@ -26,6 +27,7 @@ def run_twins(
     offset: float | None = None,
     service: Service = Service.DATAGRAM,
     progress: Progress | None = None,
+    keeper: RunKeeper | None = None,
 ) -> TwinRun:
     """Run a plan on both twins.
 
@@ -38,20 +40,23 @@ def run_twins(
         offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
         service: Order of delivery on the link.
         progress: Called now and then with the user time reached [s].
+        keeper: Who writes the run down while it goes on.
 
     Returns:
         The record, every 20 ms of user time, until both robots have been at rest for 2 s.
     """
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
     with arm(plan.start) as body:
-        session = TwinSession(plan.start, model, conditions, body, seed=seed, offset=offset)
+        session = TwinSession(
+            plan.start, model, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
+        )
         for motion in plan.motions:
             session.lab.schedule(motion.registered_at, lambda now, motion=motion: _register(session, motion, now))  # type: ignore[misc]
         for item in plan.payloads:
             session.hand(item.t, item.mass)
         session.last_action = max((motion.registered_at for motion in plan.motions), default=0.0)
         end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or unheard)
-    return session.record(end, plan.title, conditions.forward, seed)
+    return session.record(end)
 
 
 def _register(session: TwinSession, item: PlannedMotion, now: float) -> None:

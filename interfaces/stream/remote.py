@@ -217,7 +217,7 @@ class RemoteViewer:
         return shown if shown is not None and shown.number > number else None
 
     def play(self, rate: float | None = None) -> None:
-        """Run from here at a rate, 0.1 to 10, or negative to rewind."""
+        """Run from here at a rate, −10 to 10 but not 0, negative to rewind."""
         self._session.do(lambda now: self._viewer.play(now=now, rate=rate))
 
     def pause(self) -> None:
@@ -225,12 +225,24 @@ class RemoteViewer:
         self._session.do(lambda now: self._viewer.pause(now=now))
 
     def rewind(self, rate: float = 1.0) -> None:
-        """Run backwards at a rate, 0.1 to 10."""
+        """Run backwards at a rate above 0, 10 at most."""
         self._session.do(lambda now: self._viewer.rewind(now=now, rate=rate))
+
+    def step(self, frames: float = 1.0) -> None:
+        """Stand so many of its own frames further on, or back where that's negative."""
+        self._session.do(lambda now: self._viewer.step(frames, now=now))
 
     def seek(self, t: float) -> None:
         """Go to a time [s] at once."""
         self._session.do(lambda now: self._viewer.seek(t, now=now))
+
+    def set_loop(self, start: float, end: float) -> None:
+        """Loop a range [s]."""
+        self._session.do(lambda now: self._viewer.set_loop(start, end, now=now))
+
+    def clear_loop(self) -> None:
+        """Loop no more."""
+        self._session.do(lambda now: self._viewer.clear_loop(now=now))
 
     def go_live(self) -> float:
         """Catch up with the newest there is; when it will be there [s]."""

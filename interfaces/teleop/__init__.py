@@ -2,12 +2,14 @@
 
 from interfaces.teleop.host import RobotHost, RobotHostConfig
 from interfaces.teleop.line import RobotLine
+from interfaces.teleop.listening import Correction, Deed, Listener
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
-from interfaces.teleop.operator import Correction, OperatorSite, OperatorSiteConfig
+from interfaces.teleop.operator import OperatorSite, OperatorSiteConfig
 from interfaces.teleop.robot import Reference, RobotSite, RobotSiteConfig
 
 __all__ = [
-    "AdaptiveOffset", "Correction", "Entry", "OffsetConfig", "OperatorSite", "OperatorSiteConfig", "Orders",
-    "PlanPart", "Reference", "Report", "RobotHost", "RobotHostConfig", "RobotLine", "RobotSite", "RobotSiteConfig",
+    "AdaptiveOffset", "Correction", "Deed", "Entry", "Listener", "OffsetConfig", "OperatorSite",
+    "OperatorSiteConfig", "Orders", "PlanPart", "Reference", "Report", "RobotHost", "RobotHostConfig", "RobotLine",
+    "RobotSite", "RobotSiteConfig",
 ]  # fmt: skip

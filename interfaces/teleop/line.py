@@ -16,6 +16,9 @@ from interfaces.teleop.operator import OperatorSite
 ToRobot: TypeAlias = Orders | Pong
 ToOperator: TypeAlias = Report | Ping
 
+LOGGED = 500
+"""Records of packets that each way keeps until somebody takes them."""
+
 
 class RobotLine:
     """Carries what the operator's site says to a connection, and back. Times are the operator's session time."""
@@ -29,7 +32,7 @@ class RobotLine:
             rng: Source of everything random in that.
         """
         self.operator = operator
-        self.link: Link[ToRobot, ToOperator] = Link(conditions, rng)
+        self.link: Link[ToRobot, ToOperator] = Link(conditions, rng, keep=LOGGED)
         self.connected = False
         """Whether there's a connection to send on."""
         self.heard = -math.inf

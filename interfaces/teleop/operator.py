@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.teleop.listening import Correction, Deed, Listener
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from vrs.checks import number_in
 from vrs.clock import ManualClock
@@ -59,25 +60,13 @@ class OperatorSiteConfig:
             number_in(name, getattr(self, name), low, high)
 
 
-class Correction(NamedTuple):
-    """The virtual robot was put where the real one is going."""
-
-    t: float
-    """When, by the operator's clock [s]."""
-    end: float
-    """Until when it takes [s]."""
-    error: Array
-    """By how much it was off [rad], (n,)."""
-    reason: str
-
-
 class LoggedEngine(Engine):
-    """An engine that asks whether it may, and tells what it carried out."""
+    """An engine that asks whether it may, and tells what it was given."""
 
     def __init__(
         self,
         refusal: Callable[[], str],
-        told: Callable[[Command | None, Receipt | None, int], None],
+        told: Callable[[Deed, int], None],
         model: RobotModel,
         *,
         q: Array,
@@ -88,7 +77,7 @@ class LoggedEngine(Engine):
 
         Args:
             refusal: Says why commands are refused now; empty if they aren't.
-            told: Is told what was accepted (None for an undo), the receipt, and the newest id before it.
+            told: Is told what it was given, and the newest id before that.
             model: See `Engine`, as for the rest.
             q: Initial joints.
             clock: The operator's.
@@ -102,11 +91,8 @@ class LoggedEngine(Engine):
         if isinstance(command, PositionQuery):
             return super().execute(command)
         reason, newest = self._refusal(), self.newest
-        if reason:
-            return self.refuse(command, reason)
-        answer: Receipt | None = super().execute(command)  # type: ignore[arg-type]
-        if answer is None or answer.status is not Status.REJECTED:
-            self._tell(command, answer, newest)
+        answer: Receipt | None = self.refuse(command, reason) if reason else super().execute(command)  # type: ignore[arg-type]
+        self._tell(Deed(self.now(), command, answer, bool(reason)), newest)
         return answer
 
     def undo(self) -> Receipt | None:
@@ -116,7 +102,7 @@ class LoggedEngine(Engine):
         newest = self.newest
         answer = super().undo()
         if answer is not None:
-            self._tell(None, answer, newest)
+            self._tell(Deed(self.now(), None, answer, False), newest)
         return answer
 
 
@@ -149,6 +135,8 @@ class OperatorSite:
         self.config = OperatorSiteConfig() if config is None else config
         self._model, self._lateness = model, lateness
         self._clock = ManualClock(now)
+        self.listener: Listener | None = None
+        """Who is told of all that happens here."""
         self.engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self._clock, lateness=lateness)
         """The virtual robot; what it's told goes to the real one, whoever tells it."""
         self.epoch, self._began = 1, now
@@ -198,9 +186,13 @@ class OperatorSite:
             return f"{_UNDER_WAY_MOST} commands wait to be acknowledged"
         return ""
 
-    def _told(self, command: Command | None, answer: Receipt | None, newest: int) -> None:
+    def _told(self, deed: Deed, newest: int) -> None:
         """Write what the engine carried out into the log, to be sent."""
-        now = self._clock.now()
+        if self.listener is not None:
+            self.listener.commanded(deed)
+        now, command, answer, _ = deed
+        if answer is not None and answer.status is Status.REJECTED:
+            return
         self._entries += 1
         if command is not None and answer is not None:
             command = _resolved(command, answer, now)
@@ -243,10 +235,15 @@ class OperatorSite:
         for number, receipt in report.receipts:
             known = self._under_way.pop(number, None)
             if known is not None or number in self._ids:
-                self.receipts[self._ids.pop(number, receipt.command_id)] = receipt
+                command_id = self._ids.pop(number, receipt.command_id)
+                self.receipts[command_id] = receipt
+                if self.listener is not None:
+                    self.listener.answered(command_id, receipt, now=now)
         if self.report is not None and report.number <= self.report.number:
             return
         self.report = report
+        if self.listener is not None:
+            self.listener.reported(report, now=now)
         for number in range(self._acknowledged + 1, report.executed + 1):
             self._under_way.pop(number, None)
         self._acknowledged = max(self._acknowledged, report.executed)
@@ -271,9 +268,9 @@ class OperatorSite:
         compared = part.version, self._entries, len(self._under_way), self.engine.timeline.version
         if compared == self._compared:
             return
-        truth = Timeline(part.initial, part.since, part.segments, part.version)
+        plan = Timeline(part.initial, part.since, part.segments, part.version)
         clock = ManualClock(part.since)
-        expected = Engine(self._model, timeline=truth, clock=clock, lateness=self._lateness)
+        expected = Engine(self._model, timeline=plan, clock=clock, lateness=self._lateness)
         for entry, _ in sorted(self._under_way.values(), key=lambda waiting: waiting[0].number):
             clock.set(max(entry.at, clock.now()))
             try:
@@ -282,12 +279,17 @@ class OperatorSite:
             except VrsError:
                 continue
         if _differs(self.engine.timeline, expected.timeline, now):
+            found = expected.timeline
+            # Made of its segments alone, as a recording keeps them: whoever reads that joins the very same.
+            truth = Timeline(found.initial, found.start, found.segments, found.version)
             try:
-                made = self.engine.anchor(expected.timeline)
+                made = self.engine.anchor(truth)
             except PlanningError:
                 # No way keeps the limits from here; the next report finds the arm elsewhere.
                 return
             self.corrections.append(Correction(now, made.end, made.error, reason))
+            if self.listener is not None:
+                self.listener.corrected(self.corrections[-1], truth)
         else:
             self._compared = compared
 

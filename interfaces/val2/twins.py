@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
+from interfaces.runtime.keeping import RunKeeper
 from interfaces.runtime.offset import QUANTILE
 from interfaces.runtime.plan import Plan, PlannedMotion, PlannedPayload
 from interfaces.runtime.run import TwinRun
@@ -93,6 +94,7 @@ def play(
     listeners: Listeners | None = None,
     limit: float = LONGEST,
     progress: Progress | None = None,
+    keeper: RunKeeper | None = None,
 ) -> Played:
     """Carry out the first program of a file, once, from the robot's `nominal` pose.
 
@@ -107,6 +109,7 @@ def play(
         listeners: Who hears what the program says; nobody by default.
         limit: When the program is given up [s].
         progress: Called now and then with the user time reached [s].
+        keeper: Who writes the run down while it goes on.
 
     Raises:
         ValError: If the program can't be begun.
@@ -114,7 +117,9 @@ def play(
     start = model.poses["nominal"]
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
     with arm(start) as body:
-        session = TwinSession(start, model, conditions, body, seed=seed, offset=offset)
+        session = TwinSession(
+            start, model, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper
+        )
         operator = _Operator(session, limit, source.name)
         robot = SiteRobot(session.operator, operator.told)
         val = Arm(robot, parameters=operator.parameters, gripped=operator.gripped)
@@ -124,6 +129,6 @@ def play(
         player.begin(0.0)
         session.lab.schedule(0.0, operator.advance)
         end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or unheard)
-    run = session.record(end, source.name, conditions.forward, seed)
+    run = session.record(end)
     plan = Plan(source.name, start, tuple(operator.motions), tuple(operator.payloads))
     return Played(run, plan, player.errors[-1] if player.errors else None)

@@ -89,7 +89,7 @@ class TestPlayBack:
         seen = places(viewer, since + 0.5)
         assert np.abs(seen[:, 1] - (place + seen[:, 0] - since)).max() < 0.013
 
-    @pytest.mark.parametrize("rate", [-10.0, -1.0, -0.1, 0.1, 0.5, 1.0])
+    @pytest.mark.parametrize("rate", [-10.0, -4.0, -1.0, -0.1, 0.01, 0.5, 1.0])
     def test_rates(self, form, rate):
         joined, viewer = watched(form)
         joined.run(15.0)
@@ -118,6 +118,36 @@ class TestPlayBack:
         viewer.pause(now=joined.now)
         joined.run(5.0)
         assert viewer.history[-1].t == pytest.approx(11.0, abs=0.02)
+
+    def test_a_loop_goes_on_while_the_engine_runs(self, form):
+        joined, viewer = watched(form)
+        joined.run(10.0)
+        viewer.set_loop(3.0, 4.0, now=joined.now)
+        since = joined.now
+        joined.run(6.5)
+        assert viewer.mode is Mode.PLAYING
+        seen = places(viewer, since + 0.5)
+        wanted = 3.0 + (seen[:, 0] - since) % 1.0
+        off = np.abs(seen[:, 1] - wanted)
+        assert np.minimum(off, 1.0 - off).max() < 0.013
+        assert len(seen) > 250
+        viewer.clear_loop(now=joined.now)
+        joined.run(2.0)
+        assert viewer.history[-1].t > 4.5
+        for shown in viewer.history:
+            assert np.abs(shown.q - joined.engine.joints(shown.t)).max() < 1e-9
+
+    def test_steps_stand_a_frame_further(self, form):
+        joined, viewer = watched(form)
+        joined.run(3.0)
+        viewer.seek(1.5, now=joined.now)
+        place = 1.5
+        for frames in (1, 1, -3, 10, -0.5):
+            viewer.step(frames, now=joined.now)
+            place += frames / 50
+            joined.run(0.5)
+            assert viewer.mode is Mode.PAUSED
+            assert viewer.history[-1].t == pytest.approx(place, abs=1e-9)
 
     def test_played_on_to_the_live_edge_it_is_live(self, form):
         joined, viewer = watched(form)
@@ -361,7 +391,7 @@ class TestPlayHead:
 
     def test_rates_out_of_range_are_refused_and_change_nothing(self):
         head = self.head()
-        for rate in (0.0, 0.05, 11.0, -0.01, -10.1, np.nan):
+        for rate in (0.0, -0.0, 11.0, -10.1, np.nan, np.inf, True, "1"):
             with pytest.raises(InvalidValueError):
                 head.play(now=1.0, rate=rate)
             with pytest.raises(InvalidValueError):
@@ -412,6 +442,80 @@ class TestPlayHead:
         assert head.mode is Mode.CATCHING_UP
         assert head.position(done) == pytest.approx(done - 0.2)
         assert head.mode is Mode.LIVE
+
+    def test_steps_stay_in_the_timeline_and_stand(self):
+        head = self.head()
+        head.step(-0.5, now=10.0)
+        assert (head.mode, head.position(10.0)) == (Mode.PAUSED, pytest.approx(9.3))
+        head.step(-100.0, now=11.0)
+        assert head.position(20.0) == 0.0
+        head.step(1e6, now=12.0)
+        assert head.position(99.0) == 30.0
+        with pytest.raises(InvalidValueError):
+            head.step(np.nan, now=1.0)
+
+    @settings(max_examples=200, deadline=None)
+    @given(
+        low=st.floats(0, 20),
+        length=st.floats(0.01, 9.0),
+        rate=st.floats(-10, 10).filter(lambda rate: abs(rate) > 1e-3),
+        place=st.floats(0, 30),
+        waits=st.lists(st.floats(0, 5), min_size=1, max_size=8),
+    )
+    def test_a_loop_is_never_left_and_takes_its_time(self, low, length, rate, place, waits):
+        head = self.head(span=(0.0, 30.0))
+        head.seek(place, now=40.0)
+        head.play(now=40.0, rate=rate)
+        head.set_loop(low, low + length, now=40.0)
+        high = head.loop[1]
+        inside = low <= place <= high
+        begin = place if inside else (low if rate > 0 else high)
+        now = 40.0
+        for wait in waits:
+            now += wait
+            t = head.position(now)
+            assert low - 1e-9 <= t <= high + 1e-9
+            off = (t - begin - rate * (now - 40.0)) % (high - low)
+            assert min(off, high - low - off) < 1e-7
+            assert head.mode is Mode.PLAYING
+            assert head.ahead(now) == t
+
+    def test_what_is_sought_behind_a_loop_runs_freely_and_before_it_runs_in(self):
+        head = self.head()
+        head.set_loop(5.0, 6.0, now=40.0)
+        head.seek(8.0, now=41.0)
+        assert head.position(43.0) == pytest.approx(10.0)
+        head.seek(4.0, now=43.0)
+        assert head.position(43.5) == pytest.approx(4.5)
+        assert head.position(46.25) == pytest.approx(5.25)
+        head.play(now=46.25, rate=-1.0)
+        assert head.position(46.75) == pytest.approx(5.75)
+        head.pause(now=46.75)
+        head.set_loop(1.0, 2.0, now=47.0)
+        assert (head.mode, head.position(60.0)) == (Mode.PAUSED, 2.0)
+        head.go_live(now=60.0)
+        assert head.loop is None
+        assert head.position(90.0) == pytest.approx(89.8)
+
+    def test_loops_of_nothing_are_refused_and_change_nothing(self):
+        head = self.head()
+        head.seek(3.0, now=40.0)
+        for start, end in ((5.0, 5.0), (6.0, 5.0), (np.nan, 5.0), (-9.0, -1.0), (50.0, 60.0), (1.0, 1.009)):
+            with pytest.raises(InvalidValueError):
+                head.set_loop(start, end, now=40.0)
+        assert head.loop is None
+        assert head.position(41.0) == pytest.approx(4.0)
+        head.set_loop(-5.0, 2.0, now=41.0)
+        assert head.loop == (0.0, 2.0)
+
+    def test_where_nothing_is_live_it_begins_at_the_start_and_stops_at_the_end(self):
+        head = PlayHead(lambda now: -np.inf, lambda: (2.0, 9.0))
+        assert head.position(0.0) == 2.0
+        head.seek(3.0, now=0.0)
+        assert head.go_live(now=1.0) == 1.0
+        head.play(now=1.0, rate=4.0)
+        assert head.position(60.0) == 9.0
+        assert head.mode is Mode.PLAYING
 
     def test_nothing_is_shown_before_anything_is_known(self):
         head = PlayHead(lambda now: None, lambda: None)

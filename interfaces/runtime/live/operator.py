@@ -14,6 +14,8 @@ import numpy as np
 from starlette.routing import BaseRoute
 
 from interfaces.link import LinkConditions
+from interfaces.recording.live import TURN as RECORD
+from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.runtime.live.warm import warm
 from interfaces.site import Site
@@ -62,6 +64,8 @@ class LiveOperatorConfig:
     """How the operator's site sends."""
     server: str = "vrs"
     """Name and version of the program."""
+    recording: LiveRecording | None = None
+    """What is recorded; None for nothing."""
 
 
 class LiveOperator:
@@ -73,6 +77,9 @@ class LiveOperator:
         Args:
             config: The site.
             access: Who may do what.
+
+        Raises:
+            RecordingError: If it's to be recorded and the file can't be made.
         """
         self.config = config
         warm(config.model, config.q)
@@ -80,6 +87,12 @@ class LiveOperator:
         self.operator = OperatorSite(config.model, config.q, now=0.0, config=config.site, halted=NOT_MET)
         self.site = Site(self.operator.engine)
         self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
+        self.recorder: LiveRecorder | None = None
+        if config.recording is not None:
+            began = seconds_since_1970() - self.clock.now()
+            self.recorder = LiveRecorder(
+                config.recording, self.line, config.model, config.q, seed=config.seed, began=began
+            )
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token)
         # Every lease of an earlier life has a smaller epoch.
@@ -102,7 +115,8 @@ class LiveOperator:
     async def running(self) -> AsyncIterator[LiveOperator]:
         """Serve clients, and keep the robot connected."""
         async with self.server.running():
-            tasks = [asyncio.create_task(self.robot.run()), asyncio.create_task(self._draw())]
+            tasks = [asyncio.create_task(work) for work in (self.robot.run(), self._draw(), self._record())]
+            tasks[-1].add_done_callback(self._recorded)
             self._turning.start()
             try:
                 yield self
@@ -111,6 +125,8 @@ class LiveOperator:
                 for task in tasks:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
+                if self.recorder is not None:
+                    self.recorder.finish(now=self.clock.now())
 
     async def _draw(self) -> None:
         """Draw both robots for those who look."""
@@ -124,6 +140,17 @@ class LiveOperator:
             follows = report is not None and not self.operator.halted
             path = Committed(timeline, report.q_at) if follows and report is not None else None
             self.scene.show(virtual=links(timeline.sample(now)), real=real, path=path, now=now)
+
+    async def _record(self) -> None:
+        """Let what has happened be recorded."""
+        while self.recorder is not None:
+            await asyncio.sleep(RECORD)
+            self.recorder.advance(now=self.clock.now(), connected=self.connected)
+
+    def _recorded(self, task: asyncio.Task[None]) -> None:
+        """Nothing is recorded any more: say why, unless it's all over."""
+        if self.recorder is not None and not task.cancelled() and (error := task.exception()) is not None:
+            self.recorder.stop(str(error) or type(error).__name__)
 
     def _turn(self, now: float) -> float | None:
         version = self.operator.engine.timeline.version
@@ -216,4 +243,5 @@ class LiveOperator:
             "link_loss": None if attached is None else attached.link_loss,
             "offset": None if attached is None else attached.offset,
             "timer_late": self._turning.lateness.worst,
+            "recording": None if self.recorder is None else self.recorder.health(),
         }

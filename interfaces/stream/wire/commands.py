@@ -255,7 +255,8 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
     reason: Text = ""
     version: Count = 0
     shift: Finite = 0.0
-    superseded_by: Number | None = None
+    superseded_by: Count | None = None
+    """0 for a correction: no command did it."""
     undone: bool = False
     shifted: Names = ()
     superseded: Names = ()

@@ -1,0 +1,62 @@
+"""`vrs export`: a recording as CSV, as Parquet, as a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vrs.errors import FormatError, InvalidValueError
+
+if TYPE_CHECKING:
+    from interfaces.recording.recording import Recording
+
+
+def export(
+    recording: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
+    to_csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="DIR", help="Write its tables there, as CSV.")
+    ] = None,
+    to_parquet: Annotated[
+        Path | None,
+        typer.Option("--parquet", metavar="DIR", help="Write its tables there, as Parquet; needs pyarrow."),
+    ] = None,
+    to_report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE.html", help="Write its report there.")
+    ] = None,
+) -> None:
+    """Write a recording as tables (units are in the columns' names), or as the report of its run."""
+    from interfaces.recording.export import tables, write_csv, write_parquet
+    from interfaces.recording.recording import open_recording
+
+    if to_csv is None and to_parquet is None and to_report is None:
+        raise InvalidValueError("export", "nothing", "one or more of --csv DIR, --parquet DIR, --report FILE.html")
+    written: list[Path] = []
+    with open_recording(recording) as opened:
+        if opened.damage and to_report is None:
+            typer.echo(f"vrs: {recording.name}: the recording is damaged: {opened.damage}", err=True)
+        found = () if to_csv is None and to_parquet is None else tables(opened)
+        if to_csv is not None:
+            written += write_csv(found, to_csv)
+        if to_parquet is not None:
+            written += write_parquet(found, to_parquet)
+        if to_report is not None:
+            _report(opened, to_report)
+            written.append(to_report)
+    for path in written:
+        typer.echo(f"Wrote {path}")
+
+
+def _report(recording: Recording, path: Path) -> None:
+    from interfaces.recording.figures import figures
+    from interfaces.report.html import write_report
+    from interfaces.report.summary import summarize
+
+    found = figures(recording)
+    for line in found.missing:
+        typer.echo(f"vrs: {recording.path.name}: missing: {line}", err=True)
+    try:
+        write_report(path, found.run, summarize(found.run, found.attributions, found.offsets))
+    except OSError as error:
+        raise FormatError(str(path), f"can't be written: {error.strerror}") from None

@@ -1,0 +1,236 @@
+"""`vrs replay`: play-back and rewind of a recording, in the browser or as lines."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, names_of
+from interfaces.cli.options import Host, Port
+from vrs.checks import one_of
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from interfaces.recording.playback import Playback
+    from interfaces.recording.recording import Recording
+    from interfaces.stream.access import Access
+
+FEWEST, MOST = 0.1, 1000.0
+"""Frames a second."""
+RERUN = ("identical", "commands", "versions", "difference", "missing")
+"""What is said of commands that were run again."""
+
+
+def replay(
+    run: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
+    other: Annotated[
+        Path | None, typer.Argument(metavar="[OTHER.mcap]", help="Another one, shown beside it.")
+    ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option("--at", metavar="T", help="Where to begin [s]; alone with --headless: that instant."),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option("--rate", metavar="R", help="−8 to 8, but not 0; negative rewinds. 1 by default."),
+    ] = None,
+    loop: Annotated[str | None, typer.Option("--loop", metavar="A:B", help="Loop from A to B [s].")] = None,
+    align: Annotated[
+        str,
+        typer.Option("--align", metavar="CLOCK", help="Of two recordings: timeline, or began (the calendar)."),
+    ] = "timeline",
+    headless: Annotated[
+        bool, typer.Option("--headless", help="Frames as lines, at their time, instead of a page.")
+    ] = False,
+    frames: Annotated[
+        float, typer.Option("--frames", metavar="HZ", help="Frames a second of your time, with --headless.")
+    ] = 30.0,
+    as_json: Annotated[bool, typer.Option("--json", help="With --headless or --commands: JSON lines.")] = False,
+    commands: Annotated[
+        bool,
+        typer.Option("--commands", help="Run the commands again on a fresh engine: is the timeline the same?"),
+    ] = False,
+    host: Host = "127.0.0.1",
+    port: Port = 8610,
+    token_file: TokenFile = None,
+) -> int:
+    """Play recordings back: either way, at any rate, in a loop, live where one is being written.
+
+    Exit code 1 means that --commands found another timeline than the recorded one.
+    """
+    from interfaces.recording.playback import Align, Playback, checked_rate
+    from interfaces.recording.recording import open_recording
+
+    span = None if loop is None else _range(loop)
+    if rate is not None:
+        checked_rate(rate)
+    if not FEWEST <= frames <= MOST:
+        raise InvalidValueError("frames", frames, f"{FEWEST:g} to {MOST:g} a second")
+    aligned = Align(one_of("align", align, Align))
+    if as_json and not (headless or commands):
+        raise InvalidValueError("json", "--json", "with --headless or --commands")
+    from interfaces.stream.access import OPEN
+
+    access = access_for(host, token_file, free=OPEN)
+    with ExitStack() as stack:
+        recordings = [stack.enter_context(open_recording(path)) for path in (run, other) if path is not None]
+        for recording in recordings:
+            _warn(recording)
+        if commands:
+            return _run_again(recordings, as_json)
+        playback = Playback(recordings, align=aligned)
+        if headless:
+            _print(playback, at, rate, span, frames, as_json)
+        else:
+            _serve(playback, at, rate, span, access, host, port)
+    return 0
+
+
+def _range(text: str) -> tuple[float, float]:
+    """The two times of `A:B` [s]."""
+    start, colon, end = text.partition(":")
+    try:
+        times = float(start), float(end)
+    except ValueError:
+        raise InvalidValueError("loop", text, "A:B, two times in seconds") from None
+    if not colon or not times[0] < times[1]:
+        raise InvalidValueError("loop", text, "A:B, two times in seconds, the first one earlier")
+    return times
+
+
+def _warn(recording: Recording) -> None:
+    """Say what is missing of a recording."""
+    if recording.damage:
+        unless = " (unless it's being written now)" if recording.damage.cut else ""
+        typer.echo(f"vrs: {recording.path}: {recording.damage}{unless}", err=True)
+
+
+def begin(
+    playback: Playback, at: float | None, rate: float | None, span: tuple[float, float] | None, *, now: float
+) -> None:
+    """Go where play-back begins, and play there.
+
+    Args:
+        playback: Standing.
+        at: Where [s]; None for the start, or what `rate` and `span` ask for.
+        rate: How fast; None for 1.
+        span: What is looped [s].
+        now: The user's time [s].
+    """
+    if at is not None:
+        playback.seek(at, now=now)
+    playback.play(now=now, rate=1.0 if rate is None else rate)
+    if span is not None:
+        playback.set_loop(*span, now=now)
+
+
+def _print(
+    playback: Playback,
+    at: float | None,
+    rate: float | None,
+    span: tuple[float, float] | None,
+    frames: float,
+    as_json: bool,
+) -> None:
+    import asyncio
+
+    from interfaces.recording.headless import Frames, lines, play
+    from vrs.clock import WallClock
+
+    def say(line: str) -> None:
+        sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+
+    playback.read_marks()
+    if at is not None and rate is None and span is None:
+        playback.seek(at, now=0.0)
+        found = Frames(playback, rate=frames, begun=0.0).next(now=0.0)
+        assert found is not None
+        for line in lines(*found, as_json=as_json):
+            say(line)
+        return
+
+    async def printed() -> None:
+        clock, ended = WallClock(), asyncio.Event()
+        end_on_signal(ended)
+        now = clock.now()
+        begin(playback, at, rate, span, now=now)
+        await play(Frames(playback, rate=frames, begun=now), clock, say, ended, as_json=as_json)
+
+    asyncio.run(printed())
+
+
+def _serve(
+    playback: Playback,
+    at: float | None,
+    rate: float | None,
+    span: tuple[float, float] | None,
+    access: Access,
+    host: str,
+    port: int,
+) -> None:
+    import asyncio
+
+    from interfaces.recording.page import ReplayPage
+    from interfaces.stream import sockets
+    from interfaces.stream.access import hosts
+    from interfaces.stream.control import Role
+    from interfaces.stream.server import application
+    from vrs.clock import WallClock
+
+    async def served() -> None:
+        ended = asyncio.Event()
+        end_on_signal(ended)
+        listening = sockets.bind(host, port)
+        clock = WallClock()
+
+        def first(now: float) -> None:
+            if playback.growing and (at, rate, span) == (None, None, None):
+                playback.seek(playback.span[1], now=now)
+                playback.go_live(now=now)
+            elif at is None or rate is not None or span is not None:
+                begin(playback, at, rate, span, now=now)
+
+        if at is not None:
+            playback.seek(at, now=clock.now())
+        page = ReplayPage(
+            playback, clock, authorize=lambda token: not access.refusal(Role.VIEWER, token), first=first
+        )
+        number = listening.getsockname()[1]
+        app = application(page.routes, hosts(names_of(host), number))
+        async with sockets.serve(app, listening), page.running():
+            shown = f"[{host}]" if ":" in host else host
+            names = " and ".join(str(track.recording.path) for track in playback.tracks)
+            typer.echo(f"vrs: playing {names} on http://{shown}:{number}/replay")
+            sys.stdout.flush()
+            await ended.wait()
+
+    asyncio.run(served())
+
+
+def _run_again(recordings: Sequence[Recording], as_json: bool) -> int:
+    """Run the commands of recordings again; 1 if any gives another timeline."""
+    import json
+
+    from interfaces.recording.rerun import rerun
+
+    same = True
+    for recording in recordings:
+        result = rerun(recording)
+        same = same and result.identical
+        if as_json:
+            facts = {name: getattr(result, name) for name in RERUN}
+            typer.echo(json.dumps({"recording": str(recording.path), **facts}, allow_nan=False))
+            continue
+        what = f"{result.commands} commands and corrections, {result.versions} timelines compared"
+        said = "identical" if result.identical else f"not identical: {result.difference}"
+        typer.echo(f"{recording.path}: {said} ({what})")
+        if result.missing:
+            typer.echo(f"vrs: {recording.path}: {result.missing}", err=True)
+    return 0 if same else 1

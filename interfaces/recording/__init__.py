@@ -1,0 +1,9 @@
+"""Recordings: MCAP in and out, figures, play-back. `docs/recording.md` is the reference."""
+
+from interfaces.recording.damage import Damage
+from interfaces.recording.errors import RecordingError
+from interfaces.recording.recorder import Recorder
+from interfaces.recording.recording import Recording, open_recording
+from interfaces.recording.writer import RecordingWriter
+
+__all__ = ["Damage", "Recorder", "Recording", "RecordingError", "RecordingWriter", "open_recording"]

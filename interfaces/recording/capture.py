@@ -1,0 +1,325 @@
+"""What happens at an operator's site, as messages of a recording.
+
+Both drivers add what they know of the real robot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from importlib import metadata
+from operator import itemgetter
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from interfaces.changes import difference
+from interfaces.link import PacketRecord
+from interfaces.recording.channels import Message
+from interfaces.recording.messages import (
+    Anchor,
+    ChangeEntry,
+    CommandEntry,
+    FullReceipt,
+    HistoryEntry,
+    LinkEntry,
+    ReceiptEntry,
+    VirtualSample,
+    segment_entries,
+)
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, virtual_pose
+from interfaces.teleop import Correction, Deed, OperatorSite, Report
+from vrs.model import Array, RobotModel
+from vrs.receipt import Receipt, Status
+from vrs.timeline import Timeline
+
+PART = 256
+"""Segments of one message of a history."""
+MOST_CHANGED = 2048
+"""Segments of an edit that's written as one; beyond that the whole timeline is, in parts."""
+MOST_AT_ONCE = 1200
+"""Samples of a robot that are taken at once; the others next time."""
+MOST_REPEATED = 20_000
+"""Segments of a timeline that's written once more when a recording ends, at most."""
+_WAITING = 1024
+"""Things that happened and weren't written yet, at most."""
+_WATCHED = 64
+"""Newest commands whose receipts are looked at for changes."""
+_MOVED = 1e-6
+"""A robot whose joints differ by more [rad] has moved."""
+_STILL = 1.0
+"""How often a robot that stands is shown [s]."""
+
+
+class Put(Protocol):
+    """What a capture writes with."""
+
+    def __call__(self, message: Message, *, t: float) -> object:
+        """Take a message of a time [s]."""
+
+
+class _Happened(NamedTuple):
+    """A command or a correction, and the timelines before and after it."""
+
+    what: Deed | tuple[Correction, Timeline]
+    before: Timeline
+    after: Timeline
+
+
+class Paced:
+    """Chooses what is shown at a lower rate: not more often than that, and seldom while nothing moves."""
+
+    def __init__(self, rate: float) -> None:
+        """Show so often a second, at most."""
+        self._period = 1.0 / rate
+        self._at, self._q = -math.inf, np.empty(0)
+
+    def chosen(self, t: Array, q: Array) -> list[int]:
+        """Rows to show.
+
+        Args:
+            t: Ascending times [s], (k,).
+            q: Joints [rad], (k, n).
+        """
+        found = []
+        for row, now in enumerate(t.tolist()):
+            since = now - self._at
+            if since < self._period - 1e-9:
+                continue
+            if since < _STILL - 1e-9 and np.abs(q[row] - self._q).max() <= _MOVED:
+                continue
+            self._at, self._q = now, q[row]
+            found.append(row)
+        return found
+
+
+class Capture:
+    """Writes down an operator's site: it listens, and writes what is due when it's told the time.
+
+    While it listens it only takes notes: commands don't wait for it.
+    """
+
+    def __init__(self, operator: OperatorSite, model: RobotModel, *, now: float, step: float, every: bool) -> None:
+        """Begin with a site that wasn't commanded yet.
+
+        Args:
+            operator: The site; this becomes its listener.
+            model: The robot.
+            now: By the operator's clock [s].
+            step: Between two samples of the virtual robot [s].
+            every: Whether receipts name every command that they shifted or superseded, however many.
+        """
+        self.operator, self.model, self.step, self._every = operator, model, step, every
+        self.put: Put | None = None
+        """Takes what is written; None at first, and when nothing can be written any more."""
+        self._timeline = operator.engine.timeline
+        self._happened: deque[_Happened] = deque()
+        self._due: list[tuple[float, Message]] = []
+        self._number = self._edit = 0
+        self._row = math.ceil(now / step - 1e-9)
+        self._linked = {"forward": now, "backward": now}
+        self._known: dict[int, int] = {}
+        self._pose = Paced(POSE_RATE)
+        self.links = Paced(LINK_RATE)
+        """When links of the virtual robot are shown."""
+        operator.listener = self
+        self._add_edit(whole_entries(self._timeline, 0, now))
+
+    def commanded(self, deed: Deed) -> None:
+        """Note a command."""
+        self._note(deed)
+
+    def corrected(self, correction: Correction, truth: Timeline) -> None:
+        """Note a correction."""
+        self._note((correction, truth))
+
+    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:  # noqa: ARG002 - ids are the same
+        """Note an answer of the robot's."""
+        self.add(now, ReceiptEntry(now, "real", FullReceipt.of(self._named(receipt))))
+
+    def reported(self, report: Report, *, now: float) -> None:
+        """Drivers that know the real robot by its reports alone take them."""
+
+    def _note(self, what: Deed | tuple[Correction, Timeline]) -> None:
+        before, self._timeline = self._timeline, self.operator.engine.timeline
+        self._happened.append(_Happened(what, before, self._timeline))
+        if len(self._happened) >= _WAITING:
+            self._tell_happened()
+            self.write_out()
+
+    def add(self, t: float, message: Message) -> None:
+        """Let a message of a time [s] be written."""
+        self._due.append((t, message))
+
+    def link(self, direction: str, records: Iterable[PacketRecord]) -> None:
+        """Write down what became of packets (`forward`, `backward`), in the order in which it was known."""
+        for record in records:
+            known = record.sent if record.arrived is None else record.arrived
+            t = self._linked[direction] = max(self._linked[direction], known)
+            lost = record.lost is not None
+            self.add(t, LinkEntry(direction, record.sent, record.arrived, lost, record.attempts))  # type: ignore[arg-type]
+
+    def advance(self, *, now: float) -> tuple[Array, Array]:
+        """Write down what is due; the virtual robot's times [s], (k,), and joints [rad], (k, n), for the driver."""
+        self._tell_happened()
+        t = self._times(now)
+        q = self.operator.engine.timeline.sample(t)
+        self._sample(t, q)
+        return t, q
+
+    def write_out(self) -> None:
+        """Write what waits, by time."""
+        due, self._due = self._due, []
+        due.sort(key=itemgetter(0))
+        for t, message in due:
+            if self.put is None:
+                return
+            self.put(message, t=t)
+
+    def _times(self, now: float) -> Array:
+        """Times of the samples that are due [s], (k,)."""
+        last = min(math.floor(now / self.step + 1e-9), self._row + MOST_AT_ONCE - 1)
+        t: Array = self.step * np.arange(self._row, last + 1, dtype=np.float64)
+        self._row = max(self._row, last + 1)
+        return t
+
+    def _sample(self, t: Array, q: Array) -> None:
+        edits = [(at, message.edit) for at, message in self._due if isinstance(message, ChangeEntry | HistoryEntry)]
+        since = edits[0][1] - 1 if edits else self._edit
+        places = np.searchsorted([at for at, _ in edits], t, side="right").tolist()
+        numbers = [max(since, 0), *(number for _, number in edits)]
+        for row, (now, joints) in enumerate(zip(t.tolist(), q.tolist(), strict=True)):
+            self.add(now, VirtualSample(now, joints, numbers[places[row]]))
+        rows = self._pose.chosen(t, q)
+        for row, X in zip(rows, self.model.forward(q[rows]) if rows else (), strict=True):
+            self.add(t[row], virtual_pose(t[row], X))
+
+    def _tell_happened(self) -> None:
+        """Write down what was noted."""
+        changed = False
+        while self._happened:
+            what, before, after = self._happened.popleft()
+            self._number += 1
+            if isinstance(what, Deed):
+                at, command_id = what.at, None if what.receipt is None else what.receipt.command_id
+                receipt = None if what.receipt is None else self._named(what.receipt)
+                entry = CommandEntry.of(self._number, at, what.command, receipt, refused=what.refused)
+                self.add(at, entry)
+                if what.receipt is not None and what.receipt.status is not Status.REJECTED:
+                    self._known[what.receipt.command_id] = what.receipt.version
+            else:
+                at, command_id = what[0].t, None
+                self.add(at, _anchor(self._number, *what, after.version))
+            if after is not before:
+                changed = True
+                self._edit += 1
+                self._add_edit(edit_entries(before, after, self._edit, at, command_id))
+        if changed:
+            self._revise()
+
+    def _add_edit(self, entries: Iterable[ChangeEntry | HistoryEntry]) -> None:
+        for entry in entries:
+            self.add(entry.at, entry)
+
+    def _revise(self) -> None:
+        """Write down receipts that later commands changed."""
+        engine = self.operator.engine
+        for command_id in list(self._known)[:-_WATCHED]:
+            del self._known[command_id]
+        for command_id, version in self._known.items():
+            receipt = engine.receipt(command_id)
+            if receipt.version != version:
+                self._known[command_id] = receipt.version
+                now = engine.now()
+                self.add(now, ReceiptEntry(now, "virtual", FullReceipt.of(self._named(receipt))))
+
+    def _named(self, receipt: Receipt) -> Receipt:
+        """A receipt whose names don't take long."""
+        if self._every:
+            return receipt
+        names = [
+            names if isinstance(names, tuple) else () for names in (receipt.shifted_names, receipt.superseded_names)
+        ]
+        return replace(receipt, shifted_names=names[0], superseded_names=names[1])
+
+    def whole(self, t: float) -> None:
+        """Write down the newest timeline once more at a time [s]: it's known then, whatever is lost of a file."""
+        if len(self._timeline) <= MOST_REPEATED:
+            for entry in whole_entries(self._timeline, self._edit, t):
+                self.add(t, entry)
+
+    def receipts(self, t: float, site: str, receipts: Sequence[Receipt]) -> None:
+        """Write down the truth about commands at a site, `virtual` or `real`, at a time [s]."""
+        for receipt in receipts:
+            self.add(t, ReceiptEntry(t, site, FullReceipt.of(self._named(receipt))))  # type: ignore[arg-type]
+
+
+def software() -> str:
+    """What writes recordings, with its version."""
+    return f"vrs-teleop {metadata.version('vrs-teleop')}"
+
+
+def edit_entries(
+    before: Timeline, after: Timeline, edit: int, at: float, command_id: int | None
+) -> tuple[ChangeEntry | HistoryEntry, ...]:
+    """An edit as it stands in a recording.
+
+    Args:
+        before: The timeline before it.
+        after: The timeline after it.
+        edit: Its number, from 1.
+        at: The engine's time [s]: nothing changed before that.
+        command_id: Who made it, if a command did.
+    """
+    change = difference(before, after, at, edit=edit, command_id=command_id)
+    if change is None or len(change.segments) > MOST_CHANGED:
+        return whole_entries(after, edit, at)
+    entry = ChangeEntry(
+        edit=edit,
+        base=change.base,
+        at=at,
+        version=after.version,
+        first=change.first,
+        dof=after.dof,
+        segments=segment_entries(change.segments),
+        tail=change.tail,
+        tail_start=change.tail_start,
+        end=change.end,
+        command_id=command_id,
+    )
+    return (entry,)
+
+
+def whole_entries(timeline: Timeline, edit: int, at: float) -> tuple[HistoryEntry, ...]:
+    """A whole timeline as it stands in a recording, in parts."""
+    total = len(timeline)
+    return tuple(
+        HistoryEntry(
+            edit=edit,
+            at=at,
+            version=timeline.version,
+            initial=timeline.initial.tolist(),
+            start=timeline.start,
+            total=total,
+            index=index,
+            segments=segment_entries(timeline.segments[index : index + PART]),
+        )
+        for index in range(0, max(total, 1), PART)
+    )
+
+
+def _anchor(number: int, correction: Correction, truth: Timeline, version: int) -> Anchor:
+    return Anchor(
+        number=number,
+        at=correction.t,
+        initial=truth.initial.tolist(),
+        start=truth.start,
+        version=truth.version,
+        segments=segment_entries(truth.segments),
+        end=correction.end,
+        error=correction.error.tolist(),
+        reason=correction.reason,
+        timeline_version=version,
+    )

@@ -1,0 +1,325 @@
+"""A recording as tables, for spreadsheets and data frames: CSV or Parquet, a file a table."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.recording.poses import quaternions
+from interfaces.recording.recording import Recording
+from interfaces.recording.track import REAL, VIRTUAL
+from vrs.errors import FormatError, InvalidValueError
+from vrs.model import Array
+
+RADIANS = "rad"
+_POSE = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""))
+_STAMPS = ("issued_at", "asked_at", "execute_at", "end")
+
+
+class Column(NamedTuple):
+    """A column of a table."""
+
+    name: str
+    """With its unit where it has one."""
+    unit: str
+    """Empty where there's none."""
+    kind: type
+    """`float`, `int`, `bool` or `str`."""
+    values: Sequence[Any]
+    """None where there's none."""
+
+
+class Table(NamedTuple):
+    """A table; its columns are of one length."""
+
+    name: str
+    columns: tuple[Column, ...]
+
+
+def tables(recording: Recording) -> tuple[Table, ...]:
+    """A recording's tables: `docs/recording.md` describes their columns.
+
+    Raises:
+        FormatError: If the recording's robot isn't known.
+    """
+    return (
+        _virtual(recording),
+        _real(recording),
+        _commands(recording),
+        _receipts(recording),
+        _segments(recording),
+        _edits(recording),
+        _packets(recording),
+        _link(recording),
+        _events(recording),
+    )
+
+
+def write_csv(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
+    """Write tables as CSV: commas, a head, floats to the last digit, nothing where there's no value.
+
+    Args:
+        found: The tables.
+        folder: Made if it's missing; files of the same names are replaced.
+
+    Returns:
+        The files.
+
+    Raises:
+        FormatError: If they can't be written.
+    """
+    return tuple(_written(folder, "csv", table, _csv) for table in found)
+
+
+def write_parquet(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
+    """Write tables as Parquet, the columns' units in their metadata; see `write_csv`.
+
+    Raises:
+        FormatError: If they can't be written.
+        InvalidValueError: If pyarrow isn't installed.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        allowed = "with pyarrow installed: pip install 'vrs-teleop[parquet]'"
+        raise InvalidValueError("--parquet", str(folder), allowed) from None
+    kinds = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
+
+    def write(path: Path, table: Table) -> None:
+        fields, arrays = [], []
+        for column in table.columns:
+            kind = kinds[column.kind]
+            fields.append(pa.field(column.name, kind, metadata={"unit": column.unit} if column.unit else None))
+            arrays.append(pa.array([_cell(value) for value in column.values], type=kind))
+        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path)
+
+    return tuple(_written(folder, "parquet", table, write) for table in found)
+
+
+def _written(folder: Path, kind: str, table: Table, write: Callable[[Path, Table], None]) -> Path:
+    path = folder / f"{table.name}.{kind}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write(path, table)
+    except OSError as error:
+        raise FormatError(str(path), f"can't be written: {error.strerror or error}") from None
+    return path
+
+
+def _csv(path: Path, table: Table) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([column.name for column in table.columns])
+        for row in zip(*(column.values for column in table.columns), strict=True):
+            writer.writerow([_text(_cell(value)) for value in row])
+
+
+def _cell(value: Any) -> Any:
+    """A value, None where it's none of a number."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _table(name: str, *columns: Column | Sequence[Column]) -> Table:
+    found: list[Column] = []
+    for column in columns:
+        found += [column] if isinstance(column, Column) else column
+    return Table(name, tuple(found))
+
+
+def _seconds(name: str, values: Sequence[float | None]) -> Column:
+    return Column(f"{name}_s", "s", float, values)
+
+
+def _joints(name: str, q: Array) -> list[Column]:
+    return [Column(f"{name}{i}_rad", RADIANS, float, column.tolist()) for i, column in enumerate(q.T, start=1)]
+
+
+def _pose(X: Array) -> list[Column]:
+    """Position and unit quaternion of poses, (k, 4, 4); NaN where they aren't known."""
+    known = np.isfinite(X).all(axis=(1, 2))
+    values = np.full((len(X), 7), np.nan)
+    values[known, :3], values[known, 3:] = X[known, :3, 3], quaternions(X[known, :3, :3])
+    return [
+        Column(name, unit, float, column.tolist()) for (name, unit), column in zip(_POSE, values.T, strict=True)
+    ]
+
+
+def _tool(recording: Recording, q: Array) -> list[Column]:
+    X = np.full((len(q), 4, 4), np.nan)
+    known = np.isfinite(q).all(axis=1)
+    if known.any():
+        X[known] = recording.model.forward(q[known])
+    return _pose(X)
+
+
+def _virtual(recording: Recording) -> Table:
+    t = recording.track(VIRTUAL).t
+    q = recording.virtual(t)
+    return _table("virtual", _seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
+
+
+def _real(recording: Recording) -> Table:
+    track = recording.track(REAL)
+    return _table(
+        "real",
+        _seconds("t", track.t.tolist()),
+        _seconds("play", track.play.tolist()),
+        _joints("q", track.q),
+        _joints("reference", track.reference),
+        _tool(recording, track.q),
+    )
+
+
+def _commands(recording: Recording) -> Table:
+    entries = recording.commands
+    receipts = [entry.receipt if isinstance(entry, CommandEntry) else None for entry in entries]
+
+    def told(name: str) -> list[Any]:
+        return [None if receipt is None else getattr(receipt, name) for receipt in receipts]
+
+    n = len(recording.session.q)
+    q = np.array([[math.nan] * n if row is None or len(row) != n else row for row in told("q")]).reshape(-1, n)
+    return _table(
+        "commands",
+        Column("number", "", int, [entry.number for entry in entries]),
+        _seconds("at", [entry.at for entry in entries]),
+        Column("command", "", str, [_kind(entry) for entry in entries]),
+        Column("command_id", "", int, told("command_id")),
+        Column("status", "", str, [None if status is None else str(status) for status in told("status")]),
+        [_seconds(name, told(name)) for name in _STAMPS],
+        _joints("q", q),
+        Column("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
+        Column("reason", "", str, [_reason(entry) for entry in entries]),
+        Column("content", "", str, [_content(entry) for entry in entries]),
+    )
+
+
+def _kind(entry: CommandEntry | Anchor) -> str:
+    if isinstance(entry, Anchor):
+        return "correction"
+    return "undo" if entry.command is None else str(entry.command.__struct_config__.tag)
+
+
+def _reason(entry: CommandEntry | Anchor) -> str:
+    if isinstance(entry, Anchor):
+        return entry.reason
+    return "" if entry.receipt is None else entry.receipt.reason
+
+
+def _content(entry: CommandEntry | Anchor) -> str | None:
+    """A command as JSON."""
+    if isinstance(entry, Anchor) or entry.command is None:
+        return None
+    return msgspec.json.encode(entry.command).decode()
+
+
+def _receipts(recording: Recording) -> Table:
+    rows = [("virtual", receipt) for receipt in recording.receipts("virtual")]
+    rows += [("real", receipt) for receipt in recording.receipts("real")]
+
+    def told(name: str) -> list[Any]:
+        return [getattr(receipt, name) for _, receipt in rows]
+
+    return _table(
+        "receipts",
+        Column("site", "", str, [site for site, _ in rows]),
+        Column("command_id", "", int, told("command_id")),
+        Column("status", "", str, [str(status) for status in told("status")]),
+        [_seconds(name, told(name)) for name in _STAMPS],
+        _seconds("shift", told("shift")),
+        Column("superseded_by", "", int, told("superseded_by")),
+        Column("undone", "", bool, told("undone")),
+        Column("reason", "", str, told("reason")),
+    )
+
+
+def _segments(recording: Recording) -> Table:
+    """The newest timeline, a row a segment and joint."""
+    rows: list[tuple[int, float, float, int | None, int, list[float]]] = []
+    for number, segment in enumerate(recording.timeline.segments):
+        for joint, powers in enumerate(segment.coefficients.T.tolist(), start=1):
+            rows.append((number, segment.start, segment.duration, segment.command_id, joint, powers))
+    most = max((len(row[-1]) for row in rows), default=1)
+    return _table(
+        "segments",
+        Column("segment", "", int, [row[0] for row in rows]),
+        _seconds("start", [row[1] for row in rows]),
+        _seconds("duration", [row[2] for row in rows]),
+        Column("command_id", "", int, [row[3] for row in rows]),
+        Column("joint", "", int, [row[4] for row in rows]),
+        [
+            Column(
+                f"c{k}_{_power(k, '_per_')}", _power(k, "/"), float, [(row[5] + [0.0] * most)[k] for row in rows]
+            )
+            for k in range(most)
+        ],
+    )
+
+
+def _power(k: int, per: str) -> str:
+    """Unit of a coefficient of a power."""
+    return RADIANS if k == 0 else f"{RADIANS}{per}s{k if k > 1 else ''}"
+
+
+def _edits(recording: Recording) -> Table:
+    edits = recording.edits
+    return _table(
+        "edits",
+        Column("edit", "", int, [edit.number for edit in edits]),
+        _seconds("at", [edit.at for edit in edits]),
+        Column("version", "", int, [edit.timeline.version for edit in edits]),
+        Column("command_id", "", int, [edit.command_id for edit in edits]),
+        _seconds("end", [edit.timeline.end for edit in edits]),
+    )
+
+
+def _packets(recording: Recording) -> Table:
+    packets = recording.packets
+    return _table(
+        "packets",
+        Column("command_id", "", int, [packet.command_id for packet in packets]),
+        Column("real_id", "", int, [packet.real_id for packet in packets]),
+        _seconds("sent", [packet.sent for packet in packets]),
+        _seconds("arrived", [packet.arrived for packet in packets]),
+        Column("lost", "", bool, [packet.lost for packet in packets]),
+    )
+
+
+def _link(recording: Recording) -> Table:
+    entries = recording.link
+    return _table(
+        "link",
+        Column("direction", "", str, [entry.direction for entry in entries]),
+        _seconds("sent", [entry.sent for entry in entries]),
+        _seconds("arrived", [entry.arrived for entry in entries]),
+        Column("lost", "", bool, [entry.lost for entry in entries]),
+        Column("attempts", "", int, [entry.attempts for entry in entries]),
+    )
+
+
+def _events(recording: Recording) -> Table:
+    events = recording.events
+    return _table(
+        "events",
+        _seconds("t", [event.t for event in events]),
+        Column("kind", "", str, [event.kind for event in events]),
+        Column("text", "", str, [event.text for event in events]),
+    )

@@ -1,0 +1,257 @@
+"""The figures of a run, from its recording alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.recording.recording import Recording
+from interfaces.recording.rerun import Rerun, rerun
+from interfaces.recording.runs import extras_of
+from interfaces.recording.track import APART, REAL, Track
+from interfaces.report.summary import Json, summarize
+from interfaces.runtime.attribution import Attribution, OffsetOutcome
+from interfaces.runtime.happenings import waits
+from interfaces.runtime.offset import ADAPTIVE
+from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.runtime.session import commands_alone
+from interfaces.teleop import Correction
+from robots.onboard.playout import PlayoutConfig
+from vrs.errors import FormatError
+from vrs.model import Array, frozen_array
+from vrs.receipt import Receipt, Status
+from vrs.timeline import Timeline
+
+MOST_ROWS = 1_000_000
+"""Rows of a run's grid, at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Figures:
+    """A run as its recording has it."""
+
+    run: TwinRun
+    attributions: tuple[Attribution, ...]
+    """Its measures split among causes; none where that wasn't recorded."""
+    offsets: tuple[OffsetOutcome, ...]
+    """What other choices of the offset made of the network."""
+    missing: tuple[str, ...]
+    """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
+
+
+def figures(recording: Recording) -> Figures:
+    """Everything that a run's summary and report are made of.
+
+    Raises:
+        FormatError: If the recording has too little of it: no model, no samples of the real robot.
+    """
+    reading = _Reading(recording)
+    run = reading.run()
+    attributions, offsets = reading.extras()
+    return Figures(run, attributions, offsets, (*reading.damage(), *reading.missing))
+
+
+def twin_run(recording: Recording) -> TwinRun:
+    """The run alone; see `figures`."""
+    return figures(recording).run
+
+
+def summary(recording: Recording) -> Json:
+    """The run's summary: of a whole recording of the laboratory the run's own, else with a list `missing`.
+
+    Raises:
+        FormatError: As `figures`.
+    """
+    found = figures(recording)
+    value = summarize(found.run, found.attributions, found.offsets)
+    return value | {"missing": list(found.missing)} if found.missing else value
+
+
+class _Reading:
+    """Puts a run together, and notes what is missing."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording, self.begin, self.end = recording, recording.session, recording.end
+        self.missing: list[str] = []
+        self._live = self.begin.driver == "live"
+
+    def damage(self) -> tuple[str, ...]:
+        """What is missing from the file."""
+        found = []
+        if self.recording.damage:
+            found.append(f"the recording is damaged: {self.recording.damage}")
+        if self.recording.dropped:
+            counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(self.recording.dropped.items()))
+            found.append(f"messages for which the disk was too slow: {counts}")
+        return tuple(found)
+
+    def extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
+        """What the recording was closed with."""
+        extras = None if self.end is None else self.end.extras
+        if extras is None:
+            if not self._live:
+                self.missing.append("what other runs say of the causes, and of other offsets")
+            return (), ()
+        return extras_of(extras, str(self.recording.path))
+
+    def run(self) -> TwinRun:
+        """The run on its even grid."""
+        recording, begin, model = self.recording, self.begin, self.recording.model
+        track = recording.track(REAL)
+        t = self._grid(track)
+        play, q_real, q_reference = self._real(track, t)
+        again = rerun(recording)
+        shown = self._shown(again)
+        corrections = self._corrections()
+        alone = self._alone() if corrections else shown
+        if not np.isfinite(q_reference).all():
+            self.missing.append("the real robot's own references: the virtual robot's timeline stands for its")
+            q_reference = np.where(np.isfinite(q_reference), q_reference, shown.sample(play))
+        receipts = again.receipts if shown is again.timeline else recording.receipts("virtual")
+        return TwinRun(
+            model=model,
+            title=begin.title,
+            seed=0 if begin.seed is None else begin.seed,
+            delay=begin.delay,
+            offset=begin.offset,
+            service=begin.service,
+            link_loss=begin.link_loss,
+            t=t,
+            play=play,
+            q_virtual=alone.sample(t),
+            q_shown=shown.sample(t),
+            q_matched=alone.sample(play),
+            q_real=q_real,
+            q_reference=q_reference,
+            receipts_virtual=receipts,
+            receipts_real=recording.receipts("real"),
+            packets=self._packets(),
+            messages=recording.messages(),
+            corrections=corrections,
+            events=self._events(t, play, q_reference),
+        )
+
+    def _grid(self, track: Track) -> Array:
+        """User times of the run [s], (k,)."""
+        step, known = self.begin.step, track.t
+        if not len(known):
+            raise FormatError(str(self.recording.path), "holds no samples of the real robot to compare with")
+        first = max(math.ceil(float(known[0]) / step - 1e-9), 0)
+        last = math.floor(float(known[-1]) / step + 1e-9)
+        if self.end is not None and not self._live:
+            last = round(self.end.t / step)
+        if last - first < 1:
+            raise FormatError(str(self.recording.path), "holds less than two samples of the real robot")
+        if last - first >= MOST_ROWS:
+            raise FormatError(str(self.recording.path), f"is longer than the {MOST_ROWS} samples that are compared")
+        t: Array = step * np.arange(first, last + 1, dtype=np.float64)
+        return t
+
+    def _real(self, track: Track, t: Array) -> tuple[Array, Array, Array]:
+        """Play time [s], (k,), measured joints and references [rad], (k, n), at times [s], (k,)."""
+        rows = len(t)
+        if np.array_equal(track.t[:rows], t):
+            return track.play[:rows], track.q[:rows], track.reference[:rows]
+        if not self._live:
+            self.missing.append("samples of the real robot: it's on lines between those that are there")
+        gaps = np.flatnonzero(np.diff(track.t) > APART)
+        if self._live and len(gaps):
+            longest = float(np.diff(track.t).max())
+            self.missing.append(
+                f"samples of the real robot, for up to {longest:.1f} s: it's on lines between the others"
+            )
+        play = np.maximum.accumulate(np.interp(t, track.t, track.play))
+        q, reference = (
+            np.stack([np.interp(t, track.t, column) for column in table.T], axis=1)
+            for table in (track.q, track.reference)
+        )
+        return play, q, reference
+
+    def _shown(self, again: Rerun) -> Timeline:
+        """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
+        if not again.missing and not again.difference:
+            return again.timeline
+        why = again.difference or again.missing
+        self.missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
+        if self.recording.certain < math.inf:
+            self.missing.append(f"edits of the virtual robot's timeline after {self.recording.certain:.3f} s")
+        return self.recording.timeline
+
+    def _corrections(self) -> tuple[Correction, ...]:
+        anchors = (entry for entry in self.recording.commands if isinstance(entry, Anchor))
+        return tuple(Correction(made.at, made.end, frozen_array(made.error), made.reason) for made in anchors)
+
+    def _taken(self) -> list[tuple[CommandEntry, Receipt | None]]:
+        """The commands that were carried out, with their receipts."""
+        found = []
+        for entry in self.recording.commands:
+            if isinstance(entry, CommandEntry):
+                receipt = None if entry.receipt is None else entry.receipt.read()
+                if receipt is None or receipt.status is not Status.REJECTED:
+                    found.append((entry, receipt))
+        return found
+
+    def _alone(self) -> Timeline:
+        """What the commands alone make of the virtual robot."""
+        sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
+        return commands_alone(self.recording.model, frozen_array(self.begin.q), sent, now=self.begin.t)
+
+    def _packets(self) -> tuple[Packet, ...]:
+        if not self._live:
+            if self.end is None:
+                self.missing.append("what became of commands that weren't answered yet")
+            return self.recording.packets
+        # The operator's site doesn't know when a command reached the robot, but when it left the emulated link.
+        messages = self.recording.messages()
+        messages = messages[np.argsort(messages[:, 0], kind="stable")]
+        known = {receipt.command_id for receipt in self.recording.receipts("real")}
+        found = []
+        for entry, receipt in self._taken():
+            if receipt is None:
+                continue
+            place = int(np.searchsorted(messages[:, 0], entry.at - 1e-9))
+            arrivals = messages[place : place + 4, 1]
+            there = arrivals[np.isfinite(arrivals)]
+            answered = receipt.command_id in known
+            found.append(
+                Packet(
+                    receipt.command_id,
+                    entry.at,
+                    float(there.min()) if answered and len(there) else None,
+                    receipt.command_id if answered else None,
+                    bool(len(arrivals) and not np.isfinite(arrivals[0])),
+                )
+            )
+        return tuple(found)
+
+    def _events(self, t: Array, play: Array, q_reference: Array) -> tuple[Event, ...]:
+        events = list(self.recording.events)
+        if self.end is None or self._live:
+            # A whole recording of the laboratory has them.
+            slew = PlayoutConfig().slew
+            if self.begin.offset in {ADAPTIVE, "the robot's own"}:
+                events += waits(t, play, q_reference, slowest=1.0 - slew)
+        return tuple(sorted(event for event in events if event.t <= t[-1]))
+
+
+def differences(first: Any, second: Any, path: str = "") -> dict[str, float]:
+    """By how much the second of two summaries' numbers is larger, by their paths; lists of equal length, too."""
+    found: dict[str, float] = {}
+    if isinstance(first, dict) and isinstance(second, dict):
+        for name in sorted(first.keys() & second.keys()):
+            found |= differences(first[name], second[name], f"{path}.{name}" if path else name)
+    elif isinstance(first, list) and isinstance(second, list) and len(first) == len(second):
+        for number, (a, b) in enumerate(zip(first, second, strict=True), start=1):
+            if isinstance(a, int | float):
+                found |= differences(a, b, f"{path}[{number}]")
+    elif _is_number(first) and _is_number(second):
+        found[path] = round(second - first, 9) + 0.0
+    return found
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

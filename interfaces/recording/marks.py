@@ -1,0 +1,228 @@
+"""What a seek bar marks: commands, what became of them, what they made of the plan, stops, corrections."""
+
+from __future__ import annotations
+
+import enum
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
+from interfaces.stream.wire.commands import MoveWire
+from vrs.commands import Motion
+from vrs.receipt import Status
+from vrs.timeline import Timeline
+
+if TYPE_CHECKING:
+    from interfaces.recording.history import RecordedEdit
+    from interfaces.recording.recording import Recording
+    from interfaces.runtime.run import Event
+
+CHANGED: Final = 1e-9
+"""A predicted position that is off by more [rad] was falsified."""
+_SAMPLES: Final = 201
+"""Times at which two plans are compared, besides the middles of their segments."""
+_SEGMENTS: Final = 256
+"""Segments whose middles are looked at, at most."""
+
+
+class MarkKind(enum.StrEnum):
+    """What a mark tells."""
+
+    COMMAND = "command"
+    """A command was accepted."""
+    POSTPONED = "postponed"
+    """A command came later than was asked for, on either robot."""
+    REJECTED = "rejected"
+    """A command was rejected, by either robot."""
+    FALSIFIED = "falsified"
+    """A command changed what had been planned: who was shown it before, saw what didn't come true."""
+    CORRECTED = "corrected"
+    """The virtual robot was put where the real one was going."""
+    STOPPED = "stopped"
+    """The real robot stopped by itself, its watchdog or a tolerance."""
+    LINK = "link"
+    """Messages were lost or late, the link came or went."""
+    OTHER = "other"
+    """A load, an end that wasn't reached."""
+
+
+OF_EVENTS: Final = {
+    "corrected": MarkKind.CORRECTED,
+    "halted": MarkKind.STOPPED,
+    "diverged": MarkKind.REJECTED,
+    "late": MarkKind.POSTPONED,
+    "lost": MarkKind.LINK,
+    "slowed": MarkKind.LINK,
+    "waited": MarkKind.LINK,
+    "up": MarkKind.LINK,
+    "down": MarkKind.LINK,
+}
+"""Kinds of events, as they are marked; all others are `OTHER`."""
+
+_OF_STATUS: Final = {
+    Status.ACCEPTED: MarkKind.COMMAND,
+    Status.POSTPONED: MarkKind.POSTPONED,
+    Status.REJECTED: MarkKind.REJECTED,
+}
+_WORDS: Final = {"via": "via point", "scale": "time scaling", "retime": "another time for a command"}
+"""What commands are called where the word of the wire isn't plain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something that happened at a time."""
+
+    t: float
+    """When, on the recording's timeline [s]."""
+    kind: MarkKind
+    text: str
+    """What happened, one line."""
+    span: tuple[float, float] | None = None
+    """What part of the timeline it's about [s], if it's about one."""
+    command_id: int | None = None
+
+
+class MarkReader:
+    """The marks of a recording, by time; read on as it grows, and a bounded number of steps at a time."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._marks: list[Mark] = []
+        self._times: list[float] = []
+        self._told: list[Mark] = []
+        self._happened: list[Mark] = []
+        self._commands = self._edits = self._events = 0
+        self.version = 0
+        """Counts up whenever there are more marks."""
+
+    @property
+    def marks(self) -> Sequence[Mark]:
+        """Those that were read so far; not to be changed."""
+        return self._marks
+
+    def read(self, most: int | None = None) -> bool:
+        """Read on.
+
+        Args:
+            most: Most commands and edits to look at; None for all there are.
+
+        Returns:
+            Whether there is more to read.
+        """
+        recording, found = self._recording, list[Mark]()
+        commands, edits, events = recording.commands, recording.edits, recording.events
+        left = len(commands) + len(edits) if most is None else most
+        for entry in commands[self._commands : self._commands + left]:
+            found += _told(entry)
+            self._commands += 1
+            left -= 1
+        while left > 0 and self._edits < len(edits):
+            edit = edits[self._edits]
+            if self._edits:
+                found += _changed(edits[self._edits - 1], edit)
+            self._edits += 1
+            left -= 1
+        # Events may be written long after they happened: those that are there may not be the first ones.
+        if len(events) != self._events:
+            self._events = len(events)
+            self._happened = [mark for event in events for mark in _happened(event)]
+        elif not found:
+            return self._commands < len(commands) or self._edits < len(edits)
+        self._told += found
+        self._marks = sorted((*self._told, *self._happened), key=lambda mark: mark.t)
+        self._times = [mark.t for mark in self._marks]
+        self.version += 1
+        return self._commands < len(commands) or self._edits < len(edits)
+
+    def passed(self, since: float, until: float) -> Sequence[Mark]:
+        """The marks after one place, up to another [s], in that order: backwards where that's earlier."""
+        if until >= since:
+            return self._marks[bisect_right(self._times, since) : bisect_right(self._times, until)]
+        return self._marks[bisect_left(self._times, until) : bisect_left(self._times, since)][::-1]
+
+    def latest(self, t: float) -> Mark | None:
+        """The newest mark at a time [s]; None before the first."""
+        count = bisect_right(self._times, t)
+        return self._marks[count - 1] if count else None
+
+    def beside(self, t: float, *, back: bool) -> Mark | None:
+        """The next mark after a time [s], or the last one before it; None where there's none."""
+        index = bisect_left(self._times, t - 1e-6) - 1 if back else bisect_right(self._times, t + 1e-6)
+        return self._marks[index] if 0 <= index < len(self._marks) else None
+
+
+def falsified(before: Timeline, after: Timeline, at: float) -> tuple[float, float] | None:
+    """What an edit changed of what had been planned.
+
+    Args:
+        before: The plan before it.
+        after: The plan that it made.
+        at: When it was made [s].
+
+    Returns:
+        From when to when [s] the positions of both differ, before the end of the first; None if they don't.
+    """
+    low, high = max(at, before.start), before.end
+    if not low < high:
+        return None
+    times = [np.linspace(low, high, _SAMPLES)]
+    for timeline in (before, after):
+        first = max(timeline.index_at(low), 0)
+        starts, _ = timeline.knots(first, min(first + _SEGMENTS, len(timeline)))
+        times.append(0.5 * (starts[1:] + starts[:-1]))
+    t = np.unique(np.concatenate(times))
+    t = t[(t >= low) & (t <= high)]
+    differs = np.flatnonzero(np.abs(before.sample(t) - after.sample(t)).max(axis=1) > CHANGED)
+    if not len(differs):
+        return None
+    return float(t[max(differs[0] - 1, 0)]), float(t[differs[-1]])
+
+
+def _changed(before: RecordedEdit, edit: RecordedEdit) -> Iterator[Mark]:
+    """The mark of an edit, where it changed what had been planned."""
+    span = falsified(before.timeline, edit.timeline, edit.at)
+    if span is not None:
+        who = "a correction" if edit.command_id is None else f"command {edit.command_id}"
+        text = f"{who} changed what was planned from {span[0]:.2f} s to {span[1]:.2f} s"
+        yield Mark(edit.at, MarkKind.FALSIFIED, text, span, edit.command_id)
+
+
+def _happened(event: Event) -> Iterator[Mark]:
+    """The mark of an event; corrections are among the commands, exactly."""
+    kind = OF_EVENTS.get(event.kind, MarkKind.OTHER)
+    if kind is not MarkKind.CORRECTED:
+        yield Mark(event.t, kind, event.text)
+
+
+def _told(entry: CommandEntry | Anchor) -> Iterator[Mark]:
+    """The mark of a command, or of what put the virtual robot elsewhere."""
+    if isinstance(entry, Anchor):
+        joint = int(np.abs(entry.error).argmax())
+        off = float(np.degrees(abs(entry.error[joint])))
+        where = f"joint {joint + 1} was {off:.3g}° off"
+        text = f"the virtual robot joined the real one's plan until {entry.end:.2f} s ({where}): {entry.reason}"
+        yield Mark(entry.at, MarkKind.CORRECTED, text, (entry.at, entry.end))
+    elif entry.receipt is not None:
+        receipt = entry.receipt
+        start, end = receipt.execute_at, receipt.end
+        span = None if start is None or end is None else (start, end)
+        yield Mark(entry.at, _OF_STATUS[receipt.status], _described(entry, receipt), span, receipt.command_id)
+
+
+def _described(entry: CommandEntry, receipt: FullReceipt) -> str:
+    """A command and what became of it at first, in a line."""
+    command = entry.command
+    if command is None:
+        return f"command {receipt.command_id} was taken back"
+    tag = str(type(command).__struct_config__.tag)
+    straight = isinstance(command, MoveWire) and command.motion is Motion.LINE
+    text = (
+        f"command {receipt.command_id} ({'straight line' if straight else _WORDS.get(tag, tag)}): {receipt.status}"
+    )
+    if receipt.execute_at is not None and receipt.end is not None:
+        text += f", {receipt.execute_at:.2f} s to {receipt.end:.2f} s"
+    return f"{text}: {receipt.reason}" if receipt.reason else text

@@ -1,0 +1,337 @@
+"""What stands in a recording, one structure a kind of message; `docs/recording.md` is the reference.
+
+Times are seconds of the user's timeline, exact floats. What is None is left out of the file. Which topic a kind
+belongs to stands in `interfaces.recording.channels`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from msgspec import Meta
+
+from interfaces.stream.wire.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.stream.wire.fields import (
+    MOST_JOINTS,
+    CommandId,
+    Count,
+    Finite,
+    Joints,
+    Number,
+    Seconds,
+    Stamp,
+    Text,
+    Time,
+    Wire,
+    Word,
+    numbers,
+    text,
+)
+from interfaces.stream.wire.segments import MOST_POWERS
+from vrs.commands import Command
+from vrs.errors import InvalidValueError
+from vrs.model import Array, frozen_array
+from vrs.receipt import Receipt
+from vrs.segment import PolynomialSegment, known_segment
+from vrs.timeline import Timeline
+
+FORMAT = "vrs-recording/1"
+"""Name and version of what the messages mean."""
+
+_Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
+_Names = tuple[Number, ...]
+Site: TypeAlias = Literal["virtual", "real"]
+
+
+class Entry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
+    """A message of a channel that has several kinds."""
+
+
+class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_only=True):
+    """How the run was set up; repeated now and then, so that no damage makes a recording nameless."""
+
+    format: Literal["vrs-recording/1"] = FORMAT  # type: ignore[assignment]
+    t: Time
+    """Where the recording begins [s]."""
+    robot: Word
+    """As in `robots.<name>`."""
+    driver: Literal["laboratory", "live"]
+    title: Text
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] | None = None
+    """Of everything random in the run; None where nothing is."""
+    delay: Word
+    """Delay profile, as it was asked for."""
+    offset: Word
+    """`adaptive`, or `fixed:S`."""
+    service: Word
+    link_loss: Word
+    step: Seconds
+    """Between two samples [s]."""
+    q: Joints
+    """Joints of both robots at the start [rad]."""
+    lateness: Word
+    software: Word
+    """What wrote the file, with its version."""
+    began: Stamp | None = None
+    """Seconds since 1970; None in the laboratory, where the same seed gives the same bytes."""
+
+    @classmethod
+    def new(cls, **fields: Any) -> Begin:
+        """A beginning that says its format; see the class for the fields."""
+        return cls(**fields)
+
+
+class Drop(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Messages of a topic for which there was no room."""
+
+    topic: Word
+    count: Count
+
+
+class Dropped(Entry, frozen=True, omit_defaults=True, gc=False, tag="dropped"):
+    """How many messages weren't recorded since the beginning, because the disk took no more."""
+
+    t: Time
+    counts: tuple[Drop, ...]
+
+
+class End(Entry, frozen=True, omit_defaults=True, gc=False, tag="end"):
+    """The recording was closed in order."""
+
+    t: Time
+    extras: dict[str, Any] | None = None
+    """What the run's summary holds besides what can be computed from the recording."""
+
+
+class FullReceipt(ReceiptWire, frozen=True, omit_defaults=True, gc=False):
+    """A receipt that names every command it shifted or superseded."""
+
+    shifted: _Names = ()
+    superseded: _Names = ()
+
+    @classmethod
+    def of(cls, receipt: Receipt) -> FullReceipt:
+        """The form in the file."""
+        return cls(
+            command_id=receipt.command_id,
+            status=receipt.status,
+            issued_at=receipt.issued_at,
+            asked_at=receipt.asked_at,
+            execute_at=receipt.execute_at,
+            end=receipt.end,
+            q=None if receipt.q is None else numbers(receipt.q),
+            reason=text(receipt.reason),
+            version=receipt.version,
+            shift=receipt.shift,
+            superseded_by=receipt.superseded_by,
+            undone=receipt.undone,
+            shifted=receipt.shifted,
+            superseded=receipt.superseded,
+        )
+
+
+class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="command"):
+    """A command as the operator's engine took it, rejected ones too."""
+
+    number: Number
+    """Counts commands and anchors, from 1."""
+    at: Time
+    """The engine's clock, exactly [s]."""
+    command: CommandWire | None = None
+    """None takes back the newest accepted command."""
+    receipt: FullReceipt | None = None
+    """None where the command gives none."""
+    refused: bool = False
+    """Whether the site refused it before the engine saw it."""
+
+    @classmethod
+    def of(
+        cls, number: int, at: float, command: Command | None, receipt: Receipt | None, *, refused: bool = False
+    ) -> CommandEntry:
+        """The entry of a command."""
+        given = None if receipt is None else FullReceipt.of(receipt)
+        return cls(number, at, command_wire(command, packed=False), given, refused)
+
+    def read(self) -> Command | None:
+        """The command; None takes back the newest.
+
+        Raises:
+            InvalidValueError: If it's none.
+        """
+        command: Command | None = None if self.command is None else self.command.read()
+        return command
+
+
+class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """A segment: a row of `dof` numbers a power, ascending, one row after the other."""
+
+    duration: Seconds
+    coefficients: _Numbers
+    command_id: CommandId | None = None
+    start: Time | None = None
+    """[s]; None where the segment before ends."""
+
+
+class Anchor(Entry, frozen=True, omit_defaults=True, gc=False, tag="anchor", kw_only=True):
+    """The virtual robot joined the real one's plan, because the two had parted."""
+
+    number: Number
+    at: Time
+    initial: Joints
+    start: Time
+    version: Count
+    segments: tuple[SegmentEntry, ...] = ()
+    end: Time
+    """Until when it takes to come back [s]."""
+    error: Joints
+    """By how much the virtual robot was off [rad], (n,)."""
+    reason: Text
+    timeline_version: Count | None = None
+    """Version of the operator's timeline afterwards."""
+
+    @property
+    def truth(self) -> Timeline:
+        """The real robot's plan that was joined.
+
+        Raises:
+            InvalidValueError: If it's none.
+        """
+        segments = segments_of(len(self.initial), self.start, self.segments)
+        return Timeline(self.initial, self.start, segments, self.version)
+
+
+class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receipt"):
+    """The newest truth about a command at one of the sites."""
+
+    t: Time
+    site: Site
+    receipt: FullReceipt
+
+
+class PacketEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
+    """A command on its way across the link, as `interfaces.runtime.run.Packet`."""
+
+    number: Number
+    """Place in the order of sending, from 1."""
+    command_id: Number
+    sent: Time
+    arrived: Time | None = None
+    real_id: Number | None = None
+    lost: bool = False
+
+
+class HistoryEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="history", kw_only=True):
+    """A part of the whole timeline with an edit, as the virtual robot shows it."""
+
+    edit: Count
+    at: Time
+    """The engine's clock when the timeline was that [s]."""
+    version: Count
+    initial: Joints
+    """Before the start of the timeline [rad]."""
+    start: Time
+    """Origin of the timeline [s]."""
+    total: Count
+    """Segments of the whole."""
+    index: Count
+    """Number of the first segment of this part, from 0."""
+    segments: tuple[SegmentEntry, ...] = ()
+
+
+class ChangeEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="change", kw_only=True):
+    """An edit of the timeline, as `interfaces.messages.Change`."""
+
+    edit: Number
+    base: Count
+    at: Time
+    """The engine's clock, exactly [s]."""
+    version: Count
+    """Of the timeline afterwards."""
+    first: Count
+    dof: Count
+    segments: tuple[SegmentEntry, ...] = ()
+    tail: Count | None = None
+    tail_start: Time
+    end: Time
+    command_id: CommandId | None = None
+
+
+class VirtualSample(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Joints of the virtual robot as it's shown: a comfort for other readers, ours compute them."""
+
+    t: Time
+    q: Joints
+    edit: Count
+    """Number of the newest edit."""
+
+
+class RealSample(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Joints of the real robot as measured."""
+
+    t: Time
+    play: Time
+    """Where its timeline is played [s]."""
+    q: Joints
+    reference: Joints | None = None
+    """What its own timeline asked for; None where that isn't known."""
+
+
+class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """A packet of the link whose fate is known."""
+
+    direction: Literal["forward", "backward"]
+    sent: Time
+    arrived: Time | None = None
+    lost: bool = False
+    attempts: Count = 1
+
+
+class EventEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Something that happened, as `interfaces.runtime.run.Event`."""
+
+    t: Time
+    kind: Word
+    text: Text
+
+
+def segment_entries(segments: Sequence[PolynomialSegment]) -> tuple[SegmentEntry, ...]:
+    """Segments for the file; the first one's start is always given."""
+    end: float | None = None
+    found = []
+    for segment in segments:
+        start = None if segment.start == end else segment.start
+        coefficients: list[float] = segment.coefficients.ravel().tolist()
+        found.append(SegmentEntry(segment.duration, coefficients, segment.command_id, start))
+        end = segment.start + segment.duration
+    return tuple(found)
+
+
+def segments_of(dof: int, start: float, entries: Sequence[SegmentEntry]) -> tuple[PolynomialSegment, ...]:
+    """The segments that entries stand for.
+
+    Args:
+        dof: Joints.
+        start: Start of the first where it doesn't say so itself [s].
+        entries: As they stand in the file.
+
+    Raises:
+        InvalidValueError: If the coefficients don't fit the joints.
+    """
+    found = []
+    for entry in entries:
+        start = start if entry.start is None else entry.start
+        count = len(entry.coefficients)
+        if not dof or count % dof or count > dof * MOST_POWERS:
+            raise InvalidValueError("coefficients", f"{count} numbers", f"1 to {MOST_POWERS} rows of {dof}")
+        a: Array = np.array(entry.coefficients).reshape(-1, dof)
+        a.flags.writeable = False
+        found.append(known_segment(start, entry.duration, a, entry.command_id))
+        start += entry.duration
+    return tuple(found)
+
+
+def joints(values: list[float]) -> Array:
+    """A read-only array of a message's joints."""
+    return frozen_array(values)

@@ -1,0 +1,315 @@
+"""The page `/replay`: a thin shell round a `Playback`, whose one play head all open pages show and move."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final, TypeAlias
+
+import msgspec
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+
+from interfaces.playhead import Mode
+from interfaces.recording.marks import Mark, MarkKind
+from interfaces.recording.playback import Moment, Playback, Track
+from interfaces.stream.meshcat import MeshcatScene
+from interfaces.stream.meshcat.newest import Newest
+from interfaces.stream.meshcat.page import HEADERS, files
+from interfaces.stream.meshcat.viewers import Viewers
+from vrs.clock import Clock
+from vrs.errors import VrsError
+
+SHOW: Final = 1.0 / 60.0
+"""Time between two frames [s]."""
+IDLE: Final = 0.1
+"""Time between two looks at the files while nobody watches [s]."""
+TOLD: Final = 1.0 / 30.0
+"""Time between two read-outs [s]."""
+MARKED: Final = 0.5
+"""Time between two looks at marks that are new [s]."""
+MOST_HEARD: Final = 900
+"""Messages that a page may send in 10 s."""
+CELLS: Final = 480
+"""Places on the seek bar: marks of one kind at one place are shown as one."""
+TEXTS: Final = 3
+"""Lines of what is shown as one."""
+
+
+class _Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do"):
+    """What a page asks for."""
+
+
+class _Play(_Wish, frozen=True, tag="play"):
+    rate: float | None = None
+
+
+class _Pause(_Wish, frozen=True, tag="pause"):
+    pass
+
+
+class _Toggle(_Wish, frozen=True, tag="toggle"):
+    pass
+
+
+class _Rate(_Wish, frozen=True, tag="rate"):
+    rate: float
+
+
+class _Step(_Wish, frozen=True, tag="step"):
+    by: float
+
+
+class _Seek(_Wish, frozen=True, tag="seek"):
+    t: float
+
+
+class _Skip(_Wish, frozen=True, tag="skip"):
+    by: float
+
+
+class _Loop(_Wish, frozen=True, tag="loop"):
+    start: float
+    end: float
+
+
+class _Unloop(_Wish, frozen=True, tag="unloop"):
+    pass
+
+
+class _Live(_Wish, frozen=True, tag="live"):
+    pass
+
+
+class _ToMark(_Wish, frozen=True, tag="mark"):
+    back: bool = False
+
+
+_Any: TypeAlias = _Play | _Pause | _Toggle | _Rate | _Step | _Seek | _Skip | _Loop | _Unloop | _Live | _ToMark
+_decoder = msgspec.json.Decoder(_Any)
+
+
+class ReplayPage:
+    """Serves a play-back to browsers. All pages share the head: who watches together sees the same moment."""
+
+    def __init__(
+        self,
+        playback: Playback,
+        clock: Clock,
+        *,
+        admit: Callable[[HTTPConnection], bool] | None = None,
+        authorize: Callable[[str | None], bool] | None = None,
+        first: Callable[[float], None] | None = None,
+    ) -> None:
+        """Make the scenes.
+
+        Args:
+            playback: What is played.
+            clock: The user's.
+            admit: See `Viewers`.
+            authorize: See `Viewers`.
+            first: Called with the user's time [s] when the first page is there.
+        """
+        self.playback, self._clock, self._first = playback, clock, first
+        self.scenes = tuple(MeshcatScene(track.recording.model) for track in playback.tracks)
+        self.board = Newest(b'{"kind":"begin"}')
+        """What pages are told: JSON by key."""
+        self._told = float("-inf")
+        self._marked = float("-inf")
+        self._versions: list[tuple[int, tuple[float, float]] | None] = [None] * len(playback.tracks)
+        self._put("recordings", {"kind": "recordings", "items": _recordings(playback)})
+        self._routes: list[BaseRoute] = [
+            Route("/", _to_page),
+            *files("replay", "interfaces.recording", ("seekbar.js", "controls.js")),
+            WebSocketRoute(
+                "/replay/board",
+                Viewers(self.board, admit, authorize, hear=self.hear, most_heard=MOST_HEARD).serve,
+            ),
+            *(
+                WebSocketRoute(f"/replay/scene/{index}", Viewers(scene, admit, authorize).serve)
+                for index, scene in enumerate(self.scenes)
+            ),
+        ]
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """What it answers."""
+        return self._routes
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[ReplayPage]:
+        """Play for those who look."""
+        task = asyncio.create_task(self._run())
+        try:
+            yield self
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    async def _run(self) -> None:
+        while True:
+            self.turn(now=self._clock.now())
+            await asyncio.sleep(SHOW if self.board.readers else IDLE)
+
+    def turn(self, *, now: float) -> None:
+        """Show what is to be shown now [s]."""
+        if self._first is not None and self.board.readers:
+            first, self._first = self._first, None
+            first(now)
+        moment = self.playback.advance(now=now)
+        if not self.board.readers:
+            return
+        for scene, track, frame in zip(self.scenes, self.playback.tracks, moment.frames, strict=True):
+            links = track.recording.model.links
+            real = None if frame.q_real is None else links(frame.q_real)
+            # Where nobody knows where it was, it stays where it was last seen; the page says so.
+            if frame.q_virtual is not None:
+                scene.show(virtual=links(frame.q_virtual), real=real, path=track.committed(frame), now=now)
+        if now >= self._told + TOLD:
+            self._told = now
+            self._tell(moment, now)
+
+    def _tell(self, moment: Moment, now: float) -> None:
+        before = self.board.version
+        if now >= self._marked + MARKED:
+            self._marked = now
+            self._tell_marks()
+        self._put("state", _state(self.playback, moment))
+        if self.board.version != before:
+            self.board.wake()
+
+    def _tell_marks(self) -> None:
+        self._put("recordings", {"kind": "recordings", "items": _recordings(self.playback)})
+        for index, track in enumerate(self.playback.tracks):
+            key = track.marks.version, self.playback.span
+            if self._versions[index] != key:
+                self._versions[index] = key
+                self._put(f"marks {index}", {"kind": "marks", "index": index, "marks": grouped(track, *key[1])})
+
+    def _put(self, key: str, value: dict[str, Any]) -> None:
+        self.board.put(key, json.dumps(value, allow_nan=False, separators=(",", ":")).encode())
+
+    def hear(self, text: str) -> str:
+        """Do what a page asks for; why it isn't done, empty if it is."""
+        try:
+            self._do(_decoder.decode(text), self._clock.now())
+        except msgspec.MsgspecError:
+            return json.dumps({"kind": "refused", "text": "this isn't a wish that is known here"})
+        except VrsError as error:
+            return json.dumps({"kind": "refused", "text": str(error)})
+        return ""
+
+    def _do(self, wish: _Any, now: float) -> None:
+        playback = self.playback
+        match wish:
+            case _Play(rate):
+                playback.play(now=now, rate=rate)
+            case _Pause():
+                playback.pause(now=now)
+            case _Toggle():
+                (playback.play if playback.mode is Mode.PAUSED else playback.pause)(now=now)
+            case _Rate(rate):
+                playback.set_rate(rate, now=now)
+                if playback.mode is not Mode.PAUSED:
+                    playback.play(now=now)
+            case _Step(by):
+                playback.step(by, now=now)
+            case _Seek(t):
+                playback.seek(t, now=now)
+            case _Skip(by):
+                playback.seek(playback.place(now=now) + by, now=now)
+            case _Loop(start, end):
+                playback.set_loop(start, end, now=now)
+            case _Unloop():
+                playback.clear_loop(now=now)
+            case _Live():
+                playback.go_live(now=now)
+            case _ToMark(back):
+                playback.seek_mark(back=back, now=now)
+        self._told = float("-inf")
+
+
+def grouped(track: Track, start: float, end: float) -> list[dict[str, Any]]:
+    """The marks of a recording for a seek bar: those of one kind that are too near are one.
+
+    Args:
+        track: The recording.
+        start: Left end of the bar [s].
+        end: Its right end [s].
+    """
+    cell = max(end - start, 1e-9) / CELLS
+    groups: dict[tuple[MarkKind, int], list[Mark]] = {}
+    for mark in track.marks.marks:
+        groups.setdefault((mark.kind, int((mark.t + track.shift - start) / cell)), []).append(mark)
+    return [_group(marks, track.shift) for marks in groups.values()]
+
+
+def _group(marks: Sequence[Mark], shift: float) -> dict[str, Any]:
+    first = marks[0]
+    texts = [f"{mark.t:.2f} s  {mark.text}" for mark in marks[:TEXTS]]
+    if len(marks) > TEXTS:
+        texts.append(f"and {len(marks) - TEXTS} more until {marks[-1].t:.2f} s")
+    facts: dict[str, Any] = {"t": first.t + shift, "kind": str(first.kind), "texts": texts}
+    if first.span is not None:
+        facts["span"] = [first.span[0] + shift, max(mark.span[1] for mark in marks if mark.span) + shift]
+    return facts
+
+
+def _recordings(playback: Playback) -> list[dict[str, Any]]:
+    """What there is; files of one name are told apart by their directories."""
+    tracks = playback.tracks
+    names = [track.recording.path.name for track in tracks]
+    if len(set(names)) < len(names):
+        names = ["/".join(track.recording.path.absolute().parts[-2:]) for track in tracks]
+    return [_recording(track, name, playback.growing) for track, name in zip(tracks, names, strict=True)]
+
+
+def _recording(track: Track, name: str, growing: bool) -> dict[str, Any]:
+    recording = track.recording
+    session = recording.session
+    # A file that is being written isn't cut.
+    damage = replace(recording.damage, cut=recording.damage.cut and not growing)
+    return {
+        "name": name,
+        "title": session.title,
+        "robot": session.robot,
+        "driver": session.driver,
+        "delay": session.delay,
+        "damage": "; ".join(filter(None, (str(damage) if damage else "", track.problem))),
+        "shift": track.shift,
+    }
+
+
+def _state(playback: Playback, moment: Moment) -> dict[str, Any]:
+    head = playback.head
+    panes = []
+    for track, frame in zip(playback.tracks, moment.frames, strict=True):
+        latest = track.marks.latest(frame.t)
+        panes.append(
+            {
+                "t": round(frame.t, 6),
+                "virtual": frame.q_virtual is not None,
+                "real": frame.q_real is not None,
+                "error": None if frame.error is None else round(frame.error, 7),
+                "behind": None if frame.behind is None else round(frame.behind, 4),
+                "mark": None if latest is None else {"t": latest.t, "kind": latest.kind, "text": latest.text},
+            }
+        )
+    return {
+        "kind": "state",
+        "t": round(moment.t, 6),
+        "mode": str(head.mode),
+        "rate": head.rate,
+        "span": list(playback.span),
+        "loop": None if head.loop is None else list(head.loop),
+        "growing": playback.growing,
+        "panes": panes,
+    }
+
+
+async def _to_page(request: Request) -> Response:  # noqa: ARG001 - Starlette gives it
+    return RedirectResponse("/replay", headers=HEADERS)

@@ -1,0 +1,160 @@
+"""Poses and links of the robots as Foxglove's messages, rounded: derived from the joints, for other readers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from interfaces.stream.wire.fields import Wire
+from vrs.model import Array
+
+BASE = "base"
+"""Frame of both robots' bases."""
+POSE_DIGITS = 9
+"""Decimal places of a pose's numbers [m, quaternion]."""
+LINK_DIGITS = 6
+"""Decimal places of a link's numbers [m, quaternion]."""
+POSE_RATE = 6.0
+"""Poses of each robot a second, at most; one a second when it stands."""
+LINK_RATE = 6.0
+"""Messages with links a second, at most; one a second when both robots stand."""
+_NANO = 10**9
+
+
+class Timestamp(Wire, frozen=True, gc=False):
+    """Foxglove's time; of the user's timeline, not negative."""
+
+    sec: int
+    nsec: int
+
+
+class Vector3(Wire, frozen=True, gc=False):
+    """Foxglove's vector [m]."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(Wire, frozen=True, gc=False):
+    """Foxglove's quaternion."""
+
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+class Pose(Wire, frozen=True, gc=False):
+    """`foxglove.Pose`."""
+
+    position: Vector3
+    orientation: Quaternion
+
+
+class PoseInFrame(Wire, frozen=True, gc=False):
+    """`foxglove.PoseInFrame`."""
+
+    timestamp: Timestamp
+    frame_id: str
+    pose: Pose
+
+
+class VirtualPose(PoseInFrame, frozen=True, gc=False):
+    """Of the virtual robot's last link."""
+
+
+class RealPose(PoseInFrame, frozen=True, gc=False):
+    """Of the real robot's last link."""
+
+
+class FrameTransform(Wire, frozen=True, gc=False):
+    """`foxglove.FrameTransform`."""
+
+    timestamp: Timestamp
+    parent_frame_id: str
+    child_frame_id: str
+    translation: Vector3
+    rotation: Quaternion
+
+
+class FrameTransforms(Wire, frozen=True, gc=False):
+    """`foxglove.FrameTransforms`."""
+
+    transforms: tuple[FrameTransform, ...]
+
+
+def nanoseconds(t: float) -> int:
+    """A time [s] as MCAP's: whole nanoseconds, from 0."""
+    return max(0, round(t * 1e9))
+
+
+def timestamp(t: float) -> Timestamp:
+    """A time [s] as Foxglove's."""
+    return Timestamp(*divmod(nanoseconds(t), _NANO))
+
+
+def virtual_pose(t: float, X: Array) -> VirtualPose:
+    """The pose of the virtual robot's last link in the base frame, X (4, 4), at a time [s]."""
+    return VirtualPose(timestamp(t), BASE, _pose(X))
+
+
+def real_pose(t: float, X: Array) -> RealPose:
+    """The pose of the real robot's last link in the base frame, X (4, 4), at a time [s]."""
+    return RealPose(timestamp(t), BASE, _pose(X))
+
+
+def _pose(X: Array) -> Pose:
+    (row,) = _rows(X[None], POSE_DIGITS)
+    return Pose(Vector3(*row[:3]), Quaternion(*row[3:]))
+
+
+def link_transforms(t: float, robots: Sequence[tuple[str, Array]]) -> FrameTransforms:
+    """Each robot's links, each relative to the one before.
+
+    Args:
+        t: When [s].
+        robots: Name of each robot and the poses of its links in the base frame, (m, 4, 4); its frames are called
+            `NAME/1` to `NAME/m`, and the first one's parent is the base.
+    """
+    stamp, found = timestamp(t), []
+    for name, X_BL in robots:
+        X_PL = X_BL.copy()
+        R = X_BL[:-1, :3, :3].transpose(0, 2, 1)
+        X_PL[1:, :3, :3] = R @ X_BL[1:, :3, :3]
+        X_PL[1:, :3, 3] = (R @ (X_BL[1:, :3, 3] - X_BL[:-1, :3, 3])[:, :, None])[:, :, 0]
+        parent = BASE
+        for number, row in enumerate(_rows(X_PL, LINK_DIGITS), 1):
+            child = f"{name}/{number}"
+            found.append(FrameTransform(stamp, parent, child, Vector3(*row[:3]), Quaternion(*row[3:])))
+            parent = child
+    return FrameTransforms(tuple(found))
+
+
+def _rows(X: Array, digits: int) -> list[list[float]]:
+    """Translations and quaternions (x, y, z, w) of poses, (m, 4, 4), rounded."""
+    found = np.empty((len(X), 7))
+    found[:, :3] = X[:, :3, 3]
+    found[:, 3:] = quaternions(X[:, :3, :3])
+    rows: list[list[float]] = (found.round(digits) + 0.0).tolist()
+    return rows
+
+
+def quaternions(R: Array) -> Array:
+    """Unit quaternions (x, y, z, w), (m, 4), w ≥ 0, of rotation matrices, (m, 3, 3)."""
+    # By the largest component, which keeps full precision at every angle.
+    x, y, z = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    q = np.empty((len(R), 4, 4))
+    q[:, 0, 0], q[:, 1, 1], q[:, 2, 2], q[:, 3, 3] = 1 + x - y - z, 1 - x + y - z, 1 - x - y + z, 1 + x + y + z
+    q[:, 0, 1] = q[:, 1, 0] = R[:, 1, 0] + R[:, 0, 1]
+    q[:, 0, 2] = q[:, 2, 0] = R[:, 0, 2] + R[:, 2, 0]
+    q[:, 1, 2] = q[:, 2, 1] = R[:, 2, 1] + R[:, 1, 2]
+    q[:, 0, 3] = q[:, 3, 0] = R[:, 2, 1] - R[:, 1, 2]
+    q[:, 1, 3] = q[:, 3, 1] = R[:, 0, 2] - R[:, 2, 0]
+    q[:, 2, 3] = q[:, 3, 2] = R[:, 1, 0] - R[:, 0, 1]
+    largest = q[:, range(4), range(4)].argmax(1)
+    best: Array = q[range(len(R)), largest]
+    best /= np.sqrt((best * best).sum(1))[:, None]
+    best[best[:, 3] < 0] *= -1.0
+    return best

@@ -1,0 +1,326 @@
+"""Recordings as they're read."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from interfaces.recording.damage import Damage
+from interfaces.recording.history import Chain, RecordedEdit
+from interfaces.recording.log import Log
+from interfaces.recording.messages import (
+    Anchor,
+    Begin,
+    ChangeEntry,
+    CommandEntry,
+    Dropped,
+    End,
+    EventEntry,
+    HistoryEntry,
+    LinkEntry,
+    PacketEntry,
+    ReceiptEntry,
+)
+from interfaces.recording.scan import NUMBERS, Blocks
+from interfaces.recording.source import Source
+from interfaces.recording.track import REAL, VIRTUAL, Track, Tracks
+from interfaces.runtime.run import Event, Packet
+from vrs.errors import FormatError
+from vrs.model import Array, RobotModel, frozen_array
+from vrs.receipt import Receipt
+from vrs.segment import times
+from vrs.timeline import Timeline
+
+
+def _puma560() -> RobotModel:
+    from robots import puma560
+
+    return puma560.model()
+
+
+MODELS: Final[dict[str, Callable[[], RobotModel]]] = {"puma560": _puma560}
+"""Robots that recordings may be of."""
+
+
+def open_recording(path: Path | str) -> Recording:
+    """Open a recording, complete, cut, damaged or still being written.
+
+    Raises:
+        FormatError: If it's none, or if what it begins with is destroyed.
+    """
+    return Recording(Path(path))
+
+
+class Recording:
+    """One recording: the virtual robot is computed, the real one lies on lines between its samples.
+
+    What is missing stands in `damage`; nothing is made up for it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """See `open_recording`."""
+        self.path = path
+        self._source = Source(path)
+        try:
+            self._blocks = Blocks(self._source)
+            self._logs = {topic: Log(self._blocks, topic, str(path)) for topic in NUMBERS}
+            self._end: End | None = None
+            begin = self._session()
+            if begin is None:
+                raise FormatError(str(path), "isn't a recording, or the block that it begins with is destroyed")
+            self.session: Begin = begin
+            """How the run was set up."""
+            self._tracks = Tracks(self._blocks, len(begin.q), str(path))
+            self._chain, self._applied = Chain(str(path)), 0
+            self._model: RobotModel | None = None
+        except FormatError:
+            self._source.close()
+            raise
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._source.close()
+
+    def _session(self) -> Begin | None:
+        """Whether the recording has ended; the first beginning that's readable."""
+        held = self._blocks.having(NUMBERS["/session"])
+        if held and not self._end:
+            ends = [entry for entry in self._logs["/session"].of(held[-1]) if isinstance(entry, End)]
+            if ends:
+                self._end = ends[-1]
+                self._blocks.ended()
+        for index in held:
+            for entry in self._logs["/session"].of(index):
+                if isinstance(entry, Begin):
+                    return entry
+        return None
+
+    def poll(self) -> bool:
+        """Look whether a file that is still being written has grown.
+
+        Raises:
+            FormatError: If what has come is none of a recording's.
+        """
+        if self._blocks.complete:
+            return False
+        grown = self._blocks.grow()
+        if grown:
+            self._session()
+        return grown
+
+    @property
+    def end(self) -> End | None:
+        """What it was closed with; None where it's cut."""
+        return self._end
+
+    @property
+    def damage(self) -> Damage:
+        """What is missing; of a file above 256 MiB only blocks that were read are looked at."""
+        return self._blocks.damage()
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """Messages that weren't recorded because the disk was too slow, by topic."""
+        found: dict[str, int] = {}
+        for entry in self._logs["/session"].entries():
+            if isinstance(entry, Dropped):
+                for drop in entry.counts:
+                    found[drop.topic] = max(drop.count, found.get(drop.topic, 0))
+        return found
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot.
+
+        Raises:
+            FormatError: If it's none that is known here, or has other joints.
+        """
+        if self._model is None:
+            made = MODELS.get(self.session.robot)
+            model = None if made is None else made()
+            if model is None or model.limits.dof != len(self.session.q):
+                raise FormatError(str(self.path), f"of a robot that isn't known here: {self.session.robot!r}")
+            self._model = model
+        return self._model
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """From the beginning to the last sample [s]."""
+        start, last = self.session.t, self.session.t
+        for topic in (VIRTUAL, REAL):
+            for index in reversed(self._blocks.having(NUMBERS[topic])):
+                first, end = self._blocks.span(index)
+                track = self._tracks.between(topic, first * 1e-9 - 1e-6, end * 1e-9 + 1e-6)
+                if len(track.t):
+                    last = max(last, float(track.t[-1]))
+                    break
+        return start, last
+
+    @property
+    def commands(self) -> tuple[CommandEntry | Anchor, ...]:
+        """What the operator's engine was told, in order; numbers are missing where blocks are."""
+        return tuple(entry for entry in self._commands() if isinstance(entry, CommandEntry | Anchor))
+
+    def receipts(self, site: Literal["virtual", "real"]) -> tuple[Receipt, ...]:
+        """The newest truth about each command at a site, by command id."""
+        found = {}
+        for entry in self._commands():
+            if isinstance(entry, ReceiptEntry):
+                if entry.site == site:
+                    found[entry.receipt.command_id] = entry.receipt
+            elif isinstance(entry, CommandEntry) and site == "virtual" and entry.receipt is not None:
+                found[entry.receipt.command_id] = entry.receipt
+        return tuple(found[command_id].read() for command_id in sorted(found))
+
+    @property
+    def packets(self) -> tuple[Packet, ...]:
+        """Commands on their way across the link, in the order of sending; what is newest about each."""
+        found = {entry.number: entry for entry in self._commands() if isinstance(entry, PacketEntry)}
+        return tuple(Packet(e.command_id, e.sent, e.arrived, e.real_id, e.lost) for _, e in sorted(found.items()))
+
+    def _commands(self) -> list[CommandEntry | Anchor | ReceiptEntry | PacketEntry]:
+        return self._logs["/commands"].entries()
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What else happened, by time."""
+        entries: list[EventEntry] = self._logs["/events"].entries()
+        return tuple(Event(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
+
+    @property
+    def changes(self) -> tuple[HistoryEntry | ChangeEntry, ...]:
+        """The messages about the timeline, as they stand in the file."""
+        return tuple(self._logs["/timeline"].entries())
+
+    @property
+    def edits(self) -> tuple[RecordedEdit, ...]:
+        """The timelines that the virtual robot had, one after the other.
+
+        Raises:
+            FormatError: If an edit doesn't fit the timeline before it.
+        """
+        return tuple(self._edits())
+
+    def _edits(self) -> list[RecordedEdit]:
+        entries = self._logs["/timeline"].entries()
+        while self._applied < len(entries):
+            self._chain.add(entries[self._applied])
+            self._applied += 1
+        return self._chain.edits
+
+    @property
+    def timeline(self) -> Timeline:
+        """The newest that is known.
+
+        Raises:
+            FormatError: If none is.
+        """
+        return self._known()[-1].timeline
+
+    def _known(self) -> list[RecordedEdit]:
+        edits = self._edits()
+        if not edits:
+            raise FormatError(str(self.path), "the block with the timeline is destroyed")
+        return edits
+
+    def timeline_at(self, t: float) -> Timeline:
+        """The timeline as it was known at a user time [s]: what came later isn't in it.
+
+        Raises:
+            FormatError: If none is known.
+        """
+        edits = self._known()
+        return edits[max(bisect_right(self._chain.times, t) - 1, 0)].timeline
+
+    @property
+    def certain(self) -> float:
+        """Up to this time the newest timeline is what the virtual robot did [s]; infinity if complete."""
+        edits = self._edits()
+        if not edits:
+            return -math.inf
+        newest, lost = edits[-1], self._blocks.lost(NUMBERS["/timeline"])
+        spans = [(first * 1e-9, last * 1e-9) for first, last in lost if last * 1e-9 > newest.at]
+        if self._chain.broken:
+            return max(newest.at, spans[0][0]) if spans else newest.at
+        for first, last in spans:
+            after = self._tracks.between(VIRTUAL, last, last + 2.0)
+            if not len(after.t) or after.edit[0] != newest.number:
+                return max(newest.at, first)
+        return math.inf
+
+    def virtual(self, t: ArrayLike) -> Array:
+        """Joints of the virtual robot, computed from the newest timeline.
+
+        Args:
+            t: User time [s], scalar or (k,).
+
+        Returns:
+            [rad], (n,) or (k, n); NaN where a lost edit may have changed it.
+
+        Raises:
+            NonFiniteTimeError: If t holds NaN or infinity.
+        """
+        moments = times(t)
+        found: Array = self.timeline.sample(moments).copy()
+        found[np.asarray(moments) > self.certain + 1e-9] = np.nan
+        return found
+
+    def real(self, t: ArrayLike) -> Array:
+        """Joints of the real robot as measured, on lines between the samples.
+
+        Args:
+            t: User time [s], scalar or (k,).
+
+        Returns:
+            [rad], (n,) or (k, n); NaN outside of the samples, and where some are lost.
+
+        Raises:
+            NonFiniteTimeError: If t holds NaN or infinity.
+        """
+        return self._at(t, "q")
+
+    def play(self, t: ArrayLike) -> Array:
+        """Where the real robot played its timeline [s]; see `real`."""
+        return self._at(t, "play")
+
+    def _at(self, t: ArrayLike, column: str) -> Array:
+        moments = times(t)
+        found = self._tracks.at(REAL, np.atleast_1d(moments), column)
+        return found if moments.ndim else found[0]
+
+    def track(self, topic: str, since: float = -math.inf, until: float = math.inf) -> Track:
+        """The samples of a robot, both ends included [s]; only blocks that are needed are read.
+
+        Raises:
+            InvalidValueError: If the topic is neither `/virtual/joints` nor `/real/joints`.
+        """
+        return self._tracks.between(topic, since, until)
+
+    def messages(self) -> Array:
+        """When packets to the robot were sent and arrived [s], (m, 2), in the order of the file; NaN: lost."""
+        rows = [
+            (entry.sent, np.nan if entry.arrived is None else entry.arrived)
+            for entry in self.link
+            if entry.direction == "forward"
+        ]
+        return frozen_array(np.array(rows).reshape(-1, 2))
+
+    @property
+    def link(self) -> tuple[LinkEntry, ...]:
+        """Packets of the link whose fate was known, both ways, in the order of the file."""
+        return tuple(self._logs["/link"].entries())

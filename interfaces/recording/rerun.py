@@ -1,0 +1,185 @@
+"""The recorded commands once more, on a fresh engine: whether they make the very same timeline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from interfaces.recording.capture import edit_entries
+from interfaces.recording.messages import Anchor, ChangeEntry, CommandEntry, FullReceipt, HistoryEntry
+from vrs.clock import ManualClock
+from vrs.commands import Lateness
+from vrs.engine import Engine
+from vrs.errors import FormatError, VrsError
+from vrs.receipt import Receipt
+from vrs.timeline import Timeline
+
+if TYPE_CHECKING:
+    from interfaces.recording.recording import Recording
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rerun:
+    """What became of recorded commands on a fresh engine."""
+
+    identical: bool
+    """Whether every timeline and receipt that could be compared is the same to the last digit."""
+    commands: int
+    """Commands and corrections that were run again."""
+    versions: int
+    """Timelines that were compared."""
+    difference: str
+    """The first that differs; empty where none does."""
+    missing: str
+    """Why some couldn't be run or compared; empty where all could."""
+    timeline: Timeline
+    """What they made."""
+    receipts: tuple[Receipt, ...]
+    """The newest truth about each command."""
+
+
+def rerun(recording: Recording) -> Rerun:
+    """Run the recorded commands again, up to the first that's missing or that makes something else.
+
+    Raises:
+        FormatError: If the recording is of a robot that isn't known, or holds no commands that can be.
+    """
+    begin = recording.session
+    try:
+        clock = ManualClock(begin.t)
+        engine = Engine(recording.model, q=begin.q, clock=clock, lateness=Lateness(begin.lateness))
+    except ValueError as error:
+        raise FormatError(str(recording.path), f"its beginning: {error}") from None
+    again = _Again(engine, clock, recording.changes)
+    for entry in recording.commands:
+        if entry.number != again.commands + 1:
+            some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
+                f"commands {again.commands + 1} to {entry.number - 1} are"
+            )  # fmt: skip
+            again.missing = f"{some} missing: what follows can't be run again"
+            break
+        again.run(entry)
+        if again.difference:
+            break
+    else:
+        again.finish()
+    return Rerun(
+        not again.difference,
+        again.commands,
+        again.versions,
+        again.difference,
+        again.missing,
+        engine.timeline,
+        engine.receipts,
+    )
+
+
+class _Again:
+    """Runs entries in turn, and compares."""
+
+    def __init__(self, engine: Engine, clock: ManualClock, changes: Sequence[HistoryEntry | ChangeEntry]) -> None:
+        self._engine, self._clock = engine, clock
+        self._recorded: dict[int, list[HistoryEntry | ChangeEntry]] = {}
+        for change in changes:
+            self._recorded.setdefault(change.edit, []).append(change)
+        first = self._recorded.pop(0, [])
+        self.commands = self.versions = self._edit = 0
+        self.difference = self.missing = ""
+        if first and first[0].version != engine.timeline.version:
+            self.difference = "the recording begins with a timeline that commands before it had made"
+        self._unseen: list[int] = []
+
+    def run(self, entry: CommandEntry | Anchor) -> None:
+        """Run one entry, and compare what it makes."""
+        self.commands += 1
+        engine, before = self._engine, self._engine.timeline
+        try:
+            self._clock.set(max(entry.at, self._clock.now()))
+            if isinstance(entry, Anchor):
+                made = engine.anchor(entry.truth)
+                same = (made.end, made.error.tolist()) == (entry.end, list(entry.error))
+                command_id, problem = None, "" if same else "joins the real robot's plan otherwise"
+            else:
+                receipt = self._carry_out(entry)
+                command_id = None if receipt is None else receipt.command_id
+                problem = _unlike(receipt, entry.receipt)
+        except (VrsError, ValueError) as error:
+            self.difference = f"{_named(entry)} can't be carried out: {error}"
+            return
+        if problem:
+            self.difference = f"{_named(entry)} {problem}"
+        elif engine.timeline is not before:
+            self._edit += 1
+            self._compare(edit_entries(before, engine.timeline, self._edit, entry.at, command_id), entry)
+
+    def _carry_out(self, entry: CommandEntry) -> Receipt | None:
+        command = entry.read()
+        if entry.refused and command is not None:
+            return self._engine.refuse(command, "" if entry.receipt is None else entry.receipt.reason)
+        if command is None:
+            return self._engine.undo()
+        answer: object = self._engine.execute(command)  # type: ignore[arg-type]
+        return answer if isinstance(answer, Receipt) else None
+
+    def _compare(self, made: tuple[ChangeEntry | HistoryEntry, ...], entry: CommandEntry | Anchor) -> None:
+        recorded = self._recorded.pop(self._edit, None)
+        if recorded is None:
+            self._unseen.append(self._edit)
+            return
+        self.versions += 1
+        # The newest timeline stands in the file once more, as a whole.
+        for mine, theirs in zip(made, recorded, strict=False):
+            if mine != theirs:
+                self.difference = f"{_named(entry)} makes another timeline: {_first(mine, theirs)}"
+                return
+        if len(made) > len(recorded):
+            self.difference = f"{_named(entry)} makes another timeline: {len(made)} parts, not {len(recorded)}"
+
+    def finish(self) -> None:
+        """All entries were run."""
+        if self._unseen:
+            self.missing = f"{len(self._unseen)} edits aren't in the recording, from edit {self._unseen[0]} on"
+        elif self._recorded:
+            self.missing = f"what made edit {min(self._recorded)} isn't in the recording"
+
+
+def _named(entry: CommandEntry | Anchor) -> str:
+    if isinstance(entry, Anchor):
+        return f"the correction at {entry.at:.6f} s"
+    if entry.command is None:
+        return f"the undo at {entry.at:.6f} s"
+    given = "" if entry.receipt is None else f" {entry.receipt.command_id}"
+    return f"command{given} at {entry.at:.6f} s"
+
+
+def _unlike(made: Receipt | None, recorded: FullReceipt | None) -> str:
+    """How a receipt differs from the recorded one, names of others aside; empty where it doesn't."""
+    if made is None or recorded is None:
+        return "" if made is None and recorded is None else "has a receipt in one of the runs alone"
+    mine = FullReceipt.of(made)
+    for name in mine.__struct_fields__:
+        a, b = getattr(mine, name), getattr(recorded, name)
+        if name not in {"shifted", "superseded"} and a != b:
+            return f"is answered with {name} {a!r}, not {b!r}"
+    return ""
+
+
+def _first(mine: msgspec.Struct, theirs: msgspec.Struct) -> str:
+    """Where two messages first differ."""
+    if type(mine) is not type(theirs):
+        return "it begins elsewhere"
+    for name in mine.__struct_fields__:
+        a, b = getattr(mine, name), getattr(theirs, name)
+        if a == b:
+            continue
+        if name != "segments":
+            return f"{name} {a!r}, not {b!r}"
+        if len(a) != len(b):
+            return f"{len(a)} new segments, not {len(b)}"
+        for number, (segment, other) in enumerate(zip(a, b, strict=True)):
+            if segment != other:
+                return f"of new segment {number}, {_first(segment, other)}"
+    return "nothing"

@@ -1,0 +1,150 @@
+"""Samples of a robot's joints: read where they're needed, linear between neighbours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from interfaces.recording.log import DECODING, unreadable
+from interfaces.recording.messages import RealSample, VirtualSample
+from interfaces.recording.scan import NUMBERS, Blocks
+from vrs.errors import FormatError, InvalidValueError
+from vrs.model import Array, frozen_array
+
+APART = 0.2
+"""Neighbours that are further apart [s] say nothing of what was between them."""
+AROUND = 1.5
+"""Samples from so long before and after one moment are kept for the next [s]."""
+VIRTUAL, REAL = "/virtual/joints", "/real/joints"
+_DECODERS: dict[str, msgspec.json.Decoder[Any]] = {
+    VIRTUAL: msgspec.json.Decoder(list[VirtualSample]),
+    REAL: msgspec.json.Decoder(list[RealSample]),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Samples, ascending in time; arrays of m rows, read-only."""
+
+    t: Array
+    """User time [s], (m,)."""
+    q: Array
+    """Joints [rad], (m, n)."""
+    play: Array
+    """Play time [s], (m,); of the virtual robot the user's."""
+    reference: Array
+    """What the real robot's own timeline asked for [rad], (m, n); NaN where that isn't known."""
+    edit: Array
+    """Number of the virtual robot's newest edit, (m,); 0 of the real one."""
+    block: Array
+    """Which block of the file a sample stands in, (m,)."""
+
+
+class Tracks:
+    """The samples of both robots in a file."""
+
+    def __init__(self, blocks: Blocks, dof: int, where: str) -> None:
+        self._blocks, self._dof, self._where = blocks, dof, where
+        self._near: dict[str, tuple[float, float, int, Track]] = {}
+
+    def between(self, topic: str, since: float, until: float) -> Track:
+        """The samples of a time, both ends included [s].
+
+        Raises:
+            InvalidValueError: If the topic has none.
+            FormatError: If a sample is none.
+        """
+        if topic not in (VIRTUAL, REAL):
+            raise InvalidValueError("topic", topic, f"{VIRTUAL} or {REAL}")
+        number, found, places = NUMBERS[topic], [], []
+        for index in self._blocks.having(number, since * 1e9 - 1, until * 1e9 + 1):
+            data = b"[" + b",".join(self._blocks.read(index, number)) + b"]"
+            try:
+                samples = _DECODERS[topic].decode(data)
+            except DECODING as error:
+                raise unreadable(self._where, number, error) from None
+            found += samples
+            places += [index] * len(samples)
+        return self._track(found, places, since, until)
+
+    def _track(self, samples: list[Any], places: list[int], since: float, until: float) -> Track:
+        n, unknown = self._dof, [math.nan] * self._dof
+        if any(len(sample.q) != n for sample in samples):
+            raise FormatError(self._where, f"a sample that hasn't {n} joints")
+        real = bool(samples) and isinstance(samples[0], RealSample)
+        t: Array = np.array([sample.t for sample in samples])
+        q: Array = np.array([sample.q for sample in samples]).reshape(-1, n)
+        play, edit, reference = t, np.zeros(len(t)), np.full_like(q, math.nan)
+        if real:
+            play = np.array([sample.play for sample in samples])
+            references = [sample.reference for sample in samples]
+            if any(row is not None and len(row) != n for row in references):
+                raise FormatError(self._where, f"a reference that hasn't {n} joints")
+            reference = np.array([unknown if row is None else row for row in references]).reshape(-1, n)
+        else:
+            edit = np.array([float(sample.edit) for sample in samples])
+        kept = np.argsort(t, kind="stable")
+        kept = kept[(t[kept] >= since) & (t[kept] <= until)]
+        if len(kept) > 1:
+            kept = kept[np.append(np.diff(t[kept]) > 0, True)]
+        return Track(*(frozen_array(column[kept]) for column in (t, q, play, reference, edit, np.array(places))))
+
+    def at(self, topic: str, t: Array, column: str) -> Array:
+        """Values at times, linear between neighbours.
+
+        Args:
+            topic: The robot's.
+            t: User time [s], (k,), finite.
+            column: `q`, `play` or `reference`.
+
+        Returns:
+            (k, n), or (k,) of the play time; NaN where nothing is known.
+        """
+        shape = (len(t),) if column == "play" else (len(t), self._dof)
+        found: Array = np.full(shape, np.nan)
+        order = np.argsort(t, kind="stable")
+        cuts = np.flatnonzero(np.diff(t[order]) > 2 * AROUND) + 1
+        for part in np.split(order, cuts):
+            if len(part):
+                track = self._around(topic, float(t[part[0]]), float(t[part[-1]]))
+                found[part] = self._interpolated(topic, track, t[part], column)
+        return found
+
+    def _around(self, topic: str, first: float, last: float) -> Track:
+        known = self._near.get(topic)
+        if (
+            known is not None
+            and known[2] == len(self._blocks)
+            and known[0] <= first - APART
+            and last + APART <= known[1]
+        ):
+            return known[3]
+        since, until = first - AROUND, last + AROUND
+        track = self.between(topic, since, until)
+        self._near[topic] = since, until, len(self._blocks), track
+        return track
+
+    def _interpolated(self, topic: str, track: Track, t: Array, column: str) -> Array:
+        values: Array = getattr(track, column)
+        found: Array = np.full((len(t), *values.shape[1:]), np.nan)
+        if not len(track.t):
+            return found
+        right = np.searchsorted(track.t, t, side="left")
+        exact = (right < len(track.t)) & (track.t[np.minimum(right, len(track.t) - 1)] == t)
+        found[exact] = values[right[exact]]
+        inside = ~exact & (right > 0) & (right < len(track.t))
+        right = right[inside]
+        low, high = track.t[right - 1], track.t[right]
+        share = (t[inside] - low) / (high - low)
+        breaks = self._blocks.breaks(NUMBERS[topic])
+        before, after = track.block[right - 1], track.block[right]
+        whole = np.searchsorted(breaks, before, "right") == np.searchsorted(breaks, after, "left")
+        known = (high - low <= APART) & whole
+        if values.ndim > 1:
+            share, known = share[:, None], known[:, None]
+        found[inside] = np.where(known, values[right - 1] + share * (values[right] - values[right - 1]), np.nan)
+        return found

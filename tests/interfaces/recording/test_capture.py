@@ -1,0 +1,198 @@
+"""What's written while something runs: in step with it, whole, and without disturbing it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from interfaces.link import delay_profile
+from interfaces.recording.capture import Paced
+from interfaces.recording.messages import HistoryEntry
+from interfaces.recording.recording import open_recording
+from interfaces.recording.rerun import rerun
+from interfaces.recording.runs import RunRecorder
+from interfaces.recording.track import REAL, VIRTUAL
+from interfaces.report.summary import summarize, to_json
+from interfaces.runtime.bodies import exact_arm
+from interfaces.runtime.virtual import run_twins
+from interfaces.teleop import OperatorSite
+from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
+from vrs import JointTarget, MotionCommand, Status
+from vrs.commands import ParameterChange, PositionQuery, Retime, ScaleTime
+from vrs.errors import UnknownCommandError
+
+
+class Heard:
+    """A listener that remembers."""
+
+    def __init__(self, site):
+        self.deeds, self.corrections, self.answers, self.reports = [], [], [], []
+        site.listener = self
+
+    def commanded(self, deed):
+        self.deeds.append(deed)
+
+    def corrected(self, correction, truth):
+        self.corrections.append((correction, truth))
+
+    def answered(self, command_id, receipt, *, now):
+        self.answers.append((command_id, receipt, now))
+
+    def reported(self, report, *, now):
+        self.reports.append((report, now))
+
+
+def test_a_site_tells_every_command_once_with_the_time_and_the_receipt():
+    site = OperatorSite(MODEL, NOMINAL, now=0.0)
+    heard = Heard(site)
+    move = MotionCommand(JointTarget(NOMINAL + 0.1))
+    far = MotionCommand(JointTarget(NOMINAL + 99.0))
+    limits = ParameterChange("lateness", "reject")
+    taken_ = site.execute(move, now=0.125)
+    rejected = site.execute(far, now=0.25)
+    site.execute(limits, now=0.25)
+    undone = site.undo(now=0.3)
+    assert [(d.at, d.command, d.receipt, d.refused) for d in heard.deeds] == [
+        (0.125, move, taken_, False), (0.25, far, rejected, False), (0.25, limits, None, False),
+        (0.3, None, undone, False),
+    ]  # fmt: skip
+    assert rejected.status is Status.REJECTED
+    site.execute(PositionQuery(0.0), now=0.4)
+    with pytest.raises(UnknownCommandError):
+        site.execute(Retime(77, 1.0), now=0.4)
+    assert len(heard.deeds) == 4
+    site.halted = "it stands in the way"
+    refused = site.execute(move, now=0.5)
+    assert site.undo(now=0.5) is None
+    assert heard.deeds[4:] == [(0.5, move, refused, True)]
+    assert "it stands in the way" in refused.reason
+
+
+def test_a_site_tells_corrections_answers_and_reports(tmp_path):
+    made = Sitting(tmp_path / "run.mcap", 0)
+    heard = Heard(made.site)
+    made.tell(MotionCommand(JointTarget(NOMINAL + 0.2)))
+    made.clock = 0.2
+    made.report()
+    ((correction, truth),) = heard.corrections
+    assert correction is made.site.corrections[0]
+    assert made.site.engine.timeline.sample(correction.end + 0.1) == pytest.approx(
+        truth.sample(correction.end + 0.1), abs=1e-9
+    )
+    assert [now for _, now in heard.reports] == [0.2]
+    made.writer.abandon()
+
+
+def test_a_run_is_in_the_file_while_it_goes_on(tmp_path):
+    path, known = tmp_path / "run.mcap", []
+
+    def look(t):
+        copy = shutil.copy(path, tmp_path / "copy.mcap")
+        with open_recording(copy) as recording:
+            assert recording.end is None
+            known.append((t, recording.span[1], len(recording.commands), recording.edits[-1].timeline))
+
+    run = taken(path, progress=look)
+    assert len(known) > 10
+    assert all(t - 0.5 <= until <= t for t, until, _, _ in known[1:])
+    assert [commands for t, _, commands, _ in known if 1.0 < t <= 1.5] == [3]
+    assert known[-1][2] == len(run.receipts_virtual)
+    with open_recording(path) as recording:
+        assert recording.end is not None
+        assert not recording.damage
+
+
+def test_samples_of_both_robots_are_the_runs_rows(tmp_path):
+    run = taken(tmp_path / "run.mcap", "mon")
+    with open_recording(tmp_path / "run.mcap") as recording:
+        real, virtual = recording.track(REAL), recording.track(VIRTUAL)
+        rows = len(run.t)
+        for name, rowed in (("q", run.q_real), ("reference", run.q_reference), ("play", run.play), ("t", run.t)):
+            assert (getattr(real, name)[:rows] == rowed).all()
+        assert (virtual.t[:rows] == run.t).all()
+        assert np.abs(virtual.q[:rows] - run.q_shown).max() < 1e-12
+        # The number of the newest edit stands beside each.
+        for edit in recording.edits[1:]:
+            assert (virtual.edit[virtual.t < edit.at] < edit.number).all()
+            assert (virtual.edit[virtual.t >= edit.at] >= edit.number).all()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+@pytest.mark.parametrize("full", ["/dev/full", "{tmp}/no/such/folder/run.mcap"])
+def test_a_disk_that_takes_nothing_ends_the_recording_and_not_the_run(tmp_path, full):
+    recorder = RunRecorder(Path(full.format(tmp=tmp_path)))
+    run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
+    recorder.finish()
+    assert recorder.problem.startswith("recording failed: ")
+    assert to_json(summarize(run)) == to_json(summarize(taken(tmp_path / "run.mcap")))
+
+
+def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path, monkeypatch):
+    from interfaces.recording import sink
+
+    class Small:
+        def __init__(self, path):
+            self.file, self.room = path.open("wb", buffering=0), 30_000
+
+        def write(self, data):
+            some = bytes(data)[: min(self.room, 1000)]
+            self.room -= len(some)
+            return self.file.write(some)
+
+        def close(self):
+            self.file.close()
+
+    monkeypatch.setattr(sink.Sink, "create", classmethod(lambda cls, path: cls(Small(path), str(path))))
+    recorder = RunRecorder(tmp_path / "run.mcap")
+    run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
+    recorder.finish()
+    assert "takes no more after 30000 bytes" in recorder.problem
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert recording.damage.cut
+        track = recording.track(REAL)
+        assert 10 < len(track.t) < len(run.t)
+        assert (track.q == run.q_real[: len(track.t)]).all()
+
+
+def test_what_moves_is_shown_at_a_rate_and_what_stands_once_a_second():
+    shown = Paced(10.0)
+    t = np.arange(0.0, 4.0, 0.02)
+    q = np.where(t[:, None] < 2.0, 0.1 * t[:, None], 0.2) * np.ones(6)
+    rows = shown.chosen(t[:50], q[:50])
+    rows += [50 + row for row in shown.chosen(t[50:], q[50:])]
+    times = t[rows]
+    assert times[times < 2.0] == pytest.approx(np.arange(0.0, 2.0, 0.1))
+    assert np.diff(times[times > 2.05]) == pytest.approx(1.0)
+    assert len(times[times > 2.05]) == 1 or np.diff(times).max() <= 1.0 + 1e-9
+
+
+def test_an_edit_of_very_many_segments_is_written_as_the_whole_timeline(tmp_path, monkeypatch):
+    monkeypatch.setattr("interfaces.recording.capture.MOST_CHANGED", 20)
+    monkeypatch.setattr("interfaces.recording.capture.PART", 16)
+    made = Sitting(tmp_path / "run.mcap", 1)
+    for k in range(10):
+        made.tell(MotionCommand(JointTarget(NOMINAL + 0.1 * (k % 3)), execute_at=1.0 + k))
+    made.tell(ScaleTime(0.5, execute_at=0.5))
+    made.tell(MotionCommand(JointTarget(NOMINAL)))
+    made.end()
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert len([c for c in recording.changes if isinstance(c, HistoryEntry) and c.edit == 11]) > 1
+        assert recording.edits[11].timeline == made.timelines[11]
+        assert recording.timeline == made.site.engine.timeline
+        again = rerun(recording)
+        assert (again.identical, again.missing, again.versions) == (True, "", 12)
+
+
+def test_many_commands_between_two_turns_are_all_written(tmp_path):
+    made = Sitting(tmp_path / "run.mcap", 1)
+    for k in range(1100):
+        made.clock = 0.001 * k
+        made.tell(MotionCommand(JointTarget(NOMINAL + 0.01 * (k % 7)), execute_at=10.0 + 0.5 * k))
+    made.end()
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert [entry.number for entry in recording.commands] == list(range(1, 1101))
+        assert len(recording.edits) == 1101
+        assert recording.timeline == made.site.engine.timeline
