@@ -108,6 +108,8 @@ def serve(
     options = ["--offset", behind, "--link-loss", policy, "--body", body, "--max-age", f"{max_age:g}"]
     recording = None
     if record is not None:
+        if record.is_file():
+            raise InvalidValueError("record", str(record), "a file that isn't there yet: none is written over")
         # Before a robot is started.
         Sink.create(record).close()
         options += ["--reports", f"{RATE:g}"]

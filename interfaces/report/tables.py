@@ -94,6 +94,10 @@ MEASURES = {
 }
 
 
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
 def time_lines(summary: Json) -> list[str]:
     """Time difference, path error and what became of the commands, a sentence each."""
     path, commands, behind = summary["path"], summary["commands"], summary["behind"]
@@ -101,15 +105,15 @@ def time_lines(summary: Json) -> list[str]:
     control = "a robot that stands has no lag" if lag is None else f"its joints lag another {_seconds(lag)}"
     lines = [
         f"Network: the robot played {_seconds(behind['mean_s'])} behind the operator on average, at most "
-        f"{_seconds(behind['max_s'])} (offset {summary['offset']}); it slowed down {behind['slowed']} times and "
-        f"waited {behind['waited']} times. Control: {control}.",
+        f"{_seconds(behind['max_s'])} (offset {summary['offset']}); it slowed down {_times(behind['slowed'])} and "
+        f"waited {_times(behind['waited'])}. Control: {control}.",
         f"Time difference along the tool path: mean {_seconds(path['time_difference_mean'])}, "
         f"sd {_seconds(path['time_difference_sd'])}, max {_seconds(path['time_difference_max'])}.",
         f"Tool path error: mean {_millimetres(path['path_error_mean'])}, "
         f"95 % {_millimetres(path['path_error_p95'])}, max {_millimetres(path['path_error_max'])}.",
         f"Commands at the virtual robot: {_counts(commands['virtual'])}; at the real one: "
         f"{_counts(commands['real'])}; {commands['sent']} sent, {commands['lost']} lost, "
-        f"{commands['late']} late; the virtual robot was corrected {commands['corrections']} times.",
+        f"{commands['late']} late; the virtual robot was corrected {_times(commands['corrections'])}.",
     ]
     if path["progress"] is not None and path["progress"] < 0.97:
         lines.append(

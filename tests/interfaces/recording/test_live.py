@@ -173,3 +173,11 @@ def test_a_file_that_cannot_be_made_is_one_line(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "recording failed" in said.splitlines()[-1]
     assert "Traceback" not in said
+
+
+def test_a_recording_is_not_written_over(tmp_path, capsys):
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"an earlier one")
+    assert _status(["serve", "--port", "0", "--record", str(path)]) == 2
+    assert "none is written over" in capsys.readouterr().err
+    assert path.read_bytes() == b"an earlier one"
