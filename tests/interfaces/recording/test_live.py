@@ -158,7 +158,8 @@ def test_vrs_serve_records(tmp_path, capsys):
         assert health["problem"] is None
     assert _status(["compare", str(path), "--json"]) == 0
     value = json.loads(capsys.readouterr().out)
-    assert value["commands"]["real"]["accepted"] >= 1
+    # How far behind the robot is to be isn't known yet: the first command may be late.
+    assert value["commands"]["real"]["accepted"] + value["commands"]["real"]["postponed"] >= 1
     with open_recording(path) as recording:
         assert rerun(recording).identical
         assert not recording.damage
