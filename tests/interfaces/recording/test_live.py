@@ -58,6 +58,8 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             site.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
             site.undo(now=clock.now())
             await until(lambda: set(site.receipts) >= {1, 3, 4})
+            await until(lambda: len({report.measured_at for report in reports}) > 30)
+            # What came last is waited for to be written.
             await asyncio.sleep(0.5)
             health = live.health()["recording"]
             assert (health["file"], health["dropped"], health["problem"]) == (str(path), 0, None)
