@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.moves import MODEL
-from interfaces.changes import difference
 from interfaces.recording import RecordingWriter
 from interfaces.recording import messages as m
+from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose, virtual_pose
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
@@ -58,7 +58,7 @@ def ticks(seconds: float, seed: int = 0) -> Iterator[Tick]:
     for k in range(round(seconds * RATE) + 1):
         t = k / RATE
         clock.set(t)
-        others = [_history(engine, 0)] if k == 0 else []
+        others = [*whole_entries(engine.timeline, 0, t)] if k == 0 else []
         if k % round(EVERY * RATE) == 0:
             number += 1
             others += _command(engine, number, t, rng)
@@ -70,7 +70,7 @@ def ticks(seconds: float, seed: int = 0) -> Iterator[Tick]:
         measured = reference + 1e-4 * rng.normal(size=len(reference))
         moving = bool(engine.timeline.sample(t, derivative=1).any())
         if k == round(seconds * RATE):
-            others.append(_history(engine, number))
+            others += whole_entries(engine.timeline, number, t)
         yield Tick(t, number, engine.joints(t), play, measured, reference, moving, others)
 
 
@@ -99,31 +99,16 @@ class Teller:
         return found
 
 
-def _history(engine: Engine, number: int) -> m.HistoryEntry:
-    timeline = engine.timeline
-    segments = m.segment_entries(timeline.segments)
-    return m.HistoryEntry(
-        edit=number, at=engine.now(), version=timeline.version, initial=timeline.initial.tolist(),
-        start=timeline.start, total=len(segments), index=0, segments=segments,
-    )  # fmt: skip
-
-
 def _command(engine: Engine, number: int, t: float, rng: np.random.Generator) -> list[Message]:
     before = engine.timeline
     command = MotionCommand(JointTarget(_target(engine.joints(t), rng)), execute_at=t)
     receipt = engine.execute(command)
-    change = difference(before, engine.timeline, t, edit=number, command_id=receipt.command_id)
-    assert change is not None
     return [
         m.CommandEntry.of(number, t, command, receipt),
-        m.ChangeEntry(
-            edit=number, base=number - 1, at=t, version=engine.timeline.version, first=change.first, dof=6,
-            segments=m.segment_entries(change.segments), tail=change.tail, tail_start=change.tail_start,
-            end=change.end, command_id=receipt.command_id,
-        ),
+        *edit_entries(before, engine.timeline, number, t, receipt.command_id),
         m.ReceiptEntry(t, "real", m.FullReceipt.of(receipt)),
         m.PacketEntry(number, number, t, t + BEHIND, number),
-    ]  # fmt: skip
+    ]
 
 
 def _target(q: Array, rng: np.random.Generator) -> Array:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import version
+from interfaces.software import software
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _alone(files: Path) -> None:
 
     model = puma560.model()
     engine = Engine(model, q=model.poses["nominal"], clock=ManualClock(0.0))
-    _converse(arm_for(engine), Free(), WallClock(), files, f"{version()}, a virtual {model.name} alone")
+    _converse(arm_for(engine), Free(), WallClock(), files, f"{software()}, a virtual {model.name} alone")
 
 
 def _connected(url: str, token_file: Path | None, files: Path) -> None:
@@ -85,7 +85,7 @@ def _connected(url: str, token_file: Path | None, files: Path) -> None:
     token = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
     with connect(url, token=token, name="vrs console") as connection:
         _converse(
-            arm_for(connection), LeaseControl(connection), connection, files, f"{version()}, connected to {url}"
+            arm_for(connection), LeaseControl(connection), connection, files, f"{software()}, connected to {url}"
         )
 
 

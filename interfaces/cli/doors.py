@@ -9,7 +9,6 @@ import signal
 import socket
 import sys
 from collections.abc import Iterable
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -29,11 +28,6 @@ TokenFile: TypeAlias = Annotated[
     typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
 ]
 """What lets other machines in: see `access_for`."""
-
-
-def version() -> str:
-    """Name and version of this program."""
-    return f"vrs-teleop {metadata.version('vrs-teleop')}"
 
 
 def is_loopback(host: str) -> bool:

@@ -13,7 +13,6 @@ from interfaces.cli.compare import compare
 from interfaces.cli.console import console
 from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
-from interfaces.cli.doors import version
 from interfaces.cli.export import export
 from interfaces.cli.link import link
 from interfaces.cli.replay import replay
@@ -21,6 +20,7 @@ from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
 from interfaces.cli.run import run
 from interfaces.cli.serve import serve
+from interfaces.software import software
 from vrs.errors import VrsError
 
 # Typer exports only one of its usage errors; the class above it is the root of all of them.
@@ -49,7 +49,7 @@ app.command()(serve)
 
 def _version(value: bool) -> None:
     if value:
-        typer.echo(version())
+        typer.echo(software())
         raise typer.Exit
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of, version
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of
+from interfaces.software import software
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
@@ -85,7 +86,7 @@ def robot(
     site = RobotSiteConfig(
         fixed_offset=_offset(offset), beat=beat, watchdog=watchdog if policy is LossPolicy.HALT else None
     )
-    config = LiveRobotConfig(model, q, RobotHostConfig(site=site, lead=lead), kind, friction, version())
+    config = LiveRobotConfig(model, q, RobotHostConfig(site=site, lead=lead), kind, friction, software())
     access = access_for(address.host, token_file, free={Role.SITE})
 
     async def main() -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of, version
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of
 from interfaces.cli.options import PROFILES, Host, Port
+from interfaces.software import software
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
@@ -198,7 +199,7 @@ async def _serve(
         url = await stack.enter_async_context(local_robot(options)) if robot_at is None else robot_at
         config = LiveOperatorConfig(
             model, model.poses["nominal"], url, conditions, robot_token, seed,
-            server=version(), recording=recording,
+            server=software(), recording=recording,
         )  # fmt: skip
         operator = LiveOperator(config, access)
         app = application(operator.routes, hosts(names_of(host), port))
@@ -210,7 +211,7 @@ async def _serve(
         typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}", err=True)
         if val_listening is not None:
             near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
-            door = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, version())
+            door = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())
             await stack.enter_async_context(door.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
         sys.stdout.flush()

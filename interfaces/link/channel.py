@@ -42,6 +42,7 @@ class Channel(Generic[T]):
         service: Order of delivery.
         capacity: Most packets in flight, ≥ 1; what is sent beyond it is lost.
         path: A path to share with other channels instead of one of its own; its conditions decide the fates.
+        log: Where to write down what becomes of each packet, instead of a log of its own.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class Channel(Generic[T]):
         capacity: int = 10_000,
         *,
         path: Path | None = None,
+        log: PacketLog | None = None,
     ) -> None:
         if isinstance(profile, Conditions):
             conditions = profile
@@ -64,7 +66,7 @@ class Channel(Generic[T]):
         self._order = self._count = 0
         self._sent = -float("inf")
         self._last_arrival = -float("inf")
-        self.log = PacketLog()
+        self.log = PacketLog() if log is None else log
         """What became of each packet."""
 
     def send(self, payload: T, now: float, size: int = 0) -> float | None:

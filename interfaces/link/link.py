@@ -40,9 +40,8 @@ class Link(Generic[T, U]):
     def __init__(self, conditions: LinkConditions, rng: np.random.Generator, *, keep: int = MAX_RECORDS) -> None:
         there, back = rng.spawn(2)
         self.conditions = conditions
-        self.forward: Direction[T] = direction(conditions.forward, there)
-        self.backward: Direction[U] = direction(conditions.backward, back)
-        self.forward.log, self.backward.log = PacketLog(keep), PacketLog(keep)
+        self.forward: Direction[T] = direction(conditions.forward, there, log=PacketLog(keep))
+        self.backward: Direction[U] = direction(conditions.backward, back, log=PacketLog(keep))
 
     def next_deadline(self) -> float | None:
         """When the next packet arrives in either direction, or is sent again [s]; None when both are idle."""
@@ -55,9 +54,9 @@ class Link(Generic[T, U]):
 
 
 def direction(
-    conditions: Conditions, rng: np.random.Generator, *, path: Path | None = None
+    conditions: Conditions, rng: np.random.Generator, *, path: Path | None = None, log: PacketLog | None = None
 ) -> Channel[T] | Stream[T]:
     """Make one direction: a `Channel` for datagrams, a `Stream` for in-order service."""
     if conditions.service is Service.IN_ORDER:
-        return Stream(conditions, rng, path=path)
-    return Channel(conditions, rng, path=path)
+        return Stream(conditions, rng, path=path, log=log)
+    return Channel(conditions, rng, path=path, log=log)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from importlib import metadata
 from operator import itemgetter
 from typing import NamedTuple, Protocol
 
@@ -153,6 +152,28 @@ class Capture:
         """Let a message of a time [s] be written."""
         self._due.append((t, message))
 
+    def show(
+        self,
+        paced: Paced,
+        t: Array,
+        q: Array,
+        kinematics: Callable[[Array], Array],
+        message: Callable[[float, Array], Message],
+    ) -> None:
+        """Let a robot be shown, as often as it's due.
+
+        Args:
+            paced: Chooses when.
+            t: Ascending times [s], (k,).
+            q: Joints [rad], (k, n).
+            kinematics: Poses (m, 4, 4), or of all links (m, n + 1, 4, 4), of joints (m, n).
+            message: Made of a time [s] and what the kinematics say of the joints then.
+        """
+        rows = paced.chosen(t, q)
+        if rows:
+            for now, X in zip(t[rows].tolist(), kinematics(q[rows]), strict=True):
+                self.add(now, message(now, X))
+
     def link(self, direction: str, records: Iterable[PacketRecord]) -> None:
         """Write down what became of packets (`forward`, `backward`), in the order in which it was known."""
         for record in records:
@@ -192,9 +213,7 @@ class Capture:
         numbers = [max(since, 0), *(number for _, number in edits)]
         for row, (now, joints) in enumerate(zip(t.tolist(), q.tolist(), strict=True)):
             self.add(now, VirtualSample(now, joints, numbers[places[row]]))
-        rows = self._pose.chosen(t, q)
-        for row, X in zip(rows, self.model.forward(q[rows]) if rows else (), strict=True):
-            self.add(t[row], virtual_pose(t[row], X))
+        self.show(self._pose, t, q, self.model.forward, virtual_pose)
 
     def _tell_happened(self) -> None:
         """Write down what was noted."""
@@ -254,11 +273,6 @@ class Capture:
         """Write down the truth about commands at a site, `virtual` or `real`, at a time [s]."""
         for receipt in receipts:
             self.add(t, ReceiptEntry(t, site, FullReceipt.of(self._named(receipt))))  # type: ignore[arg-type]
-
-
-def software() -> str:
-    """What writes recordings, with its version."""
-    return f"vrs-teleop {metadata.version('vrs-teleop')}"
 
 
 def edit_entries(

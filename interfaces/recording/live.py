@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from interfaces.recording.capture import Capture, Paced, software
+from interfaces.recording.capture import Capture, Paced
 from interfaces.recording.messages import Begin, End, EventEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runtime.happenings import correction_events
+from interfaces.software import software
 from interfaces.teleop import Correction, Deed, Report, RobotLine
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
@@ -93,6 +94,10 @@ class _LiveCapture(Capture):
         """Write down an event."""
         self.add(t, EventEntry(t, kind, text))
 
+    def show_links(self, robot: str, paced: Paced, t: Array, q: Array) -> None:
+        """Let the links of a robot, `virtual` or `real`, be shown; see `show`."""
+        self.show(paced, t, q, self.model.links, lambda now, X: link_transforms(now, ((robot, X[1:]),)))
+
     def reports(self) -> list[Report]:
         """Those that came since the last time."""
         reports, self._reports = self._reports, []
@@ -166,10 +171,7 @@ class LiveRecorder:
         link = self._line.link
         capture.link("forward", link.forward.log.take())
         capture.link("backward", link.backward.log.take())
-        t, q = capture.advance(now=now)
-        rows = capture.links.chosen(t, q)
-        for row, X in zip(rows, capture.model.links(q[rows]) if rows else (), strict=True):
-            capture.add(t[row], link_transforms(t[row], (("virtual", X[1:]),)))
+        capture.show_links("virtual", capture.links, *capture.advance(now=now))
         self._tell_reports(capture)
         capture.write_out()
 
@@ -181,12 +183,8 @@ class LiveRecorder:
         q = np.array([report.q for report in reports])
         for now, joints, report in zip(t.tolist(), q.tolist(), reports, strict=True):
             capture.add(now, RealSample(now, report.q_at, joints))
-        rows = self._real.chosen(t, q)
-        for row, X in zip(rows, capture.model.forward(q[rows]) if rows else (), strict=True):
-            capture.add(t[row], real_pose(t[row], X))
-        rows = self._real_links.chosen(t, q)
-        for row, X in zip(rows, capture.model.links(q[rows]) if rows else (), strict=True):
-            capture.add(t[row], link_transforms(t[row], (("real", X[1:]),)))
+        capture.show(self._real, t, q, capture.model.forward, real_pose)
+        capture.show_links("real", self._real_links, t, q)
 
     @property
     def problem(self) -> str | None:

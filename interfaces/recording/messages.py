@@ -7,7 +7,7 @@ belongs to stands in `interfaces.recording.channels`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from msgspec import Meta
@@ -26,8 +26,6 @@ from interfaces.stream.wire.fields import (
     Time,
     Wire,
     Word,
-    numbers,
-    text,
 )
 from interfaces.stream.wire.segments import MOST_POWERS
 from vrs.commands import Command
@@ -108,28 +106,9 @@ class End(Entry, frozen=True, omit_defaults=True, gc=False, tag="end"):
 class FullReceipt(ReceiptWire, frozen=True, omit_defaults=True, gc=False):
     """A receipt that names every command it shifted or superseded."""
 
+    most_names: ClassVar[int | None] = None
     shifted: _Names = ()
     superseded: _Names = ()
-
-    @classmethod
-    def of(cls, receipt: Receipt) -> FullReceipt:
-        """The form in the file."""
-        return cls(
-            command_id=receipt.command_id,
-            status=receipt.status,
-            issued_at=receipt.issued_at,
-            asked_at=receipt.asked_at,
-            execute_at=receipt.execute_at,
-            end=receipt.end,
-            q=None if receipt.q is None else numbers(receipt.q),
-            reason=text(receipt.reason),
-            version=receipt.version,
-            shift=receipt.shift,
-            superseded_by=receipt.superseded_by,
-            undone=receipt.undone,
-            shifted=receipt.shifted,
-            superseded=receipt.superseded,
-        )
 
 
 class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="command"):

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from interfaces.recording.capture import Capture, Paced, software
+from interfaces.recording.capture import Capture, Paced
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.messages import Begin, End, EventEntry, PacketEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose
@@ -19,6 +19,7 @@ from interfaces.recording.writer import RecordingWriter
 from interfaces.runtime.attribution import CAUSES, Attribution, Measures, OffsetOutcome
 from interfaces.runtime.keeping import RunFacts, Turn
 from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.software import software
 from interfaces.teleop import OperatorSite
 from vrs.commands import Lateness
 from vrs.errors import FormatError
@@ -84,9 +85,7 @@ class RunRecorder:
         rows = zip(t.tolist(), turn.play.tolist(), turn.q_real.tolist(), turn.q_reference.tolist(), strict=True)
         for now, play, q, reference in rows:
             capture.add(now, RealSample(now, play, q, reference))
-        shown = self._real.chosen(t, turn.q_real)
-        for row, X in zip(shown, capture.model.forward(turn.q_real[shown]) if shown else (), strict=True):
-            capture.add(t[row], real_pose(t[row], X))
+        capture.show(self._real, t, turn.q_real, capture.model.forward, real_pose)
         self._tell_links(capture, t, turn.q_real, *capture.advance(now=turn.now))
         self._write_out(capture)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from msgspec import Meta
@@ -245,6 +245,8 @@ CommandWire: TypeAlias = (
 class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
     """`Receipt`."""
 
+    most_names: ClassVar[int | None] = MOST_NAMES
+    """Commands of each kind that it names, at most; None for all."""
     command_id: Count
     status: Status
     issued_at: Time | None = None
@@ -262,8 +264,8 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
     superseded: Names = ()
 
     @classmethod
-    def of(cls, receipt: Receipt) -> ReceiptWire:
-        """The wire form; of the commands that it names, the first 1000 of each kind."""
+    def of(cls, receipt: Receipt) -> Self:
+        """The form of a receipt; of the commands that it names, the first `most_names` of each kind."""
         return cls(
             receipt.command_id,
             receipt.status,
@@ -277,8 +279,8 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
             receipt.shift,
             receipt.superseded_by,
             receipt.undone,
-            receipt.shifted[:MOST_NAMES],
-            receipt.superseded[:MOST_NAMES],
+            receipt.shifted[: cls.most_names],
+            receipt.superseded[: cls.most_names],
         )
 
     def read(self) -> Receipt:

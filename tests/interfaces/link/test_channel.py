@@ -312,6 +312,15 @@ def test_records_are_bounded_and_totals_know_of_all():
     assert (totals.delay_min, totals.delay_mean, totals.delay_max) == (0.5, 0.75, 1.0)
 
 
+@pytest.mark.parametrize("service", Service)
+def test_a_link_keeps_as_many_records_as_it_was_told(service):
+    conditions = LinkConditions.symmetric(Conditions(delay=ConstantDelay("constant:0.1", 0.1), service=service))
+    link = Link(conditions, np.random.default_rng(0), keep=3)
+    for line in (link.forward, link.backward):
+        assert len(drive(line, [(0.2, 0, True)] * 5)[0]) == 5
+        assert [record.number for record in line.log.take()] == [2, 3, 4]
+
+
 @pytest.mark.parametrize("make", [Channel, Stream])
 def test_capacity_bounds_what_is_held_and_time_does_not_run_back(make):
     conditions = Conditions(delay=ConstantDelay("constant:9", 9.0), capacity=2)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from interfaces.changes import difference
 from interfaces.recording import Recording, RecordingWriter
 from interfaces.recording import messages as m
+from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
 from interfaces.recording.poses import link_transforms, real_pose, virtual_pose
 from robots import puma560
@@ -36,12 +36,8 @@ def sample(k: int, step: float = STEP) -> m.RealSample:
 
 
 def history(engine: Engine, number: int) -> m.HistoryEntry:
-    timeline = engine.timeline
-    segments = m.segment_entries(timeline.segments)
-    return m.HistoryEntry(
-        edit=number, at=engine.now(), version=timeline.version, initial=timeline.initial.tolist(),
-        start=timeline.start, total=len(segments), index=0, segments=segments,
-    )  # fmt: skip
+    (entry,) = whole_entries(engine.timeline, number, engine.now())
+    return entry
 
 
 def motion(
@@ -62,10 +58,10 @@ def motion(
             command = MotionCommand(target, execute_at=t + 0.1, insertion=list(Insertion)[number % 3])
             receipt = engine.execute(command)
             timelines.append(engine.timeline)
-            change = difference(before, engine.timeline, t, edit=number, command_id=receipt.command_id)
+            (edit,) = edit_entries(before, engine.timeline, number, t, receipt.command_id)
             found += [
                 (t, m.CommandEntry.of(number, t, command, receipt)),
-                (t, change_entry(change, t, engine.timeline.version)),
+                (t, edit),
                 (t, m.ReceiptEntry(t, "real", m.FullReceipt.of(receipt))),
                 (t, m.PacketEntry(number, receipt.command_id, t, t + 0.2, receipt.command_id)),
                 (t, m.LinkEntry("forward", t, t + 0.2)),
@@ -80,14 +76,6 @@ def motion(
             found += [(t, virtual_pose(t, links[-1])), (t, real_pose(t, links[-1]))]
             found.append((t, link_transforms(t, [("virtual", links), ("real", links)])))
     return found, engine, timelines
-
-
-def change_entry(change: Any, at: float, version: int) -> m.ChangeEntry:
-    return m.ChangeEntry(
-        edit=change.edit, base=change.base, at=at, version=version, first=change.first, dof=6,
-        segments=m.segment_entries(change.segments), tail=change.tail, tail_start=change.tail_start,
-        end=change.end, command_id=change.command_id,
-    )  # fmt: skip
 
 
 def write(path: Path, messages: list[tuple[float, Message]], *, end: float | None = None, **fields: Any) -> Path:

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from interfaces.link import Service, delay_profile
-from interfaces.recording.capture import Capture, software
+from interfaces.recording.capture import Capture
 from interfaces.recording.messages import Begin, End
 from interfaces.recording.runs import RunRecorder
 from interfaces.recording.writer import RecordingWriter
@@ -17,6 +17,7 @@ from interfaces.runtime.offset import fixed_offset
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.run import TwinRun
 from interfaces.runtime.virtual import run_twins
+from interfaces.software import software
 from interfaces.teleop import OperatorSite, PlanPart, Report
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand

@@ -19,6 +19,7 @@ from interfaces.report.summary import summarize, to_json
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.virtual import run_twins
 from interfaces.teleop import OperatorSite
+from tests.interfaces.recording import shown
 from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
 from vrs import JointTarget, MotionCommand, Status
 from vrs.commands import ParameterChange, PositionQuery, Retime, ScaleTime
@@ -118,6 +119,12 @@ def test_samples_of_both_robots_are_the_runs_rows(tmp_path):
         for edit in recording.edits[1:]:
             assert (virtual.edit[virtual.t < edit.at] < edit.number).all()
             assert (virtual.edit[virtual.t >= edit.at] >= edit.number).all()
+
+
+def test_both_robots_are_shown_where_their_joints_put_them(tmp_path):
+    taken(tmp_path / "run.mcap", "mon")
+    with open_recording(tmp_path / "run.mcap") as recording:
+        shown.check(tmp_path / "run.mcap", recording, least=10)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")

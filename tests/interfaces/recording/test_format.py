@@ -19,7 +19,7 @@ from interfaces.recording import messages as m
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.poses import quaternions
-from tests.interfaces.recording import recorded
+from tests.interfaces.recording import recorded, shown
 from vrs.commands import JointTarget, MotionCommand, ParameterChange, PoseTarget, SteerCommand
 from vrs.planning.course import rotations
 
@@ -128,22 +128,12 @@ def test_foxgloves_links_are_the_robots(path: Path) -> None:
     with path.open("rb") as file:
         *_, message = next(make_reader(file).iter_messages("/tf", starting_after=2 * 10**9))
     transforms = json.loads(message.data)["transforms"]
-    t = transforms[0]["timestamp"]["sec"] + 1e-9 * transforms[0]["timestamp"]["nsec"]
+    t = shown.seconds(transforms[0]["timestamp"])
     assert t == pytest.approx(1e-9 * message.log_time, abs=1e-9)
     with open_recording(path) as recording:
         links = recorded.MODEL.links(recording.virtual(t))
-    poses = {"base": np.eye(4)}
-    for transform in transforms:
-        x, y, z, w = (transform["rotation"][name] for name in "xyzw")
-        X = np.eye(4)
-        X[:3, :3] = np.eye(3) + 2 * np.array([
-            [-y * y - z * z, x * y - z * w, x * z + y * w],
-            [x * y + z * w, -x * x - z * z, y * z - x * w],
-            [x * z - y * w, y * z + x * w, -x * x - y * y],
-        ])  # fmt: skip
-        X[:3, 3] = [transform["translation"][name] for name in "xyz"]
-        poses[transform["child_frame_id"]] = poses[transform["parent_frame_id"]] @ X
-    assert len(poses) == 1 + 2 * len(links)
+    poses = shown.links(transforms)
+    assert len(poses) == 2 * len(links)
     for number, link in enumerate(links, 1):
         np.testing.assert_allclose(poses[f"virtual/{number}"], link, atol=2e-5)
 

@@ -23,6 +23,7 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until
+from tests.interfaces.recording import shown
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 
 
@@ -84,6 +85,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             if t in known:
                 assert (q == known[t].q).all()
                 assert play == known[t].q_at
+        shown.check(path, recording, least=2)
         assert (recording.session.driver, recording.session.delay) == ("live", "constant:0.03")
         assert abs(recording.session.began - time.time()) < 60
         kinds = [event.kind for event in recording.events]

@@ -20,6 +20,7 @@ from interfaces.recording.recording import open_recording
 from interfaces.stream import sockets
 from interfaces.stream.access import hosts
 from interfaces.stream.server import application
+from tests.interfaces.pages import until, wait
 from tests.interfaces.recording.made import MODEL, make
 from tests.interfaces.stream.serving import Serving, beside
 from vrs.clock import ManualClock, WallClock
@@ -57,17 +58,11 @@ def files(tmp_path_factory):
 
 
 @pytest.fixture
-def open_page(browser):
-    """Opens pages; at the end no error may have been seen that wasn't expected, nor a request to elsewhere."""
-    seen, contexts = [], []
+def open_page(new_page):
+    """Opens pages."""
 
     def start(server, width=640, height=480, scheme="light", panes=1):
-        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda m: seen.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda e: seen.append(str(e)))
-        page.on("request", lambda r: None if r.url.startswith((server.url, "data:")) else seen.append(r.url))
+        page = new_page(server.url, width, height, scheme, expected="WebSocket connection")
         page.goto(f"{server.url}/replay")
         if panes:
             wait(page, f"!!window.replay && !!replay.state && replay.views.length === {panes}")
@@ -75,22 +70,7 @@ def open_page(browser):
                 wait(page, f"replay.node({k}, 'vrs', 'real', 'body', '6').children.length === 1")
         return page
 
-    yield start
-    for context in contexts:
-        context.close()
-    assert [text for text in seen if "WebSocket connection" not in text] == []
-
-
-def until(holds, patience=15.0):
-    end = time.monotonic() + patience
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-def wait(page, expression, arg=None):
-    """Wait until an expression holds; Playwright's own waiting needs what the page's policy forbids."""
-    until(lambda: page.evaluate(expression, arg) is True)
+    return start
 
 
 POSES = """([k, twin]) => { const out = []; for (let i = 0; i < 7; i++) {

@@ -163,6 +163,39 @@ def test_the_newest_word_counts(tmp_path: Path) -> None:
         assert [packet.arrived for packet in recording.packets] == [0.5]
 
 
+def test_a_history_and_an_edit_of_it_written_by_hand_mean_what_the_format_says(tmp_path: Path) -> None:
+    joint = np.arange(1.0, 7.0)
+
+    def line(duration: float, q: float, rate: float, **fields: Any) -> m.SegmentEntry:
+        return m.SegmentEntry(duration, [*(q * joint).tolist(), *(rate * joint).tolist()], **fields)
+
+    whole: dict[str, Any] = {"edit": 3, "at": 0.25, "version": 7, "initial": [0.0] * 6, "start": 0.5, "total": 3}
+    parts = (
+        (line(1.0, 0.0, 0.3, command_id=4, start=0.5), line(1.0, 0.3, 0.2)),
+        (line(1.0, 0.5, -0.1, command_id=5),),
+    )
+    edit = m.ChangeEntry(
+        edit=4, base=3, at=0.75, version=9, first=1, dof=6,
+        segments=(line(0.5, 0.3, 0.4, command_id=6, start=1.5),), tail=2, tail_start=2.0, end=3.0, command_id=6,
+    )  # fmt: skip
+    messages = [
+        (0.25, m.HistoryEntry(index=0, segments=parts[0], **whole)),
+        (0.25, m.HistoryEntry(index=2, segments=parts[1], **whole)),
+        (0.75, edit),
+    ]
+    with open_recording(recorded.write(tmp_path / "run.mcap", messages, end=1.0)) as recording:
+        before, after = recording.edits
+    assert (before.number, before.at, before.timeline.version) == (3, 0.25, 7)
+    assert (after.number, after.at, after.timeline.version, after.command_id) == (4, 0.75, 9, 6)
+    t = np.array([0.4, 1.0, 1.5, 1.75, 2.5, 3.5])
+    for timeline, expected in (
+        (before.timeline, [0.0, 0.15, 0.3, 0.35, 0.5, 0.4]),
+        (after.timeline, [0.0, 0.15, 0.3, 0.4, 0.45, 0.4]),
+    ):
+        np.testing.assert_allclose(timeline.sample(t), np.outer(expected, joint), rtol=0, atol=1e-12)
+    assert [segment.command_id for segment in after.timeline.segments] == [4, 6, 5]
+
+
 def test_a_robot_that_nobody_knows(tmp_path: Path) -> None:
     for fields in ({"robot": "../puma560"}, {"robot": "hal"}, {"q": [0.0] * 7}):
         with open_recording(recorded.write(tmp_path / "run.mcap", [], end=0.0, **fields)) as recording:

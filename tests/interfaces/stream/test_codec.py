@@ -19,11 +19,14 @@ from interfaces import messages as m
 from interfaces.stream import LARGEST, Encoding, ProblemCode, ProtocolError, SharedEncoder, decode, encode
 from interfaces.stream import control as c
 from interfaces.stream.codec import TYPES, WIRES
+from interfaces.stream.wire.commands import ReceiptWire
+from interfaces.stream.wire.fields import MOST_NAMES
 from interfaces.teleop.messages import Orders, Report
 from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
 from vrs import JointTarget, MotionCommand, PolynomialSegment
 from vrs.errors import InvalidValueError
+from vrs.receipt import Receipt, Status
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 QUICK = settings(max_examples=25, deadline=None, phases=PHASES, database=None, derandomize=True)
@@ -70,6 +73,12 @@ def test_messages_come_back_to_the_bit(kind: type, encoding: Encoding, data: st.
 def test_numpys_numbers_cross(encoding: Encoding) -> None:
     message = m.Ask(3, np.float64(1.5))
     assert decode(encode(message, encoding), encoding, allowed=m.Ask).t == 1.5
+
+
+def test_a_receipt_names_no_more_than_may_cross() -> None:
+    names = tuple(range(1, 3001))
+    wire = ReceiptWire.of(Receipt(1, Status.ACCEPTED, 0.0, None, shifted_names=names, superseded_names=names))
+    assert wire.shifted == wire.superseded == names[:MOST_NAMES]
 
 
 @pytest.mark.parametrize("encoding", Encoding)

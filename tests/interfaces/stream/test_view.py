@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -18,6 +18,7 @@ from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.page import routes
 from interfaces.stream.meshcat.viewers import BATCHES, PATIENCE, UNAUTHORISED
 from robots import puma560
+from tests.interfaces.pages import until, wait
 from tests.interfaces.stream.serving import Serving, served
 from tests.interfaces.stream.test_meshcat import Shapeless
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Timeline
@@ -55,18 +56,6 @@ def show(server: Serving, scene: MeshcatScene, virtual: Array, real: Array | Non
     server.call(scene.show, virtual=MODEL.links(virtual), real=links, now=0.0, **named)
 
 
-def wait(page: Any, expression: str, arg: Any = None) -> None:
-    """Wait until an expression holds in a page; Playwright's own waiting needs what the page's policy forbids."""
-    until(lambda: page.evaluate(expression, arg) is True)
-
-
-def until(holds: Callable[[], bool], patience: float = 15.0) -> None:
-    end = time.monotonic() + patience
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
 @contextmanager
 def viewer(server: Serving, **named: Any) -> Iterator[Any]:
     url = f"ws://127.0.0.1:{server.port}/meshcat"
@@ -85,18 +74,11 @@ def first_scene(websocket: Any) -> list[dict[str, Any]]:
 
 
 @pytest.fixture
-def open_page(browser: Any) -> Iterator[Any]:
-    """Opens the page; at the end no error may have been seen that wasn't expected, nor a request to elsewhere."""
-    seen: list[str] = []
-    contexts = []
+def open_page(new_page: Any) -> Any:
+    """Opens the page."""
 
     def start(server: Serving, width: int = 480, scheme: str = "light", live: bool = True) -> Any:
-        context = browser.new_context(viewport={"width": width, "height": 420}, color_scheme=scheme)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda m: seen.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda e: seen.append(str(e)))
-        page.on("request", lambda r: None if r.url.startswith((server.url, "data:")) else seen.append(r.url))
+        page = new_page(server.url, width, 420, scheme, expected="WebSocket connection")
         page.goto(f"{server.url}/view")
         if live:
             wait(page, "document.getElementById('status').dataset.state === 'live'")
@@ -104,10 +86,7 @@ def open_page(browser: Any) -> Iterator[Any]:
             wait(page, "view.node('vrs').box !== undefined")
         return page
 
-    yield start
-    for context in contexts:
-        context.close()
-    assert [text for text in seen if "WebSocket connection" not in text] == []
+    return start
 
 
 POSES = """(twin) => { const out = []; for (let i = 0; i < 7; i++) {
