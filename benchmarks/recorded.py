@@ -29,7 +29,7 @@ HOME = MODEL.poses["nominal"]
 
 def begin() -> m.Begin:
     """How such a recording is set up."""
-    return m.Begin.new(
+    return m.Begin(
         t=0.0, robot="puma560", driver="live", title="benchmark", seed=0, delay="mon", offset="adaptive",
         service="datagram", link_loss="hold", step=1 / RATE, q=HOME.tolist(), lateness="postpone", software="vrs",
         began=1.7e9,

@@ -94,6 +94,7 @@ def serve(
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
     from interfaces.recording.live import RATE, LiveRecording
+    from interfaces.recording.messages import OWN
     from interfaces.recording.sink import Sink
     from interfaces.runtime.offset import QUANTILE, fixed_offset, spelled
     from interfaces.stream.access import OPEN, read_tokens
@@ -114,7 +115,7 @@ def serve(
         # Before a robot is started.
         Sink.create(record).close()
         options += ["--reports", f"{RATE:g}"]
-        facts = (behind, str(policy)) if robot_at is None else ("the robot's own", "the robot's own")
+        facts = (behind, str(policy)) if robot_at is None else (OWN, OWN)
         recording = LiveRecording(record, *facts, _recording_failed)
     # Half a round trip isn't known of the clocks, and counts as age.
     usual = 2.0 * profile.quantile(QUANTILE)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.recording.messages import OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, rerun
 from interfaces.recording.runs import extras_of
@@ -112,6 +112,7 @@ class _Reading:
             self.missing.append("the real robot's own references: the virtual robot's timeline stands for its")
             q_reference = np.where(np.isfinite(q_reference), q_reference, shown.sample(play))
         receipts = again.receipts if shown is again.timeline else recording.receipts("virtual")
+        answers, messages = recording.receipts("real"), recording.messages()
         return TwinRun(
             model=model,
             title=begin.title,
@@ -128,9 +129,9 @@ class _Reading:
             q_real=q_real,
             q_reference=q_reference,
             receipts_virtual=receipts,
-            receipts_real=recording.receipts("real"),
-            packets=self._packets(),
-            messages=recording.messages(),
+            receipts_real=answers,
+            packets=self._packets(answers, messages),
+            messages=messages,
             corrections=corrections,
             events=self._events(t, play, q_reference),
         )
@@ -200,15 +201,14 @@ class _Reading:
         sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
         return commands_alone(self.recording.model, frozen_array(self.begin.q), sent, now=self.begin.t)
 
-    def _packets(self) -> tuple[Packet, ...]:
+    def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[Packet, ...]:
         if not self._live:
             if self.end is None:
                 self.missing.append("what became of commands that weren't answered yet")
             return self.recording.packets
         # The operator's site doesn't know when a command reached the robot, but when it left the emulated link.
-        messages = self.recording.messages()
         messages = messages[np.argsort(messages[:, 0], kind="stable")]
-        known = {receipt.command_id for receipt in self.recording.receipts("real")}
+        known = {receipt.command_id for receipt in answers}
         found = []
         for entry, receipt in self._taken():
             if receipt is None:
@@ -230,11 +230,10 @@ class _Reading:
 
     def _events(self, t: Array, play: Array, q_reference: Array) -> tuple[Event, ...]:
         events = list(self.recording.events)
-        if self.end is None or self._live:
-            # A whole recording of the laboratory has them.
-            slew = PlayoutConfig().slew
-            if self.begin.offset in {ADAPTIVE, "the robot's own"}:
-                events += waits(t, play, q_reference, slowest=1.0 - slew)
+        # A whole recording of the laboratory has them.
+        whole = self.end is not None and not self._live
+        if not whole and self.begin.offset in {ADAPTIVE, OWN}:
+            events += waits(t, play, q_reference, slowest=1.0 - PlayoutConfig().slew)
         return tuple(sorted(event for event in events if event.t <= t[-1]))
 
 

@@ -37,6 +37,8 @@ from vrs.timeline import Timeline
 
 FORMAT = "vrs-recording/1"
 """Name and version of what the messages mean."""
+OWN = "the robot's own"
+"""`Begin.offset` and `Begin.link_loss` of a robot that somebody else started: it alone knows them."""
 
 _Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
 _Names = tuple[Number, ...]
@@ -62,7 +64,7 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     delay: Word
     """Delay profile, as it was asked for."""
     offset: Word
-    """`adaptive`, or `fixed:S`."""
+    """`adaptive`, `fixed:S`, or `OWN`."""
     service: Word
     link_loss: Word
     step: Seconds
@@ -74,11 +76,6 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     """What wrote the file, with its version."""
     began: Stamp | None = None
     """Seconds since 1970; None in the laboratory, where the same seed gives the same bytes."""
-
-    @classmethod
-    def new(cls, **fields: Any) -> Begin:
-        """A beginning that says its format; see the class for the fields."""
-        return cls(**fields)
 
 
 class Drop(Wire, frozen=True, omit_defaults=True, gc=False):

@@ -67,7 +67,7 @@ class Site:
         self.engine = Engine(MODEL, q=HOME, clock=self.clock)
         self.told = plan(length)
         self.edit = self.number = self.beat = 0
-        begin = Begin.new(
+        begin = Begin(
             t=0.0, robot="puma560", driver="laboratory", title="a made plan", seed=seed, delay="constant:0.35",
             offset="adaptive", service="datagram", link_loss="hold", step=STEP, q=HOME.tolist(),
             lateness="postpone", software="test", began=began,

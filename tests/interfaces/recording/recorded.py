@@ -27,7 +27,7 @@ def begin(**fields: Any) -> m.Begin:
         "offset": "adaptive", "service": "datagram", "link_loss": "hold", "step": STEP, "q": HOME.tolist(),
         "lateness": "postpone", "software": "vrs test",
     }  # fmt: skip
-    return m.Begin.new(**usual | fields)
+    return m.Begin(**usual | fields)
 
 
 def sample(k: int, step: float = STEP) -> m.RealSample:
