@@ -16,7 +16,7 @@ PARTS = (
     "val2", "recording",
 )  # fmt: skip
 """Benchmarks that give results."""
-DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady")
+DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station")
 """Benchmarks that print more about one thing."""
 
 

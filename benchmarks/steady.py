@@ -32,9 +32,9 @@ HOME = puma560.model().poses["nominal"]
 
 
 @contextlib.contextmanager
-def served() -> Iterator[tuple[int, psutil.Process]]:
+def served(*options: str) -> Iterator[tuple[int, psutil.Process]]:
     """`vrs serve` with a robot of its own: its port and its process."""
-    command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--delay", "domain"]
+    command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--delay", "domain", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None

@@ -177,7 +177,9 @@ class Servlet:
         except VrsError as error:
             self._settle(Outcome(order.number, None, str(error), 0, now))
             return
-        self._settle(Outcome(order.number, None if receipt is None else portable(receipt), "", 0, now))
+        if receipt is None and order.command is None:
+            refusal = self.journal.engine.undo_refusal()
+        self._settle(Outcome(order.number, None if receipt is None else portable(receipt), refusal, 0, now))
 
     def _settle(self, outcome: Outcome) -> None:
         self._keep(outcome)

@@ -42,6 +42,7 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from vrs.anchoring import Anchored
+    from vrs.standing import Standing
 
 _LIMIT_NAMES = ("qd_max", "qdd_max", "qddd_max")
 
@@ -249,6 +250,18 @@ class Engine:
         """
         self._plan.ledger.newest = command_id
 
+    def standing(self) -> Standing:
+        """What the next commands depend on besides the timeline; see `vrs.standing.Standing`."""
+        from vrs.standing import standing
+
+        return standing(self._plan, self.now())
+
+    def take_up(self, stand: Standing) -> None:
+        """Let an engine that was just made on a timeline go on as the one did that stood so."""
+        from vrs.standing import take_up
+
+        take_up(self._plan, stand)
+
     def refuse(self, command: Command, reason: str) -> Receipt:
         """Answer a command that something outside the engine forbids."""
         issued, asked = getattr(command, "issued_at", None), getattr(command, "execute_at", None)
@@ -276,6 +289,10 @@ class Engine:
             The receipt of the command that was taken back, as it is now; None where there's none.
         """
         return self._plan.undo(self._present())
+
+    def undo_refusal(self) -> str:
+        """Why `undo` takes nothing back now; empty where it does, or where nothing was ever commanded."""
+        return self._plan.undo_refusal(self._present())
 
     def _set_parameter(self, change: ParameterChange) -> None:
         plan = self._plan

@@ -77,6 +77,8 @@ class Ledger:
         self._versions: list[int] = []
         self._stills: list[tuple[float, int]] = []
         self._undo: deque[Undo] = deque(maxlen=UNDO_DEPTH)
+        self.settled = ""
+        """Why edits before the newest ones can't be taken back any more; empty where all can."""
 
     def __contains__(self, command_id: object) -> bool:
         return command_id in self._entries
@@ -152,6 +154,14 @@ class Ledger:
                 now = receipts[i].end
                 end[i] = now if receipts[i].stands and now is not None else np.nan
         return tuple(receipts)
+
+    def stills_from(self, t: float) -> tuple[int, ...]:
+        """Commands from a time [s] on to where the arm stands anyway: no segment is theirs."""
+        return tuple(command_id for _, command_id in self._stills[bisect_left(self._stills, (t, 0)) :])
+
+    def note(self, receipt: Receipt, command: MotionCommand | None) -> None:
+        """Write down a command of another ledger, which can't be taken back here."""
+        self._write(((receipt, command),))
 
     def reject(self, issued: float | None, asked: float | None, reason: str, version: int) -> Receipt:
         """Give out a receipt for a command that can't be."""
@@ -306,6 +316,10 @@ class Ledger:
                 self._entries[command_id] = again, command
         self._write_log(len(self._changes), (change,))
         self._undo.clear()
+        self.settled = (
+            f"the plan was put right at {change.at:.6g} s, since the real robot was going elsewhere: what was "
+            "commanded before can't be taken back"
+        )
         del self._stills[bisect_left(self._stills, (change.at, 0)) :]
 
     def break_off(self, change: Change, note: str) -> Receipt:
@@ -318,6 +332,10 @@ class Ledger:
         undo = self._undo.pop()
         # What came before it can't be taken back any more: its timeline has another past.
         self._undo.clear()
+        self.settled = (
+            f"command {undo.command_id} was under way when it was taken back, at {change.at:.6g} s: what was "
+            "commanded before it can't be taken back"
+        )
         self._write_log(len(self._changes), (change,))
         del self._stills[bisect_left(self._stills, (change.at, 0)) :]
         mine = replace(

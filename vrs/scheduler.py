@@ -301,6 +301,18 @@ class Scheduler:
         receipt = replace(receipt, superseded_names=self.touched(edit, t)[1])
         return self.accept(receipt, None, edit, t)
 
+    @property
+    def steered(self) -> tuple[int, float] | None:
+        """The command that the next steering input may go on with, and when it began [s]."""
+        session = self._session
+        if session is None or session.version != self.timeline.version:
+            return None
+        return session.command_id, session.start
+
+    def go_on_steering(self, command_id: int, start: float) -> None:
+        """Let the next steering input go on with a command that began at a time [s]."""
+        self._session = _Session(command_id, self.timeline.version, start)
+
     def undo(self, now: float | None) -> Receipt | None:
         """Take back the newest edit; see `vrs.engine.Engine.undo`."""
         last = self.ledger.last
@@ -316,6 +328,15 @@ class Scheduler:
         self.profiles[last.command_id] = self.profile(owner_before(self.timeline, now))
         self.timeline = self.timeline.edited(now, [piece(stop, last.command_id)])
         return self.ledger.break_off(Change(version, last.command_id, now, None), note)
+
+    def undo_refusal(self, now: float | None) -> str:
+        """Why there's nothing to take back; see `vrs.engine.Engine.undo_refusal`."""
+        last = self.ledger.last
+        if last is None:
+            return self.ledger.settled
+        if now is None or now <= last.at or now < self.timeline.end:
+            return ""
+        return f"command {last.command_id} is over: what has happened can't be taken back"
 
 
 def _names(ledger: Ledger, timeline: Timeline, index: int, t: float) -> tuple[int, ...]:

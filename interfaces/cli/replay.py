@@ -43,7 +43,11 @@ def replay(
     loop: Annotated[str | None, typer.Option("--loop", metavar="A:B", help="Loop from A to B [s].")] = None,
     align: Annotated[
         str,
-        typer.Option("--align", metavar="CLOCK", help="Of two recordings: timeline, or began (the calendar)."),
+        typer.Option(
+            "--align",
+            metavar="CLOCK",
+            help="Of two recordings: timeline, start (their beginnings) or began (the calendar).",
+        ),
     ] = "timeline",
     headless: Annotated[
         bool, typer.Option("--headless", help="Frames as lines, at their time, instead of a page.")

@@ -1,4 +1,4 @@
-"""`vrs serve`: the operator's site: virtual robot, streams, a page to look at, and a robot if there's none."""
+"""`vrs serve`: the operator's site: virtual robot, streams, the operator station, and a robot if there's none."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    import asyncio
     from collections.abc import Sequence
+    from contextlib import AsyncExitStack
 
     from interfaces.link import LinkConditions
     from interfaces.recording.live import LiveRecording
@@ -80,12 +82,16 @@ def serve(
         ),
     ] = None,
     val_files: Annotated[
-        Path, typer.Option("--val-files", metavar="DIR", help="Where that monitor's LOAD and STORE find files.")
+        Path, typer.Option("--val-files", metavar="DIR", help="Where the LOAD and STORE of VAL-II find files.")
     ] = Path(),
     record: Annotated[
         Path | None,
         typer.Option("--record", metavar="FILE.mcap", help="Record everything; vrs replay and compare read it."),
     ] = None,
+    recordings: Annotated[
+        Path,
+        typer.Option("--recordings", metavar="DIR", help="Where the station records to; made when it's needed."),
+    ] = Path("recordings"),
     until_eof: Annotated[bool, typer.Option("--until-eof", help="End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
@@ -96,7 +102,8 @@ def serve(
     from interfaces.recording.live import RATE, LiveRecording
     from interfaces.recording.messages import OWN
     from interfaces.recording.sink import Sink
-    from interfaces.runtime.offset import QUANTILE, fixed_offset, spelled
+    from interfaces.runtime.ages import late_often
+    from interfaces.runtime.offset import fixed_offset, spelled
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
     from robots.onboard import LossPolicy
@@ -109,22 +116,20 @@ def serve(
     behind = spelled(fixed_offset(offset, profile))
     options = ["--offset", behind, "--link-loss", policy, "--body", body, "--max-age", f"{max_age:g}"]
     recording = None
+    told = (behind, str(policy)) if robot_at is None else (OWN, OWN)
+    if recordings.exists() and not recordings.is_dir():
+        raise InvalidValueError("recordings", str(recordings), "a directory, or one that can be made")
     if record is not None:
         if record.is_file():
             raise InvalidValueError("record", str(record), "a file that isn't there yet: none is written over")
         # Before a robot is started.
         Sink.create(record).close()
         options += ["--reports", f"{RATE:g}"]
-        facts = (behind, str(policy)) if robot_at is None else (OWN, OWN)
-        recording = LiveRecording(record, *facts, _recording_failed)
-    # Half a round trip isn't known of the clocks, and counts as age.
-    usual = 2.0 * profile.quantile(QUANTILE)
-    if policy is LossPolicy.HALT and usual > max_age:
-        typer.echo(
-            f"vrs: messages will often be {usual:.2g} s old, with what isn't known of the clocks, and those older "
-            f"than {max_age:g} s don't count: try --link-loss hold, or --max-age up to 2",
-            err=True,
-        )
+        recording = LiveRecording(record, *told, _recording_failed)
+    link = LinkConditions.symmetric(way)
+    advice = late_often(link, policy, max_age)
+    if advice:
+        typer.echo(f"vrs: {advice}", err=True)
     at = None if robot_at is None else parse_address("--robot-at", robot_at)
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
     if not val_files.is_dir():
@@ -136,12 +141,13 @@ def serve(
         _serve(
             access,
             doors,
-            LinkConditions.symmetric(way),
+            link,
             seed,
             None if at is None else f"ws://{at}/site",
             token,
             options,
             recording,
+            _Shelved(recordings, *told),
         )
     )
 
@@ -164,6 +170,15 @@ class _Doors:
     until_eof: bool
 
 
+@dataclass(frozen=True, slots=True)
+class _Shelved:
+    """Where the station records to, and what a recording says of the robot."""
+
+    directory: Path
+    offset: str
+    link_loss: str
+
+
 async def _serve(
     access: Access,
     doors: _Doors,
@@ -173,49 +188,90 @@ async def _serve(
     robot_token: str | None,
     options: Sequence[str],
     recording: LiveRecording | None,
+    shelved: _Shelved,
 ) -> None:
-    """Run until a signal comes."""
+    """Run until a signal comes. The page is there before the robot is."""
     import asyncio
     import contextlib
 
-    from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
-    from interfaces.runtime.live.process import local_robot
     from interfaces.stream import sockets
     from interfaces.stream.access import hosts
-    from interfaces.stream.server import application
-    from interfaces.val2.served import HOST, ServedVal
-    from robots import puma560
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    model = puma560.model()
     host = doors.host
-    listening = sockets.bind(host, doors.port)
-    port = listening.getsockname()[1]
-    async with contextlib.AsyncExitStack() as stack:
-        stack.callback(listening.close)
-        val_listening = None if doors.val_port is None else sockets.bind(HOST, doors.val_port)
-        if val_listening is not None:
-            stack.callback(val_listening.close)
-        url = await stack.enter_async_context(local_robot(options)) if robot_at is None else robot_at
+    async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
+        listening = stack.enter_context(contextlib.closing(sockets.bind(host, doors.port)))
+        port = listening.getsockname()[1]
+        val_listening = None
+        if doors.val_port is not None:
+            val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", doors.val_port)))
+        robot = asyncio.create_task(_start_robot(robots, robot_at, options))
+        stack.push_async_callback(_abandon, robot)
+        await asyncio.to_thread(_load)
+
+        from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
+        from interfaces.station.page import Station
+        from interfaces.station.record import RecordingFacts, Recordings
+        from interfaces.station.shelf import Shelf
+        from interfaces.stream.server import application
+        from interfaces.val2.pages import PageDoor
+        from interfaces.val2.served import HOST, ServedVal
+        from robots import puma560
+
+        model = puma560.model()
         config = LiveOperatorConfig(
-            model, model.poses["nominal"], url, conditions, robot_token, seed,
+            model, model.poses["nominal"], "", conditions, robot_token, seed,
             server=software(), recording=recording,
         )  # fmt: skip
         operator = LiveOperator(config, access)
-        app = application(operator.routes, hosts(names_of(host), port))
+        station = Station(model, operator.scene.tool, access)
+        shown = f"[{host}]" if ":" in host else host
+        near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
+        val = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())
+        terminals = PageDoor(val.enter).route
+        facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
+        recordings = Recordings(operator, Shelf(shelved.directory), access, facts)
+        routes = [*operator.routes, terminals, *recordings.routes, *station.routes]
+        app = application(routes, hosts(names_of(host), port))
+        await stack.enter_async_context(station.running())
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())
+        await stack.enter_async_context(recordings.running())
+        await stack.enter_async_context(val.running())
         keep_quiet()
-        shown = f"[{host}]" if ":" in host else host
         typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
-        typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}", err=True)
+        typer.echo(f"vrs: operator station on http://{shown}:{port}/")
         if val_listening is not None:
-            near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
-            door = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())
-            await stack.enter_async_context(door.listening(val_listening))
+            await stack.enter_async_context(val.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
         sys.stdout.flush()
         if doors.until_eof:
             end_with_input(ended)
-        await ended.wait()
+        ending = asyncio.create_task(ended.wait())
+        await asyncio.wait([robot, ending], return_when=asyncio.FIRST_COMPLETED)
+        if robot.done():
+            operator.robot.url = robot.result()
+            typer.echo(f"vrs: robot at {robot.result()}, emulated delay {conditions.forward.delay.name}", err=True)
+        await ending
+
+
+async def _start_robot(robots: AsyncExitStack, robot_at: str | None, options: Sequence[str]) -> str:
+    """Where the robot is; one is started if there's none."""
+    from interfaces.runtime.live.process import local_robot
+
+    return await robots.enter_async_context(local_robot(options)) if robot_at is None else robot_at
+
+
+async def _abandon(task: asyncio.Task[str]) -> None:
+    """Let a task end that nobody waits for any more."""
+    import asyncio
+
+    task.cancel()
+    await asyncio.wait([task])
+
+
+def _load() -> None:
+    """Import what takes long, while the robot's process does the same."""
+    import interfaces.runtime.live.operator
+    import interfaces.station.page  # noqa: F401

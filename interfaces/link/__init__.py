@@ -5,8 +5,10 @@ from interfaces.link.clock_sync import ClockEstimate, ClockSync, ClockSyncConfig
 from interfaces.link.conditions import Conditions, LinkConditions, Service
 from interfaces.link.delay import ConstantDelay, DelayProfile, DelaySource
 from interfaces.link.gamma import GammaDelay
+from interfaces.link.gauge import Gauge, Measured
+from interfaces.link.lane import Lane
 from interfaces.link.link import Direction, Link, LinkTotals, direction
-from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model
+from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
 from interfaces.link.measured import HeavyTailedDelay
 from interfaces.link.packets import LossReason, PacketLog, PacketRecord, Totals
 from interfaces.link.path import Fate, Path
@@ -48,15 +50,18 @@ __all__ = [
     "Evidence",
     "Fate",
     "GammaDelay",
+    "Gauge",
     "GilbertElliottLoss",
     "HeavyTailedDelay",
     "Hop",
+    "Lane",
     "Link",
     "LinkConditions",
     "LinkStatistics",
     "LinkTotals",
     "LossModel",
     "LossReason",
+    "Measured",
     "PacketLog",
     "PacketRecord",
     "Path",
@@ -78,4 +83,5 @@ __all__ = [
     "delay_profile",
     "direction",
     "loss_model",
+    "spelled_loss",
 ]

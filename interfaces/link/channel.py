@@ -63,7 +63,7 @@ class Channel(Generic[T]):
         self._conditions = conditions
         self._path = Path(conditions, rng) if path is None else path
         self._flight: list[tuple[float, int, Delivery[T], PacketRecord]] = []
-        self._order = self._count = 0
+        self._order = 0
         self._sent = -float("inf")
         self._last_arrival = -float("inf")
         self.log = PacketLog() if log is None else log
@@ -85,8 +85,7 @@ class Channel(Generic[T]):
         """
         now, size = moment("now", now, self._sent), whole("size", size, 0, 2**31)
         self._sent = now
-        number, self._count = self._count, self._count + 1
-        self.log.sent(size)
+        number = self.log.sent(size)
         fate = self._path.fate(now, size)
         if fate.lost is not None or len(self._flight) >= self._conditions.capacity:
             reason = fate.lost or LossReason.CAPACITY
@@ -127,6 +126,14 @@ class Channel(Generic[T]):
     def in_flight(self) -> int:
         """Packets on their way, copies included."""
         return len(self._flight)
+
+    def change(self, conditions: Conditions) -> None:
+        """Let other conditions hold for what is sent from now on; the path's own decide its fate."""
+        self._conditions = conditions
+
+    def latest(self) -> float:
+        """When the last of what is on its way arrives [s]; −∞ where nothing is."""
+        return max((arrival for arrival, *_ in self._flight), default=-float("inf"))
 
 
 def moment(name: str, value: object, earliest: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from interfaces.link.channel import Channel
 from interfaces.link.conditions import Conditions, LinkConditions, Service
+from interfaces.link.lane import Lane
 from interfaces.link.packets import MAX_RECORDS, PacketLog, Totals
 from interfaces.link.path import Path
 from interfaces.link.stream import Stream
@@ -32,16 +33,25 @@ class Link(Generic[T, U]):
     """Two directions, T from the operator to the robot, U back, without input or output of their own.
 
     Args:
-        conditions: What each direction does; `service` says whether it is a `Channel` or a `Stream`.
+        conditions: What each direction does at first; see `Lane`.
         rng: Source of everything random in it; the directions draw independently.
         keep: Most records that each direction's log keeps until they're taken.
     """
 
     def __init__(self, conditions: LinkConditions, rng: np.random.Generator, *, keep: int = MAX_RECORDS) -> None:
         there, back = rng.spawn(2)
-        self.conditions = conditions
-        self.forward: Direction[T] = direction(conditions.forward, there, log=PacketLog(keep))
-        self.backward: Direction[U] = direction(conditions.backward, back, log=PacketLog(keep))
+        self.forward: Lane[T] = Lane(conditions.forward, there, log=PacketLog(keep))
+        self.backward: Lane[U] = Lane(conditions.backward, back, log=PacketLog(keep))
+
+    @property
+    def conditions(self) -> LinkConditions:
+        """What each direction does now."""
+        return LinkConditions(self.forward.conditions, self.backward.conditions)
+
+    def change(self, conditions: LinkConditions, now: float) -> None:
+        """Let other conditions hold for what is sent from now [s] on; see `Lane.change`."""
+        self.forward.change(conditions.forward, now)
+        self.backward.change(conditions.backward, now)
 
     def next_deadline(self) -> float | None:
         """When the next packet arrives in either direction, or is sent again [s]; None when both are idle."""

@@ -107,6 +107,15 @@ def loss_model(text: str) -> LossModel:
     raise InvalidValueError("loss", text, ALLOWED)
 
 
+def spelled_loss(model: LossModel) -> str:
+    """A loss model as the command line spells it; in other words where it can't."""
+    if isinstance(model, BernoulliLoss):
+        return f"{model.share:g}"
+    if (model.loss_bad, model.loss_good) == (1.0, 0.0):
+        return f"burst:{model.share:g},{1.0 / model.leave:g}"
+    return f"bursts, {model.share:g} in the long run"
+
+
 class _Independent:
     def __init__(self, share: float, rng: np.random.Generator) -> None:
         self._share, self._rng = share, rng

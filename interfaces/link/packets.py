@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 MAX_RECORDS = 10_000
@@ -88,11 +89,14 @@ class PacketLog:
         self._sent = self._copies = self._arrived = self._discarded = self._resent = 0
         self._bytes_sent = self._bytes_arrived = self._forgotten = 0
         self._delay_sum, self._delay_min, self._delay_max = 0.0, math.inf, 0.0
+        self.told: Callable[[PacketRecord], None] | None = None
+        """Is told what became of each packet, at once."""
 
-    def sent(self, size: int) -> None:
-        """Count a packet of `size` bytes that was sent."""
+    def sent(self, size: int) -> int:
+        """Count a packet of `size` bytes that was sent, and return its number, from 0."""
         self._sent += 1
         self._bytes_sent += size
+        return self._sent - 1
 
     def copied(self) -> None:
         """Count a second copy."""
@@ -110,6 +114,8 @@ class PacketLog:
         """Keep what became of a packet."""
         self._forgotten += len(self._records) == self._records.maxlen
         self._records.append(record)
+        if self.told is not None:
+            self.told(record)
         if record.lost is not None:
             self._lost[record.lost.value] += 1
         elif record.arrived is not None:

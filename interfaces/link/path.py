@@ -41,6 +41,7 @@ class Path:
     def __init__(self, conditions: Conditions, rng: np.random.Generator) -> None:
         loss, reorder, duplicate, another_way = rng.spawn(4)
         self._conditions = conditions
+        self._rng, self._loss, self._another_way = rng, loss, another_way
         self._delays = conditions.delay.source(rng)
         self._losses = conditions.loss.source(loss)
         self._reorder, self._duplicate = reorder, duplicate
@@ -48,6 +49,15 @@ class Path:
         self._queue: deque[tuple[float, int]] = deque()
         self._queued_bytes = 0
         self._free = self._now = -math.inf
+
+    def change(self, conditions: Conditions) -> None:
+        """Let other conditions decide from now on; what isn't another one goes on, and keeps its state."""
+        before, self._conditions = self._conditions, conditions
+        if conditions.delay != before.delay:
+            self._delays = conditions.delay.source(self._rng)
+            self._other_delays = conditions.delay.source(self._another_way)
+        if conditions.loss != before.loss:
+            self._losses = conditions.loss.source(self._loss)
 
     def fate(self, now: float, size: int = 0, *, waits: bool = False) -> Fate:
         """Decide the fate of a packet.

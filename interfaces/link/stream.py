@@ -67,12 +67,12 @@ class Stream(Generic[T]):
         self._waiting: dict[int, _Waiting[T]] = {}
         self._events: list[tuple[float, int, int, bool]] = []
         self._ready: deque[tuple[Delivery[T], PacketRecord]] = deque()
-        self._order = self._count = self._accepted = self._next = 0
+        self._order = self._accepted = self._next = 0
         self._missing = 0
         """Packets whose last attempt was lost."""
         self._hopeless = 0
         """Packets that were given up, and whose turn hasn't come."""
-        self._now = self._newest = -math.inf
+        self._now = self._newest = self._earliest = -math.inf
         self.log = PacketLog() if log is None else log
         """What became of each packet."""
         self.lost = 0
@@ -95,8 +95,7 @@ class Stream(Generic[T]):
         """
         self._advance(moment("now", now, self._now))
         size = whole("size", size, 0, 2**31)
-        number, self._count = self._count, self._count + 1
-        self.log.sent(size)
+        number = self.log.sent(size)
         if self.in_flight() >= self._conditions.capacity:
             self.lost += 1
             self.log.settle(PacketRecord(number, size, now, None, LossReason.CAPACITY))
@@ -113,14 +112,30 @@ class Stream(Generic[T]):
         Raises:
             InvalidValueError: If now is not finite.
         """
-        now = finite("now", now, "finite seconds")
-        self._advance(max(now, self._now))
+        self.advance(now)
         taken: list[Delivery[T]] = []
         while self._ready and self._ready[0][0].arrived <= now:
             delivery, record = self._ready.popleft()
             self.log.settle(record)
             taken.append(delivery)
         return tuple(taken)
+
+    def advance(self, now: float) -> None:
+        """Send again what is due by now [s].
+
+        Raises:
+            InvalidValueError: If now is not finite.
+        """
+        self._advance(max(finite("now", now, "finite seconds"), self._now))
+
+    def change(self, conditions: Conditions, *, earliest: float = -math.inf) -> None:
+        """Let other conditions hold for what is sent, or sent again, from now on; the path's own decide its fate.
+
+        Args:
+            conditions: The new ones; `advance` was called with the time of the change.
+            earliest: Nothing that's sent from now on arrives before [s].
+        """
+        self._conditions, self._earliest = conditions, max(self._earliest, earliest)
 
     def next_deadline(self) -> float | None:
         """When something arrives or is sent again [s]; a receipt then may still be empty. None when idle."""
@@ -152,8 +167,9 @@ class Stream(Generic[T]):
         fate = self._path.fate(t, packet.size, waits=True)
         if fate.arrivals:
             self._missing -= 1
-            self._newest = max(self._newest, fate.arrivals[0])
-            self._at(fate.arrivals[0], packet.place, lands=True)
+            arrival = max(fate.arrivals[0], self._earliest)
+            self._newest = max(self._newest, arrival)
+            self._at(arrival, packet.place, lands=True)
             for _ in fate.arrivals[1:]:
                 self.log.copied()
                 self.log.discarded()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from typing import NamedTuple, Protocol
@@ -22,16 +22,21 @@ from interfaces.recording.messages import (
     ChangeEntry,
     CommandEntry,
     FullReceipt,
+    GivenEntry,
     HistoryEntry,
+    Late,
     LinkEntry,
     ReceiptEntry,
     VirtualSample,
     segment_entries,
 )
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, virtual_pose
+from interfaces.stream.wire.commands import command_wire
 from interfaces.teleop import Correction, Deed, OperatorSite, Report
+from vrs.commands import Profile
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
+from vrs.standing import Standing
 from vrs.timeline import Timeline
 
 PART = 256
@@ -42,6 +47,8 @@ MOST_AT_ONCE = 1200
 """Samples of a robot that are taken at once; the others next time."""
 MOST_REPEATED = 20_000
 """Segments of a timeline that's written once more when a recording ends, at most."""
+MOST_BEFORE = 20_000
+"""Segments that a recording which begins in the middle has of the time before, less those to come."""
 _WAITING = 1024
 """Things that happened and weren't written yet, at most."""
 _WATCHED = 64
@@ -100,8 +107,18 @@ class Capture:
     While it listens it only takes notes: commands don't wait for it.
     """
 
-    def __init__(self, operator: OperatorSite, model: RobotModel, *, now: float, step: float, every: bool) -> None:
-        """Begin with a site that wasn't commanded yet.
+    def __init__(
+        self,
+        operator: OperatorSite,
+        model: RobotModel,
+        *,
+        now: float,
+        step: float,
+        every: bool,
+        most_before: int = MOST_BEFORE,
+        apart: bool = False,
+    ) -> None:
+        """Begin with a site, at its start or in the middle.
 
         Args:
             operator: The site; this becomes its listener.
@@ -109,11 +126,14 @@ class Capture:
             now: By the operator's clock [s].
             step: Between two samples of the virtual robot [s].
             every: Whether receipts name every command that they shifted or superseded, however many.
+            most_before: See `MOST_BEFORE`.
+            apart: Whether somebody else writes what `first` gives, before anything else.
         """
         self.operator, self.model, self.step, self._every = operator, model, step, every
         self.put: Put | None = None
         """Takes what is written; None at first, and when nothing can be written any more."""
-        self._timeline = operator.engine.timeline
+        self._timeline = timeline = operator.engine.timeline
+        self._cut = max(min(timeline.index_at(now) - 2, len(timeline) - most_before), 0)
         self._happened: deque[_Happened] = deque()
         self._due: list[tuple[float, Message]] = []
         self._number = self._edit = 0
@@ -123,8 +143,22 @@ class Capture:
         self._pose = Paced(POSE_RATE)
         self.links = Paced(LINK_RATE)
         """When links of the virtual robot are shown."""
+        fresh = not operator.engine.newest and not len(timeline) and timeline.start == now
+        self.late = None if fresh else operator.engine.standing()
+        """How the engine stood; None where nothing had happened yet."""
+        self._began = timeline, now
         operator.listener = self
-        self._add_edit(whole_entries(self._timeline, 0, now))
+        for message in () if apart else self.first():
+            self.add(now, message)
+
+    def first(self) -> Iterator[Message]:
+        """What a recording begins with: the timeline so far, and commands that aren't over. From any thread."""
+        timeline, now = self._began
+        yield from whole_entries(timeline, 0, now, cut=self._cut)
+        for known in () if self.late is None else self.late.known:
+            command = None if known.command is None else command_wire(known.command, packed=False)
+            receipt = FullReceipt.of(self._named(known.receipt))
+            yield GivenEntry(now, receipt, command, known.profile is Profile.JERK_LIMITED)
 
     def commanded(self, deed: Deed) -> None:
         """Note a command."""
@@ -234,13 +268,10 @@ class Capture:
             if after is not before:
                 changed = True
                 self._edit += 1
-                self._add_edit(edit_entries(before, after, self._edit, at, command_id))
+                for change in edit_entries(before, after, self._edit, at, command_id, cut=self._cut):
+                    self.add(change.at, change)
         if changed:
             self._revise()
-
-    def _add_edit(self, entries: Iterable[ChangeEntry | HistoryEntry]) -> None:
-        for entry in entries:
-            self.add(entry.at, entry)
 
     def _revise(self) -> None:
         """Write down receipts that later commands changed."""
@@ -265,8 +296,8 @@ class Capture:
 
     def whole(self, t: float) -> None:
         """Write down the newest timeline once more at a time [s]: it's known then, whatever is lost of a file."""
-        if len(self._timeline) <= MOST_REPEATED:
-            for entry in whole_entries(self._timeline, self._edit, t):
+        if len(self._timeline) - self._cut <= MOST_REPEATED:
+            for entry in whole_entries(self._timeline, self._edit, t, cut=self._cut):
                 self.add(t, entry)
 
     def receipts(self, t: float, site: str, receipts: Sequence[Receipt]) -> None:
@@ -276,7 +307,7 @@ class Capture:
 
 
 def edit_entries(
-    before: Timeline, after: Timeline, edit: int, at: float, command_id: int | None
+    before: Timeline, after: Timeline, edit: int, at: float, command_id: int | None, *, cut: int = 0
 ) -> tuple[ChangeEntry | HistoryEntry, ...]:
     """An edit as it stands in a recording.
 
@@ -286,19 +317,20 @@ def edit_entries(
         edit: Its number, from 1.
         at: The engine's time [s]: nothing changed before that.
         command_id: Who made it, if a command did.
+        cut: First segment that the recording has; edits lie after it.
     """
     change = difference(before, after, at, edit=edit, command_id=command_id)
     if change is None or len(change.segments) > MOST_CHANGED:
-        return whole_entries(after, edit, at)
+        return whole_entries(after, edit, at, cut=cut)
     entry = ChangeEntry(
         edit=edit,
         base=change.base,
         at=at,
         version=after.version,
-        first=change.first,
+        first=change.first - cut,
         dof=after.dof,
         segments=segment_entries(change.segments),
-        tail=change.tail,
+        tail=None if change.tail is None else change.tail - cut,
         tail_start=change.tail_start,
         end=change.end,
         command_id=command_id,
@@ -306,21 +338,34 @@ def edit_entries(
     return (entry,)
 
 
-def whole_entries(timeline: Timeline, edit: int, at: float) -> tuple[HistoryEntry, ...]:
-    """A whole timeline as it stands in a recording, in parts."""
+def whole_entries(timeline: Timeline, edit: int, at: float, *, cut: int = 0) -> tuple[HistoryEntry, ...]:
+    """A whole timeline as it stands in a recording, in parts; from a segment on, where `cut` isn't 0."""
     total = len(timeline)
+    start = timeline.start_of(cut) if cut else timeline.start
+    initial = timeline.sample(start) if cut else timeline.initial
     return tuple(
         HistoryEntry(
             edit=edit,
             at=at,
             version=timeline.version,
-            initial=timeline.initial.tolist(),
-            start=timeline.start,
-            total=total,
-            index=index,
+            initial=initial.tolist(),
+            start=start,
+            total=total - cut,
+            index=index - cut,
             segments=segment_entries(timeline.segments[index : index + PART]),
         )
-        for index in range(0, max(total, 1), PART)
+        for index in range(cut, max(total, cut + 1), PART)
+    )
+
+
+def late_of(stand: Standing | None) -> Late | None:
+    """How an engine stood, as it's written at the beginning."""
+    if stand is None:
+        return None
+    steered, at = (None, 0.0) if stand.steered is None else stand.steered
+    limits = stand.limits
+    return Late(
+        stand.newest, limits.qd_max.tolist(), limits.qdd_max.tolist(), limits.qddd_max.tolist(), steered, at
     )
 
 

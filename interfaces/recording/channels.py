@@ -46,7 +46,12 @@ class Channel:
 
 CHANNELS: Final = (
     Channel("/session", "vrs.Session", (m.Begin, m.Dropped, m.End), many=False),
-    Channel("/commands", "vrs.Command", (m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry), many=False),
+    Channel(
+        "/commands",
+        "vrs.Command",
+        (m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry),
+        many=False,
+    ),
     Channel("/timeline", "vrs.Timeline", (m.HistoryEntry, m.ChangeEntry), many=False),
     Channel("/virtual/joints", "vrs.VirtualJoints", (m.VirtualSample,)),
     Channel("/real/joints", "vrs.RealJoints", (m.RealSample,)),
@@ -64,9 +69,9 @@ TOPIC_OF: Final = {kind: channel.topic for channel in CHANNELS for kind in chann
 """Topic of a kind of message."""
 
 Message: TypeAlias = (
-    m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.HistoryEntry
-    | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms | m.LinkEntry
-    | m.EventEntry
+    m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.GivenEntry
+    | m.HistoryEntry | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms
+    | m.LinkEntry | m.EventEntry
 )  # fmt: skip
 """What can be recorded."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from interfaces.recording.messages import OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
-from interfaces.recording.rerun import Rerun, rerun
+from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.runs import extras_of
 from interfaces.recording.track import APART, REAL, Track
 from interfaces.report.summary import Json, summarize
@@ -18,7 +18,7 @@ from interfaces.runtime.attribution import Attribution, OffsetOutcome
 from interfaces.runtime.happenings import waits
 from interfaces.runtime.offset import ADAPTIVE
 from interfaces.runtime.run import Event, Packet, TwinRun
-from interfaces.runtime.session import commands_alone
+from interfaces.runtime.session import carried_out
 from interfaces.teleop import Correction
 from robots.onboard.playout import PlayoutConfig
 from vrs.errors import FormatError
@@ -112,6 +112,10 @@ class _Reading:
             self.missing.append("the real robot's own references: the virtual robot's timeline stands for its")
             q_reference = np.where(np.isfinite(q_reference), q_reference, shown.sample(play))
         receipts = again.receipts if shown is again.timeline else recording.receipts("virtual")
+        if begin.late is not None:
+            # A command that was over when the recording began stands there for what may go on with it.
+            newest = begin.late.newest
+            receipts = tuple(r for r in receipts if r.command_id > newest or (r.end or -math.inf) > begin.t)
         answers, messages = recording.receipts("real"), recording.messages()
         return TwinRun(
             model=model,
@@ -199,7 +203,7 @@ class _Reading:
     def _alone(self) -> Timeline:
         """What the commands alone make of the virtual robot."""
         sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
-        return commands_alone(self.recording.model, frozen_array(self.begin.q), sent, now=self.begin.t)
+        return carried_out(*begun(self.recording), sent)
 
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[Packet, ...]:
         if not self._live:

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from interfaces.recording.capture import Capture, Paced
+from interfaces.recording.capture import Capture, Paced, late_of
+from interfaces.recording.errors import RecordingError
 from interfaces.recording.messages import Begin, End, EventEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
+from interfaces.recording.sink import Sink
 from interfaces.runtime.happenings import correction_events
 from interfaces.software import software
 from interfaces.teleop import Correction, Deed, Report, RobotLine
@@ -45,13 +47,15 @@ class LiveRecording:
     """What it does when messages stay away."""
     failed: Callable[[str], None] | None = None
     """Is told once why nothing more is recorded."""
+    over: bool = True
+    """Whether a file that's there already is written over."""
 
 
 class _LiveCapture(Capture):
     """A capture that knows the real robot by its reports."""
 
-    def __init__(self, line: RobotLine, model: RobotModel) -> None:
-        super().__init__(line.operator, model, now=0.0, step=1.0 / RATE, every=False)
+    def __init__(self, line: RobotLine, model: RobotModel, now: float) -> None:
+        super().__init__(line.operator, model, now=now, step=1.0 / RATE, every=False, apart=True)
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._reports: list[Report] = []
         self._measured = -np.inf
@@ -105,34 +109,40 @@ class _LiveCapture(Capture):
 
 
 class LiveRecorder:
-    """Records an operator's site. `advance` takes its turns; a thread of the recorder's does the writing."""
+    """Records an operator's site. `advance` takes its turns; a thread of the recorder's does the writing.
+
+    It begins with a session, or in its middle; takes notes from when it's made, and writes once `open` has made a
+    file. `finish` ends it; or `end`, and `close` from a thread, which takes a moment.
+    """
 
     def __init__(
         self,
         what: LiveRecording,
         line: RobotLine,
         model: RobotModel,
-        q: Array,
         *,
         seed: int,
         began: float,
+        now: float = 0.0,
     ) -> None:
-        """Begin the file.
+        """Begin to take notes.
 
         Args:
             what: What is recorded, and where to.
-            line: From the operator's site to the robot; nothing was commanded yet.
+            line: From the operator's site to the robot; nobody else listens to that site.
             model: The robot.
-            q: Joints of the virtual robot at first [rad], (n,).
             seed: Of the emulated link.
-            began: Seconds since 1970 at session time 0.
-
-        Raises:
-            RecordingError: If the file can't be made.
+            began: Seconds since 1970 now.
+            now: Session time [s].
         """
-        link = line.link.conditions.forward
-        begin = Begin(
-            t=0.0,
+        self.path, self.since = what.path, now
+        self._what, self._line, self._failed = what, line, what.failed
+        self._capture = _LiveCapture(line, model, now)
+        for way in (line.link.forward, line.link.backward):
+            way.log.take()
+        link, engine = line.link.conditions.forward, line.operator.engine
+        self._begin = Begin(
+            t=now,
             robot=model.name,
             driver="live",
             title=f"live {model.name}",
@@ -142,18 +152,38 @@ class LiveRecorder:
             service=str(link.service),
             link_loss=what.link_loss,
             step=1.0 / RATE,
-            q=np.asarray(q, float).tolist(),
-            lateness=str(line.operator.engine.parameters["lateness"]),
+            q=engine.timeline.sample(now).tolist(),
+            lateness=str(engine.parameters["lateness"]),
             software=software(),
             began=began,
+            late=late_of(self._capture.late),
         )
-        self.path, self._line, self._failed = what.path, line, what.failed
-        self._recorder = Recorder(what.path, begin)
-        self._capture = _LiveCapture(line, model)
-        self._capture.put = self._recorder.put
+        self._recorder: Recorder | None = None
         self._real, self._real_links = Paced(POSE_RATE), Paced(LINK_RATE)
         self._connected = self._told = False
         self._stopped = ""
+        self._rest: tuple[End, tuple[Receipt, ...]] | None = None
+
+    def open(self) -> None:
+        """Make the file, with what is known so far; from any thread.
+
+        Raises:
+            RecordingError: If the file can't be made.
+        """
+        sink = Sink.create(self.path, over=self._what.over)
+        try:
+            self._recorder = Recorder(sink, self._begin, first=self._capture.first())
+        except RecordingError:
+            self.leave()
+            raise
+        self._capture.put = self._recorder.put
+
+    def leave(self) -> None:
+        """Listen no more."""
+        capture = self._capture
+        capture.put = None
+        if capture.operator.listener is capture:
+            capture.operator.listener = None
 
     def advance(self, *, now: float, connected: bool) -> None:
         """Write down what is due at a time [s].
@@ -163,6 +193,8 @@ class LiveRecorder:
             connected: Whether the robot is heard of.
         """
         capture = self._capture
+        if capture.put is None:
+            return
         self._look()
         if connected is not self._connected:
             self._connected = connected
@@ -186,15 +218,20 @@ class LiveRecorder:
         capture.show(self._real, t, q, capture.model.forward, real_pose)
         capture.show_links("real", self._real_links, t, q)
 
+    def tell(self, t: float, kind: str, text: str) -> None:
+        """Write down an event of a kind at a time [s]."""
+        if not self._stopped:
+            self._capture.tell(t, kind, text)
+
     @property
     def problem(self) -> str | None:
         """Why it doesn't record; None while it does."""
-        return self._stopped or self._recorder.problem
+        return self._stopped or (None if self._recorder is None else self._recorder.problem)
 
     def stop(self, why: str) -> None:
         """Record nothing more, for a reason."""
         self._stopped = f"recording failed: {why}"
-        self._capture.operator.listener = self._capture.put = None
+        self.leave()
         self._look()
 
     def _look(self) -> None:
@@ -206,17 +243,36 @@ class LiveRecorder:
 
     def finish(self, *, now: float) -> None:
         """Write down the rest, and close the file, which takes a moment."""
-        capture = self._capture
-        if self._stopped:
-            self._recorder.close(End(now))
+        self.end(now=now)
+        self.close()
+
+    def end(self, *, now: float) -> None:
+        """Take the last notes."""
+        receipts: tuple[Receipt, ...] = ()
+        if not self._stopped:
+            self.advance(now=now, connected=self._connected)
+            receipts = self._capture.operator.engine.receipts
+            late = self._begin.late
+            if late is not None:
+                receipts = tuple(one for one in receipts if one.command_id > late.newest)
+        put = self._capture.put
+        self.leave()
+        self._capture.put = put
+        self._rest = End(now), receipts
+
+    def close(self) -> None:
+        """Write the last notes down, and close the file; from any thread, after `end`."""
+        recorder, capture = self._recorder, self._capture
+        assert self._rest is not None
+        end, receipts = self._rest
+        if recorder is None:
             return
-        self.advance(now=now, connected=self._connected)
-        engine = capture.operator.engine
-        capture.receipts(now, "virtual", engine.receipts)
-        capture.whole(now)
-        capture.write_out()
-        capture.operator.listener = capture.put = None
-        self._recorder.close(End(now))
+        if not self._stopped:
+            capture.receipts(end.t, "virtual", receipts)
+            capture.whole(end.t)
+            capture.write_out()
+        capture.put = None
+        recorder.close(end)
         self._look()
 
     def health(self) -> dict[str, Any]:
@@ -224,7 +280,12 @@ class LiveRecorder:
         recorder = self._recorder
         return {
             "file": str(self.path),
-            "written_s": recorder.written,
-            "dropped": sum(recorder.dropped.values()),
+            "written_s": self._begin.t if recorder is None else recorder.written,
+            "dropped": 0 if recorder is None else sum(recorder.dropped.values()),
             "problem": self.problem,
         }
+
+    @property
+    def size(self) -> int:
+        """Bytes in the file."""
+        return 0 if self._recorder is None else self._recorder.size

@@ -45,7 +45,7 @@ class MarkKind(enum.StrEnum):
     STOPPED = "stopped"
     """The real robot stopped by itself, its watchdog or a tolerance."""
     LINK = "link"
-    """Messages were lost or late, the link came or went."""
+    """Messages were lost or late, the link came or went, or was changed."""
     OTHER = "other"
     """A load, an end that wasn't reached."""
 
@@ -60,6 +60,7 @@ OF_EVENTS: Final = {
     "waited": MarkKind.LINK,
     "up": MarkKind.LINK,
     "down": MarkKind.LINK,
+    "rerouted": MarkKind.LINK,
 }
 """Kinds of events, as they are marked; all others are `OTHER`."""
 

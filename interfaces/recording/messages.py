@@ -28,11 +28,12 @@ from interfaces.stream.wire.fields import (
     Word,
 )
 from interfaces.stream.wire.segments import MOST_POWERS
-from vrs.commands import Command
+from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
 from vrs.receipt import Receipt
 from vrs.segment import PolynomialSegment, known_segment
+from vrs.standing import Known
 from vrs.timeline import Timeline
 
 FORMAT = "vrs-recording/1"
@@ -47,6 +48,21 @@ Site: TypeAlias = Literal["virtual", "real"]
 
 class Entry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
     """A message of a channel that has several kinds."""
+
+
+class Late(Wire, frozen=True, omit_defaults=True, gc=False):
+    """How the operator's engine stood when a recording began in the middle of its session; see `vrs.standing`."""
+
+    newest: Count
+    """Highest command id given out."""
+    qd_max: Joints
+    """Limits in force [rad/s], and so on."""
+    qdd_max: Joints
+    qddd_max: Joints
+    steered: Number | None = None
+    """The command that the next steering input goes on with."""
+    steered_at: Time = 0.0
+    """When that began [s]."""
 
 
 class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_only=True):
@@ -75,7 +91,9 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     software: Word
     """What wrote the file, with its version."""
     began: Stamp | None = None
-    """Seconds since 1970; None in the laboratory, where the same seed gives the same bytes."""
+    """Seconds since 1970 at `t`; None in the laboratory, where the same seed gives the same bytes."""
+    late: Late | None = None
+    """None where nothing had been commanded yet."""
 
 
 class Drop(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -138,6 +156,30 @@ class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="comman
         """
         command: Command | None = None if self.command is None else self.command.read()
         return command
+
+
+class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
+    """A command from before the recording that wasn't over when it began, or by which the arm had moved last."""
+
+    t: Time
+    receipt: FullReceipt
+    command: CommandWire | None = None
+    """None where it's no motion command."""
+    smooth: bool = False
+    """Whether it moves the arm with bounded jerk."""
+
+    @property
+    def known(self) -> Known:
+        """What an engine that goes on from here is told.
+
+        Raises:
+            InvalidValueError: If it's no command's.
+        """
+        command = None if self.command is None else self.command.read()
+        if command is not None and not isinstance(command, MotionCommand):
+            raise InvalidValueError("command", command, "a motion command")
+        profile = Profile.JERK_LIMITED if self.smooth else Profile.PARABOLIC
+        return Known(self.receipt.read(), command, profile)
 
 
 class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):

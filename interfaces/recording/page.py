@@ -40,6 +40,15 @@ TEXTS: Final = 3
 """Lines of what is shown as one."""
 
 
+BEGIN: Final = b'{"kind":"begin"}'
+"""What every page is told first."""
+
+
+def page_files() -> list[BaseRoute]:
+    """The routes of the page and its files."""
+    return files("replay", "interfaces.recording", ("seekbar.js", "controls.js"))
+
+
 class _Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do"):
     """What a page asks for."""
 
@@ -104,6 +113,8 @@ class ReplayPage:
         admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         first: Callable[[float], None] | None = None,
+        board: Newest | None = None,
+        show: float = SHOW,
     ) -> None:
         """Make the scenes.
 
@@ -113,25 +124,27 @@ class ReplayPage:
             admit: See `Viewers`.
             authorize: See `Viewers`.
             first: Called with the user's time [s] when the first page is there.
+            board: What pages look at already; one of its own unless given.
+            show: Time between two frames [s].
         """
-        self.playback, self._clock, self._first = playback, clock, first
+        self.playback, self._clock, self._first, self._show = playback, clock, first, show
         self.scenes = tuple(MeshcatScene(track.recording.model) for track in playback.tracks)
-        self.board = Newest(b'{"kind":"begin"}')
+        self.board = Newest(BEGIN) if board is None else board
         """What pages are told: JSON by key."""
         self._told = float("-inf")
         self._marked = float("-inf")
         self._versions: list[tuple[int, tuple[float, float]] | None] = [None] * len(playback.tracks)
         self._put("recordings", {"kind": "recordings", "items": _recordings(playback)})
+        self.viewers = tuple(Viewers(scene, admit, authorize) for scene in self.scenes)
+        """Of each scene."""
+        board_viewers = Viewers(self.board, admit, authorize, hear=self.hear, most_heard=MOST_HEARD)
         self._routes: list[BaseRoute] = [
             Route("/", _to_page),
-            *files("replay", "interfaces.recording", ("seekbar.js", "controls.js")),
-            WebSocketRoute(
-                "/replay/board",
-                Viewers(self.board, admit, authorize, hear=self.hear, most_heard=MOST_HEARD).serve,
-            ),
+            *page_files(),
+            WebSocketRoute("/replay/board", board_viewers.serve),
             *(
-                WebSocketRoute(f"/replay/scene/{index}", Viewers(scene, admit, authorize).serve)
-                for index, scene in enumerate(self.scenes)
+                WebSocketRoute(f"/replay/scene/{index}", viewers.serve)
+                for index, viewers in enumerate(self.viewers)
             ),
         ]
 
@@ -153,7 +166,7 @@ class ReplayPage:
     async def _run(self) -> None:
         while True:
             self.turn(now=self._clock.now())
-            await asyncio.sleep(SHOW if self.board.readers else IDLE)
+            await asyncio.sleep(self._show if self.board.readers else IDLE)
 
     def turn(self, *, now: float) -> None:
         """Show what is to be shown now [s]."""

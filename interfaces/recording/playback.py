@@ -43,6 +43,8 @@ class Align(enum.StrEnum):
     """The timeline: equal times are shown together."""
     BEGAN = "began"
     """The calendar: what happened at once is shown together."""
+    START = "start"
+    """Their beginnings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -338,6 +340,8 @@ def _shift(first: Recording, recording: Recording, align: Align) -> float:
     if align is Align.TIMELINE or recording is first:
         return 0.0
     one, other = first.session, recording.session
+    if align is Align.START:
+        return one.t - other.t
     if one.began is None or other.began is None:
         raise InvalidValueError("align", str(align), "timeline, for recordings that don't know the calendar")
     return (other.began - other.t) - (one.began - one.t)

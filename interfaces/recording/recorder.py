@@ -6,6 +6,7 @@ Nobody waits for the disk. What finds no room is counted and left out; a disk th
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from pathlib import Path
 from threading import Event, Lock, Thread
 
@@ -38,6 +39,7 @@ class Recorder:
         flush: float = FLUSH,
         room: int = ROOM,
         clock: Clock | None = None,
+        first: Iterable[Message] = (),
     ) -> None:
         """Begin a recording; the beginning is in the file when this returns.
 
@@ -47,12 +49,19 @@ class Recorder:
             flush: Longest span of a block [s].
             room: Bytes of messages that wait, at most.
             clock: Says how long the disk takes; the machine's unless given.
+            first: What is written before anything else, however long that takes.
 
         Raises:
             RecordingError: If the file can't be made, or doesn't take the beginning.
         """
         self._clock = WallClock() if clock is None else clock
         self._writer = RecordingWriter(file, session, flush=flush)
+        try:
+            for message in first:
+                self._writer.write(message, t=session.t)
+        except RecordingError:
+            self._writer.abandon()
+            raise
         self._flush, self._room = flush, room
         self._queue: deque[tuple[int, bytes, float]] = deque()
         self._lock = Lock()

@@ -23,6 +23,7 @@ from interfaces.recording.messages import (
     Dropped,
     End,
     EventEntry,
+    GivenEntry,
     HistoryEntry,
     LinkEntry,
     PacketEntry,
@@ -32,10 +33,11 @@ from interfaces.recording.scan import NUMBERS, Blocks
 from interfaces.recording.source import Source
 from interfaces.recording.track import REAL, VIRTUAL, Track, Tracks
 from interfaces.runtime.run import Event, Packet
-from vrs.errors import FormatError
+from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.receipt import Receipt
 from vrs.segment import times
+from vrs.standing import Known
 from vrs.timeline import Timeline
 
 
@@ -183,7 +185,7 @@ class Recording:
             if isinstance(entry, ReceiptEntry):
                 if entry.site == site:
                     found[entry.receipt.command_id] = entry.receipt
-            elif isinstance(entry, CommandEntry) and site == "virtual" and entry.receipt is not None:
+            elif isinstance(entry, CommandEntry | GivenEntry) and site == "virtual" and entry.receipt is not None:
                 found[entry.receipt.command_id] = entry.receipt
         return tuple(found[command_id].read() for command_id in sorted(found))
 
@@ -193,7 +195,19 @@ class Recording:
         found = {entry.number: entry for entry in self._commands() if isinstance(entry, PacketEntry)}
         return tuple(Packet(e.command_id, e.sent, e.arrived, e.real_id, e.lost) for _, e in sorted(found.items()))
 
-    def _commands(self) -> list[CommandEntry | Anchor | ReceiptEntry | PacketEntry]:
+    @property
+    def given(self) -> tuple[Known, ...]:
+        """Commands from before the recording that weren't over when it began.
+
+        Raises:
+            FormatError: If one is none.
+        """
+        try:
+            return tuple(entry.known for entry in self._commands() if isinstance(entry, GivenEntry))
+        except InvalidValueError as error:
+            raise FormatError(str(self.path), f"a command from before it: {error}") from None
+
+    def _commands(self) -> list[CommandEntry | Anchor | ReceiptEntry | PacketEntry | GivenEntry]:
         return self._logs["/commands"].entries()
 
     @property

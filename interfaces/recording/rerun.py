@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import msgspec
+import numpy as np
 
 from interfaces.recording.capture import edit_entries
-from interfaces.recording.messages import Anchor, ChangeEntry, CommandEntry, FullReceipt, HistoryEntry
+from interfaces.recording.messages import Anchor, ChangeEntry, CommandEntry, FullReceipt, HistoryEntry, Late
 from vrs.clock import ManualClock
-from vrs.commands import Lateness
+from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import FormatError, VrsError
-from vrs.receipt import Receipt
+from vrs.receipt import Receipt, Status
+from vrs.standing import Standing
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -41,19 +43,45 @@ class Rerun:
     """The newest truth about each command."""
 
 
+def begun(recording: Recording) -> tuple[Engine, ManualClock]:
+    """An engine that stands as the recorded one did when the recording began, and its clock.
+
+    Raises:
+        FormatError: If it can't stand so, or what it needs for that is missing from the file.
+    """
+    begin, where = recording.session, str(recording.path)
+    try:
+        clock, lateness = ManualClock(begin.t), Lateness(begin.lateness)
+        if begin.late is None:
+            return Engine(recording.model, q=begin.q, clock=clock, lateness=lateness), clock
+        edits = recording.edits
+        if not edits or edits[0].number:
+            raise FormatError(where, "the timeline that it begins with is destroyed")
+        engine = Engine(recording.model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
+        engine.take_up(_stand(recording, begin.late, engine))
+    except FormatError:
+        raise
+    except ValueError as error:
+        raise FormatError(where, f"its beginning: {error}") from None
+    return engine, clock
+
+
+def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
+    limits = replace(
+        engine.limits, **{name: np.array(getattr(late, name)) for name in ("qd_max", "qdd_max", "qddd_max")}
+    )
+    steered = None if late.steered is None else (late.steered, late.steered_at)
+    return Standing(late.newest, Lateness(recording.session.lateness), limits, steered, recording.given)
+
+
 def rerun(recording: Recording) -> Rerun:
     """Run the recorded commands again, up to the first that's missing or that makes something else.
 
     Raises:
         FormatError: If the recording is of a robot that isn't known, or holds no commands that can be.
     """
-    begin = recording.session
-    try:
-        clock = ManualClock(begin.t)
-        engine = Engine(recording.model, q=begin.q, clock=clock, lateness=Lateness(begin.lateness))
-    except ValueError as error:
-        raise FormatError(str(recording.path), f"its beginning: {error}") from None
-    again = _Again(engine, clock, recording.changes)
+    engine, clock = begun(recording)
+    again = _Again(engine, clock, recording.changes, late=recording.session.late)
     for entry in recording.commands:
         if entry.number != again.commands + 1:
             some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
@@ -62,7 +90,7 @@ def rerun(recording: Recording) -> Rerun:
             again.missing = f"{some} missing: what follows can't be run again"
             break
         again.run(entry)
-        if again.difference:
+        if again.difference or again.missing:
             break
     else:
         again.finish()
@@ -80,8 +108,15 @@ def rerun(recording: Recording) -> Rerun:
 class _Again:
     """Runs entries in turn, and compares."""
 
-    def __init__(self, engine: Engine, clock: ManualClock, changes: Sequence[HistoryEntry | ChangeEntry]) -> None:
-        self._engine, self._clock = engine, clock
+    def __init__(
+        self,
+        engine: Engine,
+        clock: ManualClock,
+        changes: Sequence[HistoryEntry | ChangeEntry],
+        *,
+        late: Late | None,
+    ) -> None:
+        self._engine, self._clock, self._late = engine, clock, late
         self._recorded: dict[int, list[HistoryEntry | ChangeEntry]] = {}
         for change in changes:
             self._recorded.setdefault(change.edit, []).append(change)
@@ -90,6 +125,7 @@ class _Again:
         self.difference = self.missing = ""
         if first and first[0].version != engine.timeline.version:
             self.difference = "the recording begins with a timeline that commands before it had made"
+        self._taken_up = {receipt.command_id for receipt in engine.receipts}
         self._unseen: list[int] = []
 
     def run(self, entry: CommandEntry | Anchor) -> None:
@@ -98,6 +134,7 @@ class _Again:
         engine, before = self._engine, self._engine.timeline
         try:
             self._clock.set(max(entry.at, self._clock.now()))
+            receipt = None
             if isinstance(entry, Anchor):
                 made = engine.anchor(entry.truth)
                 same = (made.end, made.error.tolist()) == (entry.end, list(entry.error))
@@ -107,13 +144,33 @@ class _Again:
                 command_id = None if receipt is None else receipt.command_id
                 problem = _unlike(receipt, entry.receipt)
         except (VrsError, ValueError) as error:
-            self.difference = f"{_named(entry)} can't be carried out: {error}"
+            if not self._goes_back(entry, None):
+                self.difference = f"{_named(entry)} can't be carried out: {error}"
+            return
+        if problem and self._goes_back(entry, receipt):
             return
         if problem:
             self.difference = f"{_named(entry)} {problem}"
         elif engine.timeline is not before:
             self._edit += 1
             self._compare(edit_entries(before, engine.timeline, self._edit, entry.at, command_id), entry)
+
+    def _goes_back(self, entry: CommandEntry | Anchor, made: Receipt | None) -> bool:
+        """Whether a command needs what only an engine from before the recording knows."""
+        late = self._late
+        if late is None or isinstance(entry, Anchor):
+            return False
+        command, answer = entry.read(), entry.receipt
+        undone = command is None and made is None and answer is not None and answer.command_id <= late.newest
+        resumed = isinstance(command, Resume) and made is not None and made.status is Status.REJECTED
+        of = command.command_id if isinstance(command, Retime | Cancel | InsertVia) else None
+        unknown = of is not None and of <= late.newest and of not in self._taken_up
+        # What was rejected changed nothing.
+        if (undone or resumed or unknown) and (answer is None or answer.status is not Status.REJECTED):
+            self.missing = (
+                f"{_named(entry)} goes back to before the recording began: it and what follows can't be run again"
+            )
+        return undone or resumed or unknown
 
     def _carry_out(self, entry: CommandEntry) -> Receipt | None:
         command = entry.read()

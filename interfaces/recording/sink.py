@@ -39,14 +39,16 @@ class Sink:
         self._failed = False
 
     @classmethod
-    def create(cls, path: Path) -> Sink:
-        """Make a file, or take the place of an old one.
+    def create(cls, path: Path, *, over: bool = True) -> Sink:
+        """Make a file, or take the place of an old one where that's allowed.
 
         Raises:
             RecordingError: If that can't be done.
         """
         try:
-            return cls(path.open("wb", buffering=0), str(path))
+            return cls(path.open("wb" if over else "xb", buffering=0), str(path))
+        except FileExistsError:
+            raise RecordingError(str(path), "it's there already: none is written over") from None
         except OSError as error:
             raise RecordingError(str(path), os.strerror(error.errno or 0)) from error
 

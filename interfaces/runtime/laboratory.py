@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link import Direction, Link, LinkConditions
+from interfaces.link import Lane, Link, LinkConditions
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import Reference, RobotSite
@@ -199,7 +199,7 @@ class Laboratory:
         return self.reference.q if self._body is None else np.concatenate(self._measured)
 
 
-def _time(way: Direction[Any]) -> float:
+def _time(way: Lane[Any]) -> float:
     """When something happens on one direction of the link [s]; infinity for never."""
     t = way.next_deadline()
     return math.inf if t is None else t

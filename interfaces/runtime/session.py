@@ -306,6 +306,13 @@ def commands_alone(
     """
     clock = ManualClock(now)
     engine = Engine(model, q=start, clock=clock, lateness=Lateness.POSTPONE)
+    return carried_out(engine, clock, sent)
+
+
+def carried_out(
+    engine: Engine, clock: ManualClock, sent: Iterable[tuple[float, Command | None, Receipt | None]]
+) -> Timeline:
+    """What commands make of an engine; see `commands_alone`."""
     for at, command, receipt in sent:
         clock.set(at)
         # Edits name commands by the ids that these got, and some ids were given to what was refused.

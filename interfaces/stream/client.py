@@ -16,7 +16,7 @@ from interfaces.ports import RemotePort, earliest
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.control import Notice, ProblemCode, Role
-from robots.onboard.lease import LeaseState
+from interfaces.stream.network import Impair, Network, Survey
 
 FROM_SERVER = 4 * LARGEST
 """Longest message of a server that is read [bytes]."""
@@ -37,8 +37,13 @@ _COMING = Reply | Notice
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
-Ask: TypeAlias = Callable[[int, int], control.Acquire | control.TakeOver | control.Release | control.Resume]
+Asked: TypeAlias = (
+    control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | Survey | Impair
+)
+Ask: TypeAlias = Callable[[int, int], Asked]
 """Makes a wish of its number and the epoch."""
+Replied: TypeAlias = control.Lease | control.Problem | Network
+"""What answers one."""
 
 
 class Phase(enum.StrEnum):
@@ -91,11 +96,15 @@ class ClientCore:
         self.lease: control.Lease | None = None
         self.state: control.State | None = None
         """The real robot."""
+        self.network: Network | None = None
+        """The way to the robot; told of from the first `Survey` on."""
         self.sessions = 0
         """Sessions so far; a further one begins with nothing that was followed, and perhaps another timeline."""
+        self.lapses = 0
+        """How often its commands have ceased to count."""
         self._out: list[bytes] = []
         self._wishes = 0
-        self._answers: OrderedDict[int, control.Lease | control.Problem | None] = OrderedDict()
+        self._answers: OrderedDict[int, Replied | None] = OrderedDict()
         self._orders: OrderedDict[int, Order] = OrderedDict()
         self._newest = self._base = 0
         self._pings = 0
@@ -105,9 +114,9 @@ class ClientCore:
 
     @property
     def epoch(self) -> int:
-        """Epoch of the lease that it holds; 0 without one."""
+        """Epoch of the lease that it holds or shares; 0 without one."""
         lease = self.lease
-        return lease.epoch or 0 if lease is not None and lease.yours and lease.state is LeaseState.HELD else 0
+        return lease.epoch or 0 if lease is not None and lease.commands else 0
 
     def time(self, now: float) -> float | None:
         """Session time [s] at the local time now [s]; None before the first round trip."""
@@ -135,7 +144,7 @@ class ClientCore:
         return self.phase in {Phase.GREETING, Phase.OPEN} and now >= self._heard + SILENCE
 
     def wish(self, ask: Ask, *, now: float) -> int:
-        """Ask something of the lease.
+        """Ask something of the lease, or of the way to the robot.
 
         Args:
             ask: Makes the message.
@@ -153,15 +162,16 @@ class ClientCore:
         if self.phase is not Phase.OPEN:
             text = "there's no connection"
             self._answers[number] = control.Problem(ProblemCode.STOPPING, text, number)
-        elif isinstance(wish, control.Release | control.Resume) and not self.epoch:
+        elif isinstance(wish, control.Release | control.Resume | Impair) and not self.epoch:
             text = "this client has no lease"
             self._answers[number] = control.Problem(ProblemCode.STALE_EPOCH, text, number)
         else:
             self._send(wish)
-        self._beat_due = min(self._beat_due, now)
+        if self._beat_due < math.inf:
+            self._beat_due = min(self._beat_due, now)
         return number
 
-    def answer(self, number: int) -> control.Lease | control.Problem | None:
+    def answer(self, number: int) -> Replied | None:
         """What the server answered; None while it hasn't."""
         return self._answers.get(number)
 
@@ -191,6 +201,9 @@ class ClientCore:
             self._complain(message)
         elif isinstance(message, control.State):
             self.state = message
+        elif isinstance(message, Network):
+            self.network = message
+            self._settle(message.answers, message)
         else:
             self._hand_on(message, now)
 
@@ -229,7 +242,8 @@ class ClientCore:
         held = self.epoch
         self.lease = lease
         if self.epoch != held:
-            self._beat_due = now if self.epoch else math.inf
+            self._beat_due = now if self.epoch and lease.yours else math.inf
+            self.lapses += held > 0
         self._settle(lease.answers, lease)
 
     def _complain(self, problem: control.Problem) -> None:
@@ -238,7 +252,7 @@ class ClientCore:
         if problem.fatal and problem.code in _FATAL:
             self.phase = Phase.CLOSED
 
-    def _settle(self, number: int | None, answer: control.Lease | control.Problem) -> None:
+    def _settle(self, number: int | None, answer: Replied) -> None:
         if number is not None and number in self._answers and self._answers[number] is None:
             self._answers[number] = answer
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from interfaces import messages
 from interfaces.messages import Reply, Request
-from interfaces.stream import control
+from interfaces.stream import control, network
 from interfaces.stream.control import Notice, ProblemCode, Question
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.wire import Message as Wire
 from interfaces.stream.wire import control as controls
+from interfaces.stream.wire import network as networks
 from interfaces.stream.wire import replies, requests, sites
 from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.messages import Orders, Report
@@ -50,12 +51,16 @@ WIRES: dict[type, type[Wire]] = {
     control.Pong: controls.PongWire,
     control.Acquire: controls.AcquireWire,
     control.TakeOver: controls.TakeOverWire,
+    control.Share: controls.ShareWire,
     control.Release: controls.ReleaseWire,
     control.Resume: controls.ResumeWire,
     control.Beat: controls.BeatWire,
     control.Lease: controls.LeaseWire,
     control.Problem: controls.ProblemWire,
     control.State: controls.StateWire,
+    network.Survey: networks.SurveyWire,
+    network.Impair: networks.ImpairWire,
+    network.Network: networks.NetworkWire,
     Orders: sites.OrdersWire,
     Report: sites.ReportWire,
 }

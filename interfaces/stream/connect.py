@@ -12,10 +12,11 @@ from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import Form
 from interfaces.ports import EnginePort
 from interfaces.stream import control
-from interfaces.stream.client import Ask, ClientCore
+from interfaces.stream.client import Ask, ClientCore, Replied
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Lease, Problem, ProblemCode, Role, State, Welcome
 from interfaces.stream.line import Line, UnreachableError, Worker
+from interfaces.stream.network import Impair, Network, Survey, Way
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
 from interfaces.viewer import Shown
 from vrs.clock import WallClock
@@ -158,7 +159,7 @@ class Connection:
         Returns:
             The lease, `yours` if it was given; or why not.
         """
-        return self._wish(lambda number, _: control.Acquire(number), wait)
+        return _of_lease(self._wish(lambda number, _: control.Acquire(number), wait))
 
     def take_over(self, *, wait: float = 5.0) -> Lease | Problem:
         """Take the lease from whoever has it: for an admin. Waits until the robot has stopped.
@@ -169,21 +170,64 @@ class Connection:
         Returns:
             The lease as it's then, `yours` if it was given; or why not.
         """
-        answer = self._wish(lambda number, _: control.TakeOver(number), wait)
+        answer = _of_lease(self._wish(lambda number, _: control.TakeOver(number), wait))
         if isinstance(answer, Lease) and not answer.yours:
             self._session.wait(lambda: self._session.core.epoch > 0, wait)
             return self.lease or answer
         return answer
 
+    def share(self, session: str, *, wait: float = 5.0) -> Lease | Problem:
+        """Ask to command under the lease that another session of the same person has.
+
+        Whoever has the lease keeps it; when it ends, so does the share. Another session's command ends it, too.
+
+        Args:
+            session: The holder's, from its `Welcome`.
+            wait: How long to wait for the answer [s].
+
+        Returns:
+            The lease, `shared` if it is; or why not.
+        """
+        return _of_lease(self._wish(lambda number, _: control.Share(number, session), wait))
+
+    def ask_to_share(self, session: str) -> int:
+        """As `share`, without waiting; the number for `answer`."""
+        core = self._session.core
+        return self._session.do(
+            lambda _: core.wish(lambda number, _: control.Share(number, session), now=self._clock.now())
+        )
+
+    def answer(self, number: int) -> Lease | Problem | None:
+        """What the server answered to `ask_to_share`; None while it hasn't."""
+        answer = self._session.core.answer(number)
+        return None if answer is None else _of_lease(answer)
+
     def release(self, *, wait: float = 5.0) -> Lease | Problem:
-        """Give the lease back; the robot stops."""
-        return self._wish(control.Release, wait)
+        """Give the lease back, and the robot stops; or the share, without a stop."""
+        return _of_lease(self._wish(control.Release, wait))
 
     def resume(self, *, wait: float = 5.0) -> Lease | Problem:
         """Let the robot go on after it stopped by itself."""
-        return self._wish(control.Resume, wait)
+        return _of_lease(self._wish(control.Resume, wait))
 
-    def _wish(self, ask: Ask, wait: float) -> Lease | Problem:
+    def survey(self, *, wait: float = 5.0) -> Network | Problem:
+        """Ask how the emulated way to the robot is, and what was measured of it."""
+        return _of_network(self._wish(lambda number, _: Survey(number), wait))
+
+    def impair(self, forward: Way | None, backward: Way | None, *, wait: float = 5.0) -> Network | Problem:
+        """Change the emulated way to the robot: for who has the lease.
+
+        Args:
+            forward: To the robot, from now on; None leaves it as it is.
+            backward: Back.
+            wait: How long to wait for the answer [s].
+
+        Returns:
+            The way as it is then; or why not.
+        """
+        return _of_network(self._wish(lambda number, epoch: Impair(number, epoch, forward, backward), wait))
+
+    def _wish(self, ask: Ask, wait: float) -> Replied:
         core = self._session.core
         number = self._session.do(lambda _: core.wish(ask, now=self._clock.now()))
         self._session.wait(lambda: core.answer(number) is not None, wait)
@@ -208,6 +252,11 @@ class Connection:
         return self._session.core.lease
 
     @property
+    def lapses(self) -> int:
+        """How often commands of this connection have ceased to count: a lease or a share has ended."""
+        return self._session.core.lapses
+
+    @property
     def state(self) -> State | None:
         """The real robot as it was last heard of; None before that."""
         return self._session.core.state
@@ -227,6 +276,17 @@ class Connection:
     def wait(self, ready: Callable[[Connection], bool], timeout: float = 5.0) -> bool:
         """Wait until something is so of this connection, or the time [s] is over; whether it is."""
         return self._session.wait(lambda: ready(self), timeout)
+
+
+def _of_lease(answer: Replied) -> Lease | Problem:
+    return _ELSE if isinstance(answer, Network) else answer
+
+
+def _of_network(answer: Replied) -> Network | Problem:
+    return _ELSE if isinstance(answer, Lease) else answer
+
+
+_ELSE = Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
 
 
 def _address(url: str) -> str:

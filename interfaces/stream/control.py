@@ -11,11 +11,14 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, TypeAlias
 
+from interfaces.stream.network import Impair, Network, Survey
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.model import Array, Limits
 
 PROTOCOL = 1
 """Version of the protocol."""
+OVERRULED = "no lease: another session of it has given a command since; share it again"
+"""Refusal of an order of a session whose share has ended so."""
 
 
 class Role(enum.StrEnum):
@@ -87,15 +90,22 @@ class Lease:
     version: ClassVar[int] = 1
     state: LeaseState
     epoch: int | None = None
-    """Of the lease in force; told to its holder only."""
+    """Of the lease in force; told to its holder only, and to those who share it."""
     holder: str | None = None
     """Name of who has it."""
     yours: bool = False
-    """Whether the receiver has it."""
+    """Whether the receiver has it, and keeps it."""
     answers: int | None = None
     """Number of the receiver's request that this answers."""
     ended: LeaseEnd | None = None
     """How the lease before ended; None if there was none."""
+    shared: bool = False
+    """Whether the receiver shares it: it commands under the epoch, but doesn't keep it."""
+
+    @property
+    def commands(self) -> bool:
+        """Whether the receiver's commands count."""
+        return self.state is LeaseState.HELD and (self.yours or self.shared)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +162,8 @@ class Attached:
     server: str = ""
     """Name and version of the program."""
     protocol: int = PROTOCOL
+    max_age: float | None = None
+    """Older messages don't count under `halt` [s]; None where that isn't known, or under `hold`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +218,17 @@ class Release:
     version: ClassVar[int] = 1
     number: int
     epoch: int
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Client: the epoch of the lease that a session of the same person has, please."""
+
+    kind: ClassVar[str] = "share"
+    version: ClassVar[int] = 1
+    number: int
+    session: str = field(repr=False)
+    """The holder's, from its `Welcome`: whoever knows it was told by the holder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,9 +292,18 @@ class State:
     """Why it stopped by itself; empty while it follows."""
     corrections: int = 0
     """How often the virtual robot was put where the real one goes."""
+    reference: Array | None = None
+    """What the robot's own timeline asked for at t [rad], (n,); None where it hasn't said."""
+    round_trip: float | None = None
+    """Newest time that a message to the robot and the answer were under way [s]; None before the first."""
+    messages: tuple[tuple[float, float | None], ...] = ()
+    """Messages to the robot of which the emulated link told since the state before: when each was sent, and when it
+    arrived [s]; None for one that was lost."""
 
 
-Question: TypeAlias = Hello | Ping | Pong | Acquire | TakeOver | Release | Resume | Beat | Problem
+Question: TypeAlias = (
+    Hello | Ping | Pong | Acquire | TakeOver | Share | Release | Resume | Beat | Survey | Impair | Problem
+)
 """Control messages that a client sends."""
-Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State
+Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network
 """Control messages that a server sends."""

@@ -6,40 +6,43 @@ import base64
 import math
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from interfaces.messages import Order
 from interfaces.ports import earliest
 from interfaces.site import Site
 from interfaces.stream import control
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.control import PROTOCOL, Problem, ProblemCode, Role
-from interfaces.stream.limits import Limits
+from interfaces.stream.leasing import Leasing, Robot
+from interfaces.stream.limits import Bucket, Limits
+from interfaces.stream.network import Impair, Network
 from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, Seat, Session, Wish
-from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
-from vrs.errors import InvalidValueError
+from robots.onboard.lease import Lease, LeaseState
+from vrs.errors import InvalidValueError, VrsError
 
 SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
+CHANGES = 5.0
+"""The way to the robot may change so many times a second, for long; twice as often for a moment."""
 KEY_BYTES = 16
 """Random bytes of a session's name."""
 _SERVED = frozenset({Role.VIEWER, Role.OPERATOR, Role.ADMIN})
 
 
-class Robot(Protocol):
-    """What the lease does to the robot."""
+class Emulation(Protocol):
+    """The emulated way to the robot."""
 
-    def began(self, grant: Grant, *, now: float) -> None:
-        """A lease has begun: its epoch's commands count from now on."""
+    def network(self, *, now: float) -> Network:
+        """How it is."""
 
-    def ended(self, ended: Ended, *, now: float) -> None:
-        """A lease has ended: stop the robot, and say `Hub.stopped` when it's at rest."""
+    def impair(self, wish: Impair, who: str, *, now: float) -> None:
+        """Change it.
 
-    def resume(self, epoch: int, *, now: float) -> str:
-        """Let a robot go on that stopped by itself; why it can't, empty if it does."""
+        Raises:
+            InvalidValueError: If a condition isn't one of those that are allowed; nothing has changed then.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +64,6 @@ class HubConfig:
             raise InvalidValueError("state_rate", self.state_rate, "0.1 to 1000 times a second")
 
 
-_REASONS = {
-    LeaseRefusal.INVALID: "a holder's name has 1 to 100 characters",
-    LeaseRefusal.HELD: "somebody has the lease",
-    LeaseRefusal.ENDING: "the robot isn't at rest yet: ask again",
-    LeaseRefusal.NOT_ADMIN: "only an admin may take over",
-    LeaseRefusal.STALE_EPOCH: "this isn't the epoch of the lease in force",
-    LeaseRefusal.EXHAUSTED: "there are no epochs left",
-}
-
-
 class Hub:
     """All sessions at one site. It's given the time, and whatever comes; shells do the sockets.
 
@@ -85,6 +78,7 @@ class Hub:
         robot: Robot,
         *,
         config: HubConfig | None = None,
+        emulation: Emulation | None = None,
         random_bytes: Callable[[int], bytes] = secrets.token_bytes,
     ) -> None:
         """Serve nobody yet.
@@ -95,6 +89,7 @@ class Hub:
             access: Who gets which role.
             robot: What the lease does to the robot.
             config: How to serve.
+            emulation: The way to the robot, where one is emulated.
             random_bytes: So many bytes that nobody can guess, to name sessions.
         """
         self.config = HubConfig() if config is None else config
@@ -102,7 +97,8 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
-        self._lease, self._robot, self._random = lease, robot, random_bytes
+        self._leasing = Leasing(lease, robot, self.limits.sharers)
+        self._random = random_bytes
         if not site.broadcasters:
             for rate in self.config.rates:
                 site.broadcast(rate)
@@ -110,11 +106,10 @@ class Hub:
         """The real robot, as clients are told."""
         self._newest: control.State | None = None
         self._state_due = -math.inf
-        self.lease_version = 0
-        """Counts the changes of the lease."""
-        self._ended: LeaseEnd | None = None
-        self._holder: Seat | None = None
-        self._taker: Seat | None = None
+        self.network_version = 0
+        """Counts the changes of the way to the robot."""
+        self._emulation = emulation
+        self._changes = Bucket(CHANGES, 2 * CHANGES, 0.0)
         self._sessions: dict[Session, None] = {}
         self._seats: dict[str, Seat] = {}
         self._edit = site.journal.look()
@@ -134,7 +129,24 @@ class Hub:
     @property
     def lease_state(self) -> LeaseState:
         """Where the lease is."""
-        return self._lease.state
+        return self._leasing.state
+
+    @property
+    def lease_version(self) -> int:
+        """Counts the changes of the lease."""
+        return self._leasing.version
+
+    def lease_for(self, seat: Seat, answers: int | None = None) -> control.Lease:
+        """The lease as a client sees it, perhaps as an answer to its request of that number."""
+        return self._leasing.seen_by(seat, answers)
+
+    def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
+        """Do what a client asks of the lease; the answer, None for a beat that counts."""
+        return self._leasing.wish(seat, wish, now)
+
+    def stopped(self, *, now: float) -> None:
+        """Say that the robot is at rest after a lease ended, and takes no command."""
+        self._leasing.stopped(now=now)
 
     def open(self, encoding: Encoding, *, now: float) -> Session:
         """Take a connection; with too many, one that's closed at once.
@@ -169,7 +181,9 @@ class Hub:
 
     def _tidy(self, now: float) -> None:
         """Forget sessions that were left long ago, or too many; not that of the lease's holder."""
-        absent = [seat for seat in self._seats.values() if seat.session is None and seat is not self._holder]
+        absent = [
+            seat for seat in self._seats.values() if seat.session is None and seat is not self._leasing.holder
+        ]
         absent.sort(key=lambda seat: seat.left)
         surplus = len(absent) - self.limits.absent
         for place, seat in enumerate(absent):
@@ -179,22 +193,11 @@ class Hub:
     def _forget(self, seat: Seat) -> None:
         seat.servlet.close()
         self._seats.pop(seat.key, None)
+        self._leasing.forget(seat)
 
     def show(self, state: control.State) -> None:
         """Take the newest that is known of the real robot."""
         self._newest = state
-
-    def stopped(self, *, now: float) -> None:
-        """Say that the robot is at rest after a lease ended, and takes no command."""
-        was = self._lease.state
-        grant = self._lease.stopped(now=now)
-        if self._lease.state is was:
-            return
-        taker, self._taker = self._taker, None
-        self.lease_version += 1
-        if isinstance(grant, Grant):
-            self._holder = taker
-            self._robot.began(grant, now=now)
 
     def close(self, text: str = "the server stops") -> tuple[Session, ...]:
         """End every session; those that have a last word to send."""
@@ -206,7 +209,7 @@ class Hub:
         """Make the frames that are due at now [s]; the sessions whose `advance` is to be called."""
         self._now, self._sweep = now, now + SWEEP
         self._t = self.site.time(now)
-        self._turn(now)
+        self._leasing.turn(now)
         self.site.advance(now=now)
         if self._newest is not self.state and now >= self._state_due:
             self.state, self._state_due = self._newest, now + 1.0 / self.config.state_rate
@@ -222,7 +225,7 @@ class Hub:
     def next_deadline(self) -> float | None:
         """When to call `advance` next [s]; None for not before something arrives."""
         sweep = self._sweep if self._sessions else None
-        return earliest(self.site.next_deadline(), self._lease.next_deadline(), sweep)
+        return earliest(self.site.next_deadline(), self._leasing.next_deadline(), sweep)
 
     def engine_time(self, now: float) -> float:
         """The engine's time [s] at the session time now [s]."""
@@ -252,7 +255,7 @@ class Hub:
     def _seat(self, hello: control.Hello) -> Seat:
         key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
         seat = self._seats[key] = Seat(key, hello.name, hello.role)
-        seat.servlet = self.site.servlet(admit=partial(self._refusal, seat))
+        seat.servlet = self.site.servlet(admit=lambda order: self._leasing.refusal(seat, order, self._now))
         return seat
 
     def _welcome(self, seat: Seat, resumed: bool, now: float) -> control.Welcome:
@@ -269,71 +272,29 @@ class Hub:
             resumed=resumed,
             instance=self.config.instance,
             server=self.config.server,
-            lease_timeout=self._lease.config.timeout,
+            lease_timeout=self._leasing.timeout,
         )
 
-    def _refusal(self, seat: Seat, order: Order) -> str:
-        """Why an order isn't carried out now; empty if it is."""
-        if seat is not self._holder:
-            return "no lease: acquire it first"
-        if self._lease.heard(order.epoch, now=self._now) is not None:
-            return f"no lease: epoch {order.epoch} isn't in force"
-        return ""
+    def network(self, now: float, answers: int | None = None) -> Network | None:
+        """How the way to the robot is; None where none is emulated."""
+        found = None if self._emulation is None else self._emulation.network(now=now)
+        return found if found is None or answers is None else replace(found, answers=answers)
 
-    def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
-        """Do what a client asks of the lease; the answer, None for a beat that counts."""
-        number = None if isinstance(wish, control.Beat) else wish.number
+    def impair(self, seat: Seat, wish: Impair, now: float) -> Problem | None:
+        """Let the holder of the lease change the way to the robot; why not, None where it's done."""
+        if self._emulation is None:
+            return Problem(ProblemCode.NOT_ALLOWED, "no way to a robot is emulated here", wish.number)
         if seat.role is Role.VIEWER:
-            return Problem(ProblemCode.NOT_ALLOWED, "a viewer has no lease", number)
-        if isinstance(wish, control.Acquire | control.TakeOver):
-            refusal = self._ask(seat, isinstance(wish, control.TakeOver), now)
-        elif seat is not self._holder:
-            refusal = LeaseRefusal.STALE_EPOCH
-        elif isinstance(wish, control.Release):
-            refusal = self._lease.release(wish.epoch, now=now)
-        else:
-            refusal = self._lease.heard(wish.epoch, now=now)
-        self._turn(now)
-        if refusal is None and isinstance(wish, control.Resume):
-            text = self._robot.resume(wish.epoch, now=now)
-            if text:
-                return Problem(ProblemCode.LEASE, text, number)
-        if refusal is not None:
-            stale = refusal is LeaseRefusal.STALE_EPOCH
-            code = ProblemCode.STALE_EPOCH if stale else ProblemCode.LEASE
-            return Problem(code, _REASONS[refusal], number)
-        return None if number is None else self.lease_for(seat, number)
-
-    def _ask(self, seat: Seat, force: bool, now: float) -> LeaseRefusal | None:
-        """Ask for the lease; who has it already keeps it."""
-        self._turn(now)
-        admin = seat.role is Role.ADMIN
-        if force and not admin:
-            return LeaseRefusal.NOT_ADMIN
-        if seat is self._holder:
-            return None
-        lease, name = self._lease, seat.name
-        answer = lease.take_over(name, admin=admin, now=now) if force else lease.acquire(name, now=now)
-        if isinstance(answer, LeaseRefusal):
-            return answer
-        self.lease_version += 1
-        if isinstance(answer, Grant):
-            self._holder = seat
-            self._robot.began(answer, now=now)
-        else:
-            self._taker = seat
+            return Problem(ProblemCode.NOT_ALLOWED, "a viewer changes nothing", wish.number)
+        if not self._leasing.admits(seat, wish.epoch, now):
+            text = "only who has control changes the way to the robot"
+            return Problem(ProblemCode.STALE_EPOCH, text, wish.number)
+        if not self._changes.take(now):
+            text = f"the way to the robot changes at most {CHANGES:g} times a second"
+            return Problem(ProblemCode.TOO_FAST, text, wish.number)
+        try:
+            self._emulation.impair(wish, seat.name, now=now)
+        except VrsError as error:
+            return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number)
+        self.network_version += 1
         return None
-
-    def _turn(self, now: float) -> None:
-        """Stop the robot if the lease has ended."""
-        ended = self._lease.advance(now=now)
-        if ended is not None:
-            self._holder, self._ended = None, ended.why
-            self.lease_version += 1
-            self._robot.ended(ended, now=now)
-
-    def lease_for(self, seat: Seat, answers: int | None = None) -> control.Lease:
-        """The lease as a client sees it: its epoch is told to its holder only."""
-        lease, yours = self._lease, seat is self._holder
-        epoch = lease.epoch if yours else None
-        return control.Lease(lease.state, epoch, lease.holder, yours, answers, self._ended)

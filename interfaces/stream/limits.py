@@ -29,6 +29,8 @@ class Limits:
     """Bytes that may wait for a client before what's for it is dropped, 1024 to 16,777,216."""
     absence: float = 30.0
     """How long after its connection was lost an operator's session can be continued [s], 0 to 3600."""
+    sharers: int = 8
+    """Most sessions that share one lease with its holder, 0 to 1000."""
     absent: int = 64
     """Most sessions that are kept so; the oldest goes first, 0 to 100,000."""
 
@@ -42,6 +44,7 @@ class Limits:
             ("bad", 1, 1000),
             ("hello", 0.1, 60),
             ("waiting", 1024, 1 << 24),
+            ("sharers", 0, 1000),
             ("absence", 0, 3600),
             ("absent", 0, 100_000),
         ):

@@ -11,6 +11,7 @@ from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
 from interfaces.stream.control import Problem, ProblemCode, Role
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.limits import Bucket, Limits
+from interfaces.stream.network import Impair, Network, Survey
 from interfaces.stream.outbox import Outbox
 
 POLICY, TOO_LARGE, RESTART, TRY_AGAIN = 1008, 1009, 1012, 1013
@@ -23,9 +24,9 @@ _MUTE = 1.0
 
 Closing = tuple[int, str]
 """Close code and reason."""
-Wish = control.Acquire | control.TakeOver | control.Release | control.Resume | control.Beat
+Wish = control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | control.Beat
 """What a client asks of the lease."""
-_ALLOWED = control.Ping | control.Pong | control.Problem | Wish | Order | Ask | Follow | Want
+_ALLOWED = control.Ping | control.Pong | control.Problem | Wish | Survey | Impair | Order | Ask | Follow | Want
 """What may come once the client is welcome."""
 
 
@@ -50,7 +51,11 @@ class Desk(Protocol):
     limits: Limits
     encoder: SharedEncoder
     state: control.State | None
-    lease_version: int
+    network_version: int
+
+    @property
+    def lease_version(self) -> int:
+        """Counts the changes of the lease."""
 
     def engine_time(self, now: float) -> float:
         """The engine's time [s]."""
@@ -63,6 +68,12 @@ class Desk(Protocol):
 
     def lease_for(self, seat: Seat, answers: int | None = None) -> control.Lease:
         """The lease as a client sees it."""
+
+    def network(self, now: float, answers: int | None = None) -> Network | None:
+        """How the way to the robot is; None where there's none."""
+
+    def impair(self, seat: Seat, wish: Impair, now: float) -> Problem | None:
+        """Change the way to the robot; why not, None where it's done."""
 
 
 class Session:
@@ -88,6 +99,8 @@ class Session:
         self._hello_until = now + self._limits.hello
         self._quiet_until = now
         self._lease = -1
+        self._network: int | None = None
+        """Version of the way to the robot that the client knows; None while it hasn't asked."""
         self._state: control.State | None = None
 
     @property
@@ -145,6 +158,19 @@ class Session:
                 self._lease = self._desk.lease_version
             if answer is not None:
                 self._put(answer)
+        elif isinstance(message, Survey | Impair):
+            self._survey(seat, message, now)
+
+    def _survey(self, seat: Seat, message: Survey | Impair, now: float) -> None:
+        """Tell how the way to the robot is, after it was changed where that was asked for."""
+        problem = self._desk.impair(seat, message, now) if isinstance(message, Impair) else None
+        found = None if problem is not None else self._desk.network(now, message.number)
+        if found is not None:
+            self._network = self._desk.network_version
+            self._put(found)
+        else:
+            text = "no way to a robot is emulated here"
+            self._put(problem or Problem(ProblemCode.NOT_ALLOWED, text, message.number))
 
     def _greet(self, hello: control.Hello, now: float) -> None:
         found = self._desk.greet(self, hello, now)
@@ -187,6 +213,8 @@ class Session:
             return now >= self._hello_until
         if self._desk.lease_version != self._lease or self._desk.state is not self._state:
             return True
+        if self._network is not None and self._desk.network_version != self._network:
+            return True
         t = self.seat.servlet.next_deadline()
         return t is not None and t <= self._desk.engine_time(now)
 
@@ -212,6 +240,11 @@ class Session:
         if desk.lease_version != self._lease:
             self._lease = desk.lease_version
             self._outbox.put_newest(desk.lease_for(seat))
+        if self._network is not None and desk.network_version != self._network:
+            self._network = desk.network_version
+            found = desk.network(now)
+            if found is not None:
+                self._outbox.put_newest(found)
         if desk.state is not None and desk.state is not self._state:
             self._state = desk.state
             self._outbox.put_newest(desk.state)

@@ -97,6 +97,7 @@ class RobotHost:
         self._trips: RoundTripEstimator | None = None
         self._count, self._first = 0, math.inf
         self._waiting: list[Orders] = []
+        self._unsent: list[Report | Ping] = []
         self._now = now
 
     def hello(self, session: str, *, now: float) -> str:
@@ -122,8 +123,12 @@ class RobotHost:
         else:
             self._next = session
             self.halt(OTHER, now=now)
-        self.advance(now=now)
+        self._catch_up(now)
         return ""
+
+    def _catch_up(self, now: float) -> None:
+        """Do what is due by now; what is to be sent waits for the next `advance`."""
+        self._unsent = [*self.advance(now=now)]
 
     def _begin(self, now: float) -> None:
         """Turn to the next operator: nothing of the one before counts any more."""
@@ -143,7 +148,7 @@ class RobotHost:
     def receive(self, message: Orders | Pong, *, now: float) -> None:
         """Take in a message of the operator that is followed."""
         self._heard = now
-        self.advance(now=now)
+        self._catch_up(now)
         if self._next or not self.session:
             return
         if isinstance(message, Pong):
@@ -190,7 +195,7 @@ class RobotHost:
 
     def advance(self, *, now: float) -> tuple[Report | Ping, ...]:
         """Do what is due by now [s], and say what is to be sent to the operator."""
-        messages: list[Report | Ping] = []
+        messages, self._unsent = self._unsent, []
         if self.site is not None:
             messages += self.site.advance(now=self.site_time(now))
         if self._next and (self.site is None or self._stands(now)):
@@ -211,6 +216,8 @@ class RobotHost:
             times.append(self._trips.next_deadline())
         if self._next and self.site is not None:
             times.append(self._now + 0.01)
+        if self._unsent:
+            times.append(self._now)
         return min(times)
 
     def _stands(self, now: float) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import TypeAlias
 
 import numpy as np
 
-from interfaces.link import Link, LinkConditions
+from interfaces.link import Gauge, Link, LinkConditions
+from interfaces.link.packets import PacketRecord
 from interfaces.ports import earliest
 from interfaces.stream.control import Ping, Pong
 from interfaces.teleop.messages import Orders, Report
@@ -18,6 +20,8 @@ ToOperator: TypeAlias = Report | Ping
 
 LOGGED = 500
 """Records of packets that each way keeps until somebody takes them."""
+TOLD = 64
+"""Messages to the robot of which `RobotLine.messages` tells at once, at most."""
 
 
 class RobotLine:
@@ -33,6 +37,10 @@ class RobotLine:
         """
         self.operator = operator
         self.link: Link[ToRobot, ToOperator] = Link(conditions, rng, keep=LOGGED)
+        self._messages: deque[tuple[float, float | None]] = deque(maxlen=TOLD)
+        self.there, self.back = Gauge(), Gauge()
+        """What the emulation does to packets, each way."""
+        self.link.forward.log.told, self.link.backward.log.told = self._settled, self.back.add
         self.connected = False
         """Whether there's a connection to send on."""
         self.heard = -math.inf
@@ -57,6 +65,30 @@ class RobotLine:
             self.link.forward.send(Pong(message.number, message.t, now, now), now)
         else:
             self.operator.receive(message, now=now)
+
+    def _settled(self, packet: PacketRecord) -> None:
+        self.there.add(packet)
+        if not packet.copy:
+            self._messages.append((packet.sent, packet.arrived))
+
+    def messages(self) -> tuple[tuple[float, float | None], ...]:
+        """Messages to the robot since the last call: when each was sent and arrived [s]; None for a lost one.
+
+        What they need beyond the emulated link isn't in it.
+        """
+        messages = tuple(self._messages)
+        self._messages.clear()
+        return messages
+
+    def change(self, conditions: LinkConditions, *, now: float) -> None:
+        """Emulate other conditions from now [s] on; what is on its way arrives as it was to. See `Lane.change`."""
+        before = self.link.conditions
+        self.link.change(conditions, now)
+        if conditions.forward != before.forward:
+            self.there.since = now
+        if conditions.backward != before.backward:
+            self.back.since = now
+        self.operator.measure_anew(now=now)
 
     def next_deadline(self) -> float | None:
         """When something is due [s]."""

@@ -90,3 +90,7 @@ class Report:
     """Receipts by entry number, of entries not known to have been reported."""
     plan: PlanPart | None = None
     """Where the robot's plan may be another than the operator thinks."""
+    reference: Array | None = None
+    """What the robot's own timeline asked for at `measured_at` [rad], (n,); None where it doesn't say."""
+    uncertainty: float | None = None
+    """Bound on the error of what it takes for the operator's clock [s]; None where that isn't known."""

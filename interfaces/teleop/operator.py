@@ -105,6 +105,10 @@ class LoggedEngine(Engine):
             self._tell(Deed(self.now(), None, answer, False), newest)
         return answer
 
+    def undo_refusal(self) -> str:
+        """Why nothing is taken back now; see `Engine.undo_refusal`."""
+        return self._refusal() or super().undo_refusal()
+
 
 class OperatorSite:
     """What runs beside the operator, all but the page.
@@ -156,7 +160,11 @@ class OperatorSite:
         self._ids: dict[int, int] = {}
         self._packets = 0
         self._due = now
-        self._round_trips = SlidingQuantiles(1000, 120.0)
+        self.round_trip: float | None = None
+        """How long the newest message that was answered, and the answer, were under way [s]."""
+        self.round_trips = SlidingQuantiles(1000, 120.0)
+        """Between the sites, of the newest messages [s]."""
+        self._measured_since = -np.inf
         self._patience = 2.0 * self.config.beat + 1.0
         """After how long without an answer an entry counts as lost [s]."""
         self._compared: tuple[int, ...] = ()
@@ -249,9 +257,11 @@ class OperatorSite:
         self._acknowledged = max(self._acknowledged, report.executed)
         if report.echo is not None:
             _, sent, arrived = report.echo
-            self._round_trips.add(now - sent - (report.sent_at - arrived), now=now)
-            usual = self._round_trips.quantile(0.95)
-            assert usual is not None
+            self.round_trip = now - sent - (report.sent_at - arrived)
+            if sent >= self._measured_since:
+                self.round_trips.add(self.round_trip, now=now)
+        usual = self.round_trips.quantile(0.95)
+        if usual is not None:
             self._patience = 2.0 * self.config.beat + 1.2 * usual
         new = bool(report.halted) and not self.halted
         if new:
@@ -261,6 +271,11 @@ class OperatorSite:
         # One at a time: what the correction under way leaves over is corrected after it.
         if report.plan is not None and (new or not correcting):
             self._follow(report.plan, report.halted or "a command was late at the robot")
+
+    def measure_anew(self, *, now: float) -> None:
+        """Forget the round trips of messages that were sent before now [s]: the way is another one."""
+        self.round_trips.clear()
+        self._measured_since = now
 
     def _follow(self, part: PlanPart, reason: str) -> None:
         """Let the virtual robot follow the real one's plan, and what is still under way to it."""

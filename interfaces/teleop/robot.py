@@ -121,6 +121,7 @@ class RobotSite:
         self.epoch = 0
         self.halted = ""
         """Why it stopped by itself; empty while it follows the operator."""
+        self._uncertainty: float | None = None
         self.parted = False
         """Whether its timeline is another than the operator's."""
         fixed = self.config.fixed_offset
@@ -176,6 +177,7 @@ class RobotSite:
             self._begin(orders, now)
         if orders.epoch != self.epoch or not self._counts(orders, now, correction, uncertainty):
             return
+        self._uncertainty = uncertainty if math.isfinite(uncertainty) else None
         if self._newest is None or orders.number > self._newest[0]:
             self._newest = orders.number, orders.sent_at, now
         while self._receipts and self._receipts[0][0] <= orders.heard:
@@ -370,7 +372,8 @@ class RobotSite:
         q.flags.writeable = False
         return Report(
             self.epoch, self._reports, now, self._newest, self._log.executed, float(p[0]), float(pace[0]), q,
-            *self._measured_at, self.halted, self._told(), plan,
+            *self._measured_at, self.halted, self._told(), plan, self.engine.timeline.sample(self._measured_at[1]),
+            self._uncertainty,
         )  # fmt: skip
 
     def _told(self) -> tuple[tuple[int, Receipt], ...]:

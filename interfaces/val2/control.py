@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from interfaces.val2.errors import ValError, robot_halted
+from interfaces.stream.control import Lease, Problem
+from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from robots.onboard.lease import LeaseState
 
 if TYPE_CHECKING:
     from interfaces.stream.connect import Connection
+    from interfaces.val2.monitor.switchboard import Person
 
 PATIENCE: Final = 3.0
 """How long the lease is waited for [s]; the robot comes to rest between two."""
 MEETING: Final = 10.0
 """How long a robot is waited for that doesn't follow a new lease yet [s]."""
+_TOLD: Final = 1.0
+"""So long after a person's session was to take control it may be that it has it, and hasn't said so [s]."""
 _AGAIN: Final = 0.25
 """Time between two requests [s]."""
 _LOOKS: Final = 0.1
@@ -22,7 +27,7 @@ _LOOKS: Final = 0.1
 
 
 class LeaseControl:
-    """The lease of a connection; it's kept by the connection until it's released."""
+    """The lease of a connection, kept by the connection until it's released; or the share of a person's lease."""
 
     def __init__(self, connection: Connection) -> None:
         """Ask for nothing yet.
@@ -34,36 +39,78 @@ class LeaseControl:
         self._since: float | None = None
         self._asked = 0.0
         self._granted: float | None = None
-        """When the lease was first seen to be there [s]."""
+        """When a lease was first seen to be held [s]."""
+        self._share: tuple[str, int] = "", 0
+        """Whose lease is shared, or was asked for, and the number of what was asked; 0 once it's answered."""
+        self._given_back = -1
+        """Of which of the lapses the server is to tell, since it was given back; -1 for none."""
+        self._lapses = connection.lapses
         self._resumed = self._resume_until = -math.inf
 
-    def wanted(self, *, now: float) -> str | None:
+    def wanted(self, person: Person | None = None, *, now: float) -> str | None:
         """Ask for the lease: empty if it's there, why not, or None while nothing is known yet.
 
         Args:
+            person: Whose lease is to be shared; None for one of the connection's own.
             now: Session time [s].
         """
-        connection, lease = self._connection, self._connection.lease
-        if not connection.is_connected:
+        lease = self._noted(now)
+        if not self._connection.is_connected:
             return self._settled("there's no connection to the robot's server")
-        if lease is not None and lease.yours and lease.state is LeaseState.HELD:
+        return self._own(lease, now) if person is None else self._theirs(person, lease, now)
+
+    def _noted(self, now: float) -> Lease | None:
+        """The lease as it was last heard of."""
+        lease = self._connection.lease
+        if lease is None or lease.state is not LeaseState.HELD:
+            self._granted = None
+        elif self._granted is None:
+            self._granted = now
+        return lease
+
+    def _own(self, lease: Lease | None, now: float) -> str | None:
+        if lease is not None and lease.state is LeaseState.HELD and not self._ends:
+            if not lease.yours:
+                return self._settled(f"{lease.holder} has control")
             return self._settled("") if self._follows(now) else None
-        self._granted = None
-        if lease is not None and lease.state is LeaseState.HELD:
-            return self._settled(f"{lease.holder} has the lease")
+        return self._patient(now, self._acquire, "the robot isn't at rest yet: try again")
+
+    def _acquire(self) -> None:
+        self._connection.acquire(wait=0.0)
+
+    def _theirs(self, person: Person, lease: Lease | None, now: float) -> str | None:
+        """A share of the lease of a person's session, which is to take one if it has none."""
+        mine = lease is not None and lease.shared and lease.commands and not self._ends
+        if mine and self._share[0] == person.session:
+            return self._settled("") if self._follows(now) else None
+        if not person.holds:
+            asked = self._since is not None and self._since <= now < self._since + _TOLD
+            if lease is not None and lease.state is LeaseState.HELD and not (lease.yours or asked):
+                return self._settled(f"{lease.holder} has control")
+            return self._patient(now, person.take, "control wasn't given: try again")
+        session, number = self._share
+        if session != person.session or not number:
+            self._share = person.session, self._connection.ask_to_share(person.session)
+            return None
+        answer = self._connection.answer(number)
+        if answer is not None:
+            self._share = session, 0
+        return self._settled(answer.text) if isinstance(answer, Problem) else None
+
+    def _patient(self, now: float, ask: Callable[[], None], in_vain: str) -> str | None:
+        """Ask now and then, but not for ever."""
         if self._since is None or now < self._since:
             self._since, self._asked = now, now - _AGAIN
         if now >= self._since + PATIENCE:
-            return self._settled("the robot isn't at rest yet: try again")
+            return self._settled(in_vain)
         if now >= self._asked + _AGAIN:
             self._asked = now
-            connection.acquire(wait=0.0)
+            ask()
         return None
 
     def _follows(self, now: float) -> bool:
         """Whether the robot follows this lease; one that doesn't in time says why to those who command it."""
-        if self._granted is None:
-            self._granted = now
+        assert self._granted is not None
         state = self._connection.state
         return now >= self._granted + MEETING or (state is not None and state.connected and not state.halted)
 
@@ -71,9 +118,31 @@ class LeaseControl:
         self._since = None
         return answer
 
+    @property
+    def _ends(self) -> bool:
+        """Whether it was given back, and the server hasn't said so yet."""
+        return self._connection.lapses == self._given_back
+
+    @property
+    def kept(self) -> bool:
+        """Whether commands count, as far as it's known."""
+        lease = self._connection.lease
+        return not self._connection.is_connected or (lease is not None and lease.commands and not self._ends)
+
+    def lapsed(self) -> str:
+        """Why commands have ceased to count since this was asked last; empty where they haven't."""
+        lease, lapses = self._connection.lease, self._connection.lapses
+        if lapses == self._lapses:
+            return ""
+        self._lapses = lapses
+        return TAKEN if lease is not None and lease.state is LeaseState.HELD else "control has ended"
+
     def release(self, *, now: float) -> None:  # noqa: ARG002 - the connection has its clock
-        """Give the lease back; the robot stops."""
-        self._connection.release(wait=0.0)
+        """Give the lease back, and the robot stops; or the share."""
+        connection = self._connection
+        if connection.lease is not None and connection.lease.commands:
+            self._given_back = connection.lapses
+        connection.release(wait=0.0)
 
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself, as soon as it can within a while."""
@@ -82,13 +151,13 @@ class LeaseControl:
 
     def trouble(self, *, now: float) -> ValError | None:
         """What is wrong with the robot or the way to it."""
-        connection, state, lease = self._connection, self._connection.state, self._connection.lease
+        connection, state, lease = self._connection, self._connection.state, self._noted(now)
         if not connection.is_connected:
             return ValError("No connection", "to the robot's server; it's taken up again by itself")
         if state is None or not state.halted:
             self._resume_until = -math.inf
             return None
-        commanded = lease is not None and lease.yours and lease.state is LeaseState.HELD
+        commanded = lease is not None and lease.commands
         if commanded and self._resumed + _AGAIN <= now < self._resume_until:
             self._resumed = now
             connection.resume(wait=0.0)

@@ -238,6 +238,21 @@ class Controller:
         self._due = True
         self.arm.brake(now=context.now)
 
+    def interrupt(self, error: ValError, *, now: float) -> None:
+        """Give up what runs, for a reason that isn't its own: a program stands, and RETRY may go on; a DO is over.
+
+        The arm isn't told to stop: somebody else does that, or has other plans.
+        """
+        context = self.context
+        context.now = max(now, context.now)
+        task = self._active()
+        if task is None:
+            return
+        task.fail(error)
+        self._do = None
+        self._due = True
+        self.arm.give_up(now=context.now)
+
     def proceed(self, *, now: float) -> None:
         """PROCEED: go on, with the next step where one was given up.
 

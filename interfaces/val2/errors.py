@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from vrs.errors import VrsError
+
+TAKEN: Final = "whoever has control has given another command"
+"""Why a program is interrupted whose person commands the robot from elsewhere, too."""
 
 
 @dataclass(frozen=True, slots=True)

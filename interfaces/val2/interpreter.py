@@ -144,9 +144,9 @@ class Task:
                 if self.single and self.state is State.RUNNING and not self.waiting:
                     self.pause("XSTEP")
         except ValError as error:
-            self._fail(error)
+            self.fail(error)
         except VrsError as error:
-            self._fail(ValError("Motion error", str(error)))
+            self.fail(ValError("Motion error", str(error)))
         self.context.notice()
         return done
 
@@ -272,7 +272,8 @@ class Task:
         if self.code.program.name:
             self.context.reactions.clear()
 
-    def _fail(self, error: ValError) -> None:
+    def fail(self, error: ValError) -> None:
+        """Stand at the present step, for an error."""
         frame = self.frames[-1]
         frame.drop()
         if frame.name:

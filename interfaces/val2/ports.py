@@ -158,6 +158,12 @@ class ArmPort(Protocol):
     def brake(self, *, now: float) -> None:
         """BRAKE, REACTI, ABORT: decelerate within the limits, drop what was to come."""
 
+    def give_up(self, *, now: float) -> None:
+        """Ask for nothing more of what is under way: somebody else commands the arm."""
+
+    def withdraw(self, *, now: float) -> None:
+        """Take what was asked for ahead then out of the plan, when commands count again."""
+
     def retry(self, *, now: float) -> bool:
         """Ask again for the motion that `brake` interrupted; False if there was none."""
 

@@ -1,4 +1,4 @@
-"""VAL's monitor at a server's own robot: a client of the server like any other, with terminals over TCP."""
+"""VAL's monitor at a server's own robot: a client of the server like any other, with terminals."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -14,8 +15,10 @@ from interfaces.val2.control import LeaseControl
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import Monitor
-from interfaces.val2.monitor.switchboard import Switchboard
+from interfaces.val2.monitor.switchboard import Person, Switchboard
+from interfaces.val2.pages import Room
 from interfaces.val2.tcp import ValDoor
+from vrs.errors import VrsError
 
 if TYPE_CHECKING:
     from interfaces.stream.access import Access
@@ -27,7 +30,7 @@ HOST: Final = "127.0.0.1"
 
 
 class ServedVal:
-    """Terminals at a server's robot. Enter `listening` in the server's loop, once it serves."""
+    """A controller at a server's robot, made for the first terminal. Enter `running` in the server's loop."""
 
     def __init__(self, url: str, token: str | None, access: Access, directory: Path, version: str) -> None:
         """Connect to nothing yet.
@@ -40,41 +43,82 @@ class ServedVal:
             version: Name and version of the program.
         """
         self._url, self._token, self._access = url, token, access
-        self._files, self._version = Files(directory), version
-        self._board: Switchboard | None = None
+        self._files, self._version = Files(directory, examples=examples()), version
+        self._entering: asyncio.Task[Room] | None = None
+        self._connection: Connection | None = None
 
     @contextlib.asynccontextmanager
-    async def listening(self, listening: socket.socket) -> AsyncIterator[ServedVal]:
-        """Serve terminals meanwhile.
+    async def running(self) -> AsyncIterator[ServedVal]:
+        """Let terminals come meanwhile."""
+        try:
+            yield self
+        finally:
+            if self._entering is not None:
+                await asyncio.wait([self._entering])
+            if self._connection is not None:
+                await asyncio.to_thread(self._connection.close)
 
-        Args:
-            listening: On this machine's loopback address; it's closed in the end.
+    async def enter(self) -> Room:
+        """What all terminals are at.
 
         Raises:
-            UnreachableError: If the server can't be reached.
+            VrsError: If the server can't be reached; the next one who comes tries anew.
         """
-        connection, arm = await asyncio.to_thread(self._connect)
+        if self._entering is None:
+            self._entering = asyncio.create_task(self._made())
+        entering = self._entering
         try:
-            controller = Controller(arm, parameters=arm.parameters, now=connection.now())
-            self._board = Switchboard(controller, LeaseControl(connection))
-            door = ValDoor(self._board, connection, self._terminal, locked=self._access.needs_tokens)
-            async with door.listening(listening):
-                yield self
-        finally:
-            await asyncio.to_thread(connection.close)
+            return await asyncio.shield(entering)
+        except (VrsError, OSError):
+            self._entering = None if self._entering is entering else self._entering
+            raise
+
+    async def _made(self) -> Room:
+        connection, arm = await asyncio.to_thread(self._connect)
+        self._connection = connection
+        controller = Controller(arm, parameters=arm.parameters, now=connection.now())
+        board = Switchboard(controller, LeaseControl(connection))
+        return Room(board, connection, partial(self._terminal, board))
 
     def _connect(self) -> tuple[Connection, Arm]:
         from interfaces import connect
         from interfaces.val2.motion import arm_for
 
         connection = connect(self._url, token=self._token, name="VAL-II terminals")
-        return connection, arm_for(connection)
+        try:
+            return connection, arm_for(connection)
+        except BaseException:
+            connection.close()
+            raise
 
-    def _terminal(self, token: str) -> Monitor | None:
+    @contextlib.asynccontextmanager
+    async def listening(self, listening: socket.socket) -> AsyncIterator[ServedVal]:
+        """Serve terminals over TCP meanwhile; within `running`.
+
+        Args:
+            listening: On this machine's loopback address; it's closed in the end.
+
+        Raises:
+            VrsError: If the server can't be reached.
+        """
+        room = await self.enter()
+        locked = self._access.needs_tokens
+
+        def terminal(token: str) -> Monitor | None:
+            return room.terminal(token if locked else None, None)
+
+        async with ValDoor(room.board, room.clock, terminal, locked=locked).listening(listening):
+            yield self
+
+    def _terminal(self, board: Switchboard, token: str | None, person: Person | None) -> Monitor | None:
         """The monitor for whoever shows a token; None for a wrong one."""
-        assert self._board is not None
-        shown = token if self._access.needs_tokens else None
-        barred = "this token only looks" if self._access.refusal(Role.OPERATOR, shown) else ""
-        if barred and self._access.refusal(Role.VIEWER, shown):
+        barred = "this token only looks" if self._access.refusal(Role.OPERATOR, token) else ""
+        if barred and self._access.refusal(Role.VIEWER, token):
             return None
-        return Monitor(self._board, self._files, f"{self._version}, VAL-II", barred=barred)
+        return Monitor(board, self._files, f"{self._version}, VAL-II", barred=barred, person=person)
+
+
+def examples() -> Path | None:
+    """The programs that come with the sources; None where they aren't there."""
+    found = Path(__file__).resolve().parents[2] / "examples" / "val2"
+    return found if found.is_dir() else None

@@ -190,12 +190,16 @@ class Lease:
 
     def heard(self, epoch: int, *, now: float) -> LeaseRefusal | None:
         """Take note of a message of the holder, or say why not: only the epoch in force keeps a lease."""
+        refusal = self.refused(epoch, now=now)
+        if refusal is None:
+            self._now, self._deadline = now, now + self.config.timeout
+        return refusal
+
+    def refused(self, epoch: int, *, now: float) -> LeaseRefusal | None:
+        """Say why an epoch doesn't count, None where it does; unlike `heard` this keeps no lease."""
         self._check(now)
         self._expire(now)
-        if not whole(epoch, 1) or epoch != self.epoch:
-            return LeaseRefusal.STALE_EPOCH
-        self._now, self._deadline = now, now + self.config.timeout
-        return None
+        return None if whole(epoch, 1) and epoch == self.epoch else LeaseRefusal.STALE_EPOCH
 
     def stopped(self, *, now: float) -> Grant | LeaseRefusal | None:
         """Say that the robot is at rest and takes no command.

@@ -25,6 +25,8 @@ STEEL: Final = (0.62, 0.64, 0.67)
 DARK: Final = (0.16, 0.18, 0.21)
 BLUE: Final = (0.10, 0.25, 0.47)
 
+ROUNDNESS: Final = 0.0015
+"""How far the sides of what is round may lie inside it [m]."""
 NECK: Final = -0.20
 """Height where the pedestal ends and the turning shoulder begins, base frame [m]."""
 UPPER_ARM_INNER: Final = D3 + 0.048
@@ -99,12 +101,22 @@ def _frame(origin: ArrayLike, axis: str) -> Array:
     return pose
 
 
+def _sides(radius: float) -> int:
+    """Sides of a circle: enough for `ROUNDNESS`, and for edges that are drawn smooth."""
+    return 4 * math.ceil(max(math.pi / math.acos(1.0 - min(ROUNDNESS / radius, 1.0)), 12.0) / 4)
+
+
 def _lathe(
-    profile: Sequence[tuple[float, float]], *, at: ArrayLike = (0, 0, 0), axis: str = "z", n: int = 56
+    profile: Sequence[tuple[float, float]],
+    *,
+    at: ArrayLike = (0, 0, 0),
+    axis: str = "z",
+    n: int | None = None,
 ) -> Any:
     """Turn a profile of (radius, height) pairs, heights ascending, into a closed body."""
     import trimesh
 
+    n = _sides(max(radius for radius, _ in profile)) if n is None else n
     line = [(0.0, profile[0][1]), *profile, (0.0, profile[-1][1])]
     return trimesh.creation.revolve(np.array(line), sections=n, transform=_frame(at, axis))
 
@@ -124,11 +136,13 @@ def _hull(points: ArrayLike) -> Any:
     return trimesh.convex.convex_hull(np.asarray(points, dtype=np.float64))
 
 
-def _outline(circles: Sequence[tuple[float, float, float]], inset: float = 0.0, n: int = 64) -> Array:
-    """Points of circles (u, v, radius), (len(circles) * n, 2)."""
-    angle = np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)
-    unit = np.column_stack([np.cos(angle), np.sin(angle)])
-    return np.concatenate([np.array([u, v]) + (r - inset) * unit for u, v, r in circles])
+def _outline(circles: Sequence[tuple[float, float, float]], inset: float = 0.0) -> Array:
+    """Points of circles (u, v, radius), (n, 2)."""
+    rings = []
+    for u, v, r in circles:
+        angle = np.linspace(0.0, 2.0 * math.pi, _sides(r), endpoint=False)
+        rings.append(np.array([u, v]) + (r - inset) * np.column_stack([np.cos(angle), np.sin(angle)]))
+    return np.concatenate(rings)
 
 
 def _slab(circles: Sequence[tuple[float, float, float]], low: float, high: float, *, edge: float = 0.008) -> Any:
@@ -147,7 +161,7 @@ def _loft(sections: Sequence[tuple[float, tuple[float, float], float, float, flo
     points = []
     for z, (x, y), half_x, half_y, corner in sections:
         u, v = half_x - corner, half_y - corner
-        flat = _outline([(x + i * u, y + j * v, corner) for i in (-1, 1) for j in (-1, 1)], n=32)
+        flat = _outline([(x + i * u, y + j * v, corner) for i in (-1, 1) for j in (-1, 1)])
         points.append(np.column_stack([flat, np.full(len(flat), z)]))
     return _hull(np.concatenate(points))
 
@@ -250,7 +264,7 @@ def _wrist_ball() -> LinkShape:
     import trimesh
 
     build = _Builder("wrist ball", STEEL)
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.0335).vertices.copy()
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.0335).vertices.copy()
     ball[:, 1] = np.clip(ball[:, 1], -0.0260, 0.0260)
     build.add(_hull(ball))
     build.add(_drum(0.015, -0.032, 0.032, axis="y", edge=0.001), DARK)

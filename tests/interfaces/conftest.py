@@ -17,6 +17,8 @@ FLAGS = [
     "--disable-sync",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    # Else laying out the page is drawn by software too, and takes a core.
+    "--disable-gpu-compositing",
 ]
 
 

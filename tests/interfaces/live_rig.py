@@ -132,14 +132,17 @@ class Child:
 
 @contextlib.contextmanager
 def child(*arguments: str) -> Iterator[Child]:
-    """Run a `vrs` command that says where it listens; it's ended in the end."""
+    """Run a `vrs` command that says where it listens; it's ended in the end, or when this process is killed."""
+    ends = ("--until-eof",) if arguments[0] in {"serve", "robot"} else ()
     process = subprocess.Popen(
-        [sys.executable, "-m", "interfaces.cli", *arguments],
+        [sys.executable, "-m", "interfaces.cli", *arguments, *ends],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
         start_new_session=True,
     )
+    assert process.stdin is not None
     assert process.stdout is not None
     guard = threading.Timer(60.0, process.kill)
     guard.start()
@@ -158,6 +161,7 @@ def child(*arguments: str) -> Iterator[Child]:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        process.stdin.close()
         process.stdout.close()
 
 

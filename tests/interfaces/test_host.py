@@ -107,6 +107,42 @@ def test_they_meet_move_and_agree() -> None:
     ends.check()
 
 
+def test_the_operators_site_knows_what_time_and_the_body_cost() -> None:
+    ends = Ends("constant:0.06")
+    ends.go()
+    ends.line.messages()
+    began = ends.now
+    ends.operator.execute(to(READY), now=ends.now)
+    heard = 0
+    for _ in range(30):
+        ends.run(0.1)
+        report = ends.operator.report
+        # The body of this test is where it was asked to be.
+        np.testing.assert_allclose(report.reference, report.q, rtol=0, atol=1e-12)
+        heard += np.abs(report.q - NOMINAL).max() > 0.01
+    assert heard > 10
+    link = ends.conditions.forward.delay
+    assert ends.operator.round_trip == pytest.approx(2 * link.quantile(0.5), abs=2.1 * STEP)
+    sent, arrived = np.array(ends.line.messages()).T
+    assert 40 <= len(sent) <= 64
+    assert sent.min() >= began - 0.5
+    np.testing.assert_allclose(arrived - sent, link.quantile(0.5), rtol=0, atol=1e-9)
+    assert ends.line.messages() == ()
+
+
+@pytest.mark.parametrize("delay", ["none", "constant:0.05", "constant:0.06"])
+def test_what_is_due_as_a_message_comes_is_sent(delay: str) -> None:
+    ends = Ends(delay)
+    ends.go()
+    numbers = set()
+    for _ in range(400):
+        ends.run(STEP)
+        numbers.add(ends.operator.report.number)
+    assert len(numbers) == max(numbers) - min(numbers) + 1
+    # Some ten a second.
+    assert len(numbers) >= 9 * 400 * STEP
+
+
 def test_a_robot_that_stands_elsewhere_is_met_where_it_stands() -> None:
     ends = Ends(q=READY)
     ends.run(12.0)

@@ -12,7 +12,7 @@
   const views = [];
 
   // What the server says, and what it's asked for.
-  const board = new VrsLink("/replay/board", [], {
+  const board = new VrsLink("/replay/board" + location.search, [], {
     take(data) {
       const text = typeof data === "string" ? data : new TextDecoder().decode(data);
       const message = JSON.parse(text);
@@ -20,6 +20,7 @@
       else if (message.kind === "marks") bar.takeMarks(message);
       else if (message.kind === "state") show(message);
       else if (message.kind === "refused") say(message.text);
+      else if (["opening", "open", "failed"].includes(message.kind)) showStanding(message);
     },
     state(next) {
       if (next === "live") el("enter").hidden = true;
@@ -32,6 +33,13 @@
   const letter = (k) => (items.length > 1 ? NAMES[k] + " · " : "");
   const bar = new VrsSeekBar(wish, letter);
   const controls = new VrsControls(wish, say, () => views.forEach((view) => view.scene && view.scene.home()));
+
+  // A server that has other things to do opens the recordings when they're asked for.
+  function showStanding({ kind, text }) {
+    el("standing").hidden = kind === "open";
+    el("standing").dataset.kind = kind;
+    write(el("standing"), text);
+  }
 
   function sayStatus() {
     const doing = () => {
@@ -93,7 +101,7 @@
       button.addEventListener("click", () => {
         if (view.scene) button.setAttribute("aria-pressed", String(view.scene.toggle(button.dataset.path)));
       });
-    view.link = new VrsLink("/replay/scene/" + k, ["vrs.meshcat.1"], {
+    view.link = new VrsLink("/replay/scene/" + k + location.search, ["vrs.meshcat.1"], {
       take: (data) => view.scene && view.scene.take(data),
       state() {},
     });
@@ -162,6 +170,7 @@
     el("now").replaceChildren(line);
   }
 
+  el("aside").hidden = !location.search;
   board.connect();
   window.replay = {
     views,

@@ -14,8 +14,10 @@ import numpy as np
 from starlette.routing import BaseRoute
 
 from interfaces.link import LinkConditions
+from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN as RECORD
 from interfaces.recording.live import LiveRecorder, LiveRecording
+from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.runtime.live.warm import warm
 from interfaces.site import Site
@@ -23,6 +25,7 @@ from interfaces.stream.access import Access
 from interfaces.stream.control import Role, State
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.meshcat import Committed, MeshcatScene
+from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, Report, RobotLine
@@ -30,7 +33,7 @@ from interfaces.timer import Turning
 from robots.onboard.lease import Ended, Grant, Lease
 from vrs.clock import WallClock, seconds_since_1970
 from vrs.commands import Stop
-from vrs.errors import VrsError
+from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array, RobotModel
 
 SHOW = 1.0 / 60.0
@@ -51,9 +54,9 @@ class LiveOperatorConfig:
     q: Array
     """Where the virtual robot stands at first [rad], (n,); it goes to where the real one is met."""
     robot: str
-    """Where the robot's site listens: `ws://HOST:PORT/site`."""
+    """Where the robot's site listens: `ws://HOST:PORT/site`; empty until that's known, see `RobotClient.url`."""
     conditions: LinkConditions
-    """What is emulated on the way to the robot, both ways."""
+    """What is emulated on the way to the robot at first, both ways; clients may change it."""
     robot_token: str | None = field(default=None, repr=False)
     """Token of the role `site` at the robot."""
     seed: int = 0
@@ -88,19 +91,21 @@ class LiveOperator:
         self.site = Site(self.operator.engine)
         self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self.recorder: LiveRecorder | None = None
+        self._recording: asyncio.Task[None] | None = None
+        self._recording_changes, self._closed = asyncio.Lock(), False
         if config.recording is not None:
             began = seconds_since_1970() - self.clock.now()
-            self.recorder = LiveRecorder(
-                config.recording, self.line, config.model, config.q, seed=config.seed, began=began
-            )
+            self.recorder = LiveRecorder(config.recording, self.line, config.model, seed=config.seed, began=began)
+            self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token)
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
         hub = HubConfig(rates=config.rates, server=config.server, instance=secrets.token_urlsafe(9))
-        self.hub = Hub(self.site, lease, access, self, config=hub)
+        self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
+        self.hub = Hub(self.site, lease, access, self, config=hub, emulation=self.emulation)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
-        self.scene = MeshcatScene(config.model)
+        self.scene = MeshcatScene(config.model, dressed=False)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self._wants_resume = self._ending = False
         self._shown: tuple[Report | None, bool, str] = (None, False, "")
@@ -115,8 +120,9 @@ class LiveOperator:
     async def running(self) -> AsyncIterator[LiveOperator]:
         """Serve clients, and keep the robot connected."""
         async with self.server.running():
-            tasks = [asyncio.create_task(work) for work in (self.robot.run(), self._draw(), self._record())]
-            tasks[-1].add_done_callback(self._recorded)
+            tasks = [asyncio.create_task(work) for work in (self.robot.run(), self._draw())]
+            if self.recorder is not None:
+                self._go_on_recording(self.recorder)
             self._turning.start()
             try:
                 yield self
@@ -125,12 +131,13 @@ class LiveOperator:
                 for task in tasks:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
-                if self.recorder is not None:
-                    self.recorder.finish(now=self.clock.now())
+                self._closed = True
+                await self.end_recording()
 
     async def _draw(self) -> None:
-        """Draw both robots for those who look."""
+        """Draw both robots for those who look, once their bodies are made."""
         links = self.config.model.links
+        self.scene.dress(await asyncio.to_thread(bodies, self.config.model))
         while True:
             await asyncio.sleep(SHOW)
             if not self.scene.viewers:
@@ -141,16 +148,55 @@ class LiveOperator:
             path = Committed(timeline, report.q_at) if follows and report is not None else None
             self.scene.show(virtual=links(timeline.sample(now)), real=real, path=path, now=now)
 
-    async def _record(self) -> None:
-        """Let what has happened be recorded."""
-        while self.recorder is not None:
-            await asyncio.sleep(RECORD)
-            self.recorder.advance(now=self.clock.now(), connected=self.connected)
+    async def begin_recording(self, what: LiveRecording) -> None:
+        """Record from now on; the loop doesn't wait for the disk.
 
-    def _recorded(self, task: asyncio.Task[None]) -> None:
-        """Nothing is recorded any more: say why, unless it's all over."""
-        if self.recorder is not None and not task.cancelled() and (error := task.exception()) is not None:
-            self.recorder.stop(str(error) or type(error).__name__)
+        Raises:
+            RecordingError: If the file can't be made.
+            InvalidValueError: If something is being recorded already, or it's all over.
+        """
+        async with self._recording_changes:
+            if self.recorder is not None or self._closed:
+                raise InvalidValueError("recording", what.path.name, "begun once the other one has ended")
+            now, config = self.clock.now(), self.config
+            recorder = LiveRecorder(
+                what, self.line, config.model, seed=config.seed, began=seconds_since_1970(), now=now
+            )
+            try:
+                await asyncio.to_thread(recorder.open)
+            except RecordingError:
+                recorder.leave()
+                raise
+            self.recorder = recorder
+            self._go_on_recording(recorder)
+
+    async def end_recording(self) -> str | None:
+        """Close what is being recorded; what was wrong with it, None if nothing was."""
+        async with self._recording_changes:
+            recorder, task = self.recorder, self._recording
+            if recorder is None or task is None:
+                return None
+            task.cancel()
+            await asyncio.wait([task])
+            recorder.end(now=self.clock.now())
+            await asyncio.to_thread(recorder.close)
+            self.recorder = self._recording = None
+            return recorder.problem
+
+    def _go_on_recording(self, recorder: LiveRecorder) -> None:
+        def stopped(task: asyncio.Task[None]) -> None:
+            """Nothing is recorded any more: say why, unless it's all over."""
+            if not task.cancelled() and (error := task.exception()) is not None:
+                recorder.stop(str(error) or type(error).__name__)
+
+        self._recording = asyncio.create_task(self._record(recorder))
+        self._recording.add_done_callback(stopped)
+
+    async def _record(self, recorder: LiveRecorder) -> None:
+        """Let what has happened be recorded."""
+        while True:
+            await asyncio.sleep(RECORD)
+            recorder.advance(now=self.clock.now(), connected=self.connected)
 
     def _turn(self, now: float) -> float | None:
         version = self.operator.engine.timeline.version
@@ -179,6 +225,12 @@ class LiveOperator:
     def resume(self, epoch: int, *, now: float) -> str:  # noqa: ARG002 - the hub says it
         """Let a robot go on that stopped by itself; why it can't, empty if it does."""
         return self.operator.resume(now=now)
+
+    def _rerouted(self, now: float, text: str) -> None:
+        """The emulated way to the robot has changed."""
+        if self.recorder is not None:
+            self.recorder.tell(now, "rerouted", text)
+        self._turning.soon()
 
     def _end_lease(self, now: float) -> None:
         """Let the next one have the lease once both robots rest."""
@@ -222,6 +274,9 @@ class LiveOperator:
                 connected=self.connected,
                 halted=self.operator.halted,
                 corrections=len(self.operator.corrections),
+                reference=report.reference,
+                round_trip=self.operator.round_trip,
+                messages=self.line.messages(),
             )
         )
         self.server.kick()
@@ -231,8 +286,8 @@ class LiveOperator:
         report, attached = self.operator.report, self.robot.attached
         silence = self.clock.now() - self.robot.heard
         return {
-            "robot_at": self.config.robot,
-            "delay": self.config.conditions.forward.delay.name,
+            "robot_at": self.robot.url,
+            "delay": self.line.link.conditions.forward.delay.name,
             "connected": self.connected,
             "problem": self.robot.problem,
             "silence": silence if math.isfinite(silence) and silence < 1e6 else None,

@@ -193,10 +193,12 @@ class LiveRobot:
 
     def _attached(self) -> Attached:
         site = self.config.host.site
-        loss, timeout = ("hold", 0.5) if site.watchdog is None else ("halt", site.watchdog.timeout)
+        dog = site.watchdog
+        loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         q = np.array(self._measured.q) if self._measured is not None else self.config.q
         name = self.config.model.name
-        return Attached(name, q, loss, timeout, site.fixed_offset, self.instance, self.config.server)
+        offset, server = site.fixed_offset, self.config.server
+        return Attached(name, q, loss, timeout, offset, self.instance, server, max_age=age)
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""

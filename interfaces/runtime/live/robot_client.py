@@ -49,7 +49,7 @@ class RobotClient:
 
         Args:
             line: What speaks and listens.
-            url: `ws://HOST:PORT/site`.
+            url: `ws://HOST:PORT/site`; empty while that isn't known yet, see `url`.
             clock: Session time.
             changed: Called when something has come, or the connection has.
             token: Of the role `site`.
@@ -75,7 +75,8 @@ class RobotClient:
         """Connect, and connect again, until it's cancelled."""
         while True:
             try:
-                await self._once()
+                if self.url:
+                    await self._once()
             except (OSError, TimeoutError, WebSocketException, ProtocolError, RobotRefusedError) as error:
                 self.problem = str(error) or type(error).__name__
             finally:

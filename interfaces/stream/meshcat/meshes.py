@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.model import Array
+from interfaces.view_parts import link_shapes
+from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
     from robots.puma560.shapes import LinkShape
@@ -28,6 +29,22 @@ class ShadedMesh(NamedTuple):
     """Red, green, blue, (n, 3)."""
     faces: NDArray[np.uint32]
     """Indices of vertices, (m, 3)."""
+
+
+class Bodies(NamedTuple):
+    """What a robot looks like."""
+
+    meshes: tuple[ShadedMesh, ...]
+    """A mesh for the base and for each link, in its frame; none for a robot without shapes."""
+    floor: float
+    """Lowest point of the base in its frame [m]; 0 for a robot without shapes."""
+
+
+def bodies(model: RobotModel) -> Bodies:
+    """Make the meshes of a robot; the first time that takes a second, most of it to load trimesh."""
+    shapes = link_shapes(model)
+    floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
+    return Bodies(tuple(shaded(shape) for shape in shapes), floor)
 
 
 def shaded(shape: LinkShape) -> ShadedMesh:

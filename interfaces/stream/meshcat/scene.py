@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from interfaces.stream.meshcat.commands import delete, set_object, set_property, set_transform
 from interfaces.stream.meshcat.committed import Committed, Path, Piece
-from interfaces.stream.meshcat.meshes import shaded
+from interfaces.stream.meshcat.meshes import Bodies, bodies
 from interfaces.stream.meshcat.newest import Newest, Slot
-from interfaces.view_parts import link_shapes
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
@@ -39,19 +38,15 @@ class MeshcatScene:
     The virtual robot is a ghost, the real one solid; the committed path runs ahead of the real one's tool.
     """
 
-    def __init__(self, model: RobotModel, *, tool: ArrayLike | None = None) -> None:
+    def __init__(self, model: RobotModel, *, tool: ArrayLike | None = None, dressed: bool = True) -> None:
         """Make the scene, with both robots at the first of the model's named poses and only the virtual one shown.
 
         Args:
             model: The robot; if it has no shapes, its frames and traces are shown.
             tool: The point whose path is drawn, in the last link's frame [m], (3,); the flange where that's known.
+            dressed: Whether to make the robot's bodies now; else nothing is to be seen until `dress`.
         """
-        from interfaces.stream.meshcat import objects
-
-        self._objects = objects
         self._model = model
-        shapes = link_shapes(model)
-        self._traced = not shapes
         self._tool = frozen_array(_tool_of(model) if tool is None else tool)
         if self._tool.shape != (3,) or not np.isfinite(self._tool).all():
             raise InvalidValueError("tool", tool, "finite, of shape (3,)")
@@ -61,14 +56,29 @@ class MeshcatScene:
         self._drawn: dict[int, Piece] = {}
         self._due = float("-inf")
         self._trails: dict[str, deque[tuple[float, Array]]] = {twin: deque(maxlen=128) for twin in COLOURS}
+        self._dressed = False
+        if dressed:
+            self.dress(bodies(model))
+
+    def dress(self, looks: Bodies) -> None:
+        """Show the robots from now on; once.
+
+        Args:
+            looks: From `bodies` of the scene's model, which takes its time and may be asked for in a thread.
+        """
+        from interfaces.stream.meshcat import objects
+
+        assert not self._dressed
+        self._dressed = True
+        self._objects = objects
+        model, meshes = self._model, looks.meshes
+        self._traced = not meshes
         q = next(iter(model.poses.values()), 0.5 * (model.limits.q_min + model.limits.q_max))
         rest = np.asarray(model.links(q))
-        floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
-        self._set(ROOT, "box", _box(model, floor))
+        self._set(ROOT, "box", _box(model, looks.floor))
         # Below the floor by a hair: no stripes where a foot stands on it.
-        self._put("/Grid", set_transform("/Grid", _at(0.0, 0.0, floor - 0.001)))
+        self._put("/Grid", set_transform("/Grid", _at(0.0, 0.0, looks.floor - 0.001)))
         self._set("/Axes", "visible", False)
-        meshes = [shaded(shape) for shape in shapes]
         for twin in COLOURS:
             for i in range(len(rest)):
                 path = f"{ROOT}/{twin}/body/{i}"
@@ -80,11 +90,17 @@ class MeshcatScene:
                 self._put(f"{path} object", set_object(path, body))
             self._move(twin, rest)
         self._set(f"{ROOT}/real", "visible", False)
+        self._newest.wake()
 
     @property
     def viewers(self) -> int:
         """How many viewers there are."""
         return self._newest.readers
+
+    @property
+    def tool(self) -> Array:
+        """The point whose path is drawn, in the last link's frame [m], (3,), read-only."""
+        return self._tool
 
     def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
         """Give a viewer a place: it gets the scene, and from then on what changes.
@@ -116,6 +132,7 @@ class MeshcatScene:
             InvalidValueError: If poses have another shape or aren't finite; nothing changes then.
         """
         number_in("now", now, -1e15, 1e15)
+        assert self._dressed
         poses = {"virtual": self._checked("virtual", virtual)}
         if real is not None:
             poses["real"] = self._checked("real", real)

@@ -70,8 +70,35 @@ VrsLink.BEAT = 2000; // [ms] between two questions whether the server is there
 VrsLink.PATIENCE = 6000; // [ms] without an answer after which the connection counts as lost
 VrsLink.UNAUTHORISED = 4401;
 
+// Lights that a scene drawn by software does without: each costs time at every pixel.
+const SIDE_LIGHTS = ["PointLightNegativeX", "PointLightPositiveX"];
+
+// Whether no graphics card draws, here and in the rest of the page.
+const SOFTWARE = (() => {
+  const gl = document.createElement("canvas").getContext("webgl");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+})();
+
+// Make a viewer whose edges aren't smoothed, which takes four samples of each pixel; its own options don't say.
+function withoutSmoothing(make) {
+  const own = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return own.call(this, kind, options && { ...options, antialias: false });
+  };
+  try {
+    return make();
+  } finally {
+    HTMLCanvasElement.prototype.getContext = own;
+  }
+}
+
 // Both robots and the committed path in a pane; throws where the browser offers no WebGL.
 window.VrsScene = class {
+  static software = SOFTWARE;
+
   constructor(pane, labels, drawn) {
     this.pane = pane;
     this.labels = labels;
@@ -82,7 +109,8 @@ window.VrsScene = class {
     this.framed = null;
     this.ahead = null; // [s] until the real robot is at rest
     // The bundle asks for the pane's size when it's made, and sizes itself by the window; the pane is what it fills.
-    const viewer = (this.viewer = new MeshCat.Viewer(pane));
+    const viewer = (this.viewer = SOFTWARE ? withoutSmoothing(() => new MeshCat.Viewer(pane)) : new MeshCat.Viewer(pane));
+    if (SOFTWARE) for (const light of SIDE_LIGHTS) viewer.set_property(["Lights", light], "visible", false);
     viewer.gui.domElement.style.display = "none";
     const resize = viewer.set_3d_pane_size.bind(viewer);
     viewer.set_3d_pane_size = () => {

@@ -32,6 +32,9 @@ from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import InvalidValueError
 from vrs.model import Limits
 
+MOST_MESSAGES = 64
+"""Messages to the robot that a state tells of, at most."""
+
 
 class HelloWire(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     """`Hello`."""
@@ -56,17 +59,18 @@ class LeaseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="lease")
     yours: bool = False
     answers: Number | None = None
     ended: LeaseEnd | None = None
+    shared: bool = False
 
     @classmethod
     def of(cls, value: control.Lease, packed: bool) -> LeaseWire:  # noqa: ARG003 - the same in both encodings
         """See `Message.of`."""
         number = None if value.epoch is None else str(value.epoch)
-        return cls(value.state, number, value.holder, value.yours, value.answers, value.ended)
+        return cls(value.state, number, value.holder, value.yours, value.answers, value.ended, value.shared)
 
     def read(self) -> control.Lease:
         """The lease."""
         number = None if self.epoch is None else epoch(self.epoch)
-        return control.Lease(self.state, number, self.holder, self.yours, self.answers, self.ended)
+        return control.Lease(self.state, number, self.holder, self.yours, self.answers, self.ended, self.shared)
 
 
 class LimitsWire(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -162,12 +166,13 @@ class AttachedWire(Message, frozen=True, omit_defaults=True, gc=False, tag="atta
     offset: Time | None = None
     instance: Word = ""
     server: Word = ""
+    max_age: Annotated[float, Meta(gt=0, le=3600)] | None = None
 
     def read(self) -> control.Attached:
         """What the robot is."""
         return control.Attached(
             self.robot, array(self.q), self.link_loss, self.timeout, self.offset, self.instance, self.server,
-            self.protocol,
+            self.protocol, self.max_age,
         )  # fmt: skip
 
 
@@ -213,6 +218,17 @@ class TakeOverWire(Message, frozen=True, omit_defaults=True, gc=False, tag="take
     def read(self) -> control.TakeOver:
         """The request."""
         return control.TakeOver(self.number)
+
+
+class ShareWire(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
+    """`Share`."""
+
+    number: Number
+    session: Word
+
+    def read(self) -> control.Share:
+        """The request."""
+        return control.Share(self.number, self.session)
 
 
 class HoldersWire(Message, frozen=True, omit_defaults=True, gc=False):
@@ -290,16 +306,23 @@ class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state")
     connected: bool = True
     halted: Text = ""
     corrections: Count = 0
+    reference: Joints | None = None
+    round_trip: Finite | None = None
+    messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
 
     @classmethod
     def of(cls, value: control.State, packed: bool) -> StateWire:  # noqa: ARG003 - the same in both encodings
         """See `Message.of`."""
         where = value.play, value.pace, value.D, value.following_error
         rest = digits(value.epoch), value.connected, text(value.halted), value.corrections
-        return cls(value.number, value.t, numbers(value.q), *where, *rest)
+        reference = None if value.reference is None else numbers(value.reference)
+        link = value.round_trip, value.messages[-MOST_MESSAGES:]
+        return cls(value.number, value.t, numbers(value.q), *where, *rest, reference, *link)
 
     def read(self) -> control.State:
         """The state."""
         where = self.play, self.pace, self.D, self.following_error
         rest = epoch(self.epoch), self.connected, self.halted, self.corrections
-        return control.State(self.number, self.t, array(self.q), *where, *rest)
+        reference = None if self.reference is None else array(self.reference)
+        link = self.round_trip, self.messages
+        return control.State(self.number, self.t, array(self.q), *where, *rest, reference, *link)

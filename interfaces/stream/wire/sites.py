@@ -111,6 +111,8 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
     halted: Text = ""
     receipts: Annotated[tuple[tuple[Number, ReceiptWire], ...], Meta(max_length=MOST_ENTRIES)] = ()
     plan: PlanWire[C] | None = None
+    reference: Joints | None = None
+    uncertainty: Annotated[float, Meta(ge=0, le=1e12)] | None = None
 
     @classmethod
     def of(cls, value: Report, packed: bool) -> ReportWire[C]:
@@ -129,6 +131,8 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             text(value.halted),
             tuple((number, ReceiptWire.of(receipt)) for number, receipt in value.receipts),
             None if value.plan is None else PlanWire.of(value.plan, packed),
+            None if value.reference is None else numbers(value.reference),
+            value.uncertainty,
         )
 
     def read(self) -> Report:
@@ -147,4 +151,6 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             self.halted,
             tuple((number, receipt.read()) for number, receipt in self.receipts),
             None if self.plan is None else self.plan.read(),
+            None if self.reference is None else array(self.reference),
+            self.uncertainty,
         )

@@ -15,20 +15,23 @@ SUFFIX: Final = ".v2"
 """Of files that are named without any."""
 LARGEST: Final = 4_000_000
 """Longest file that is read [B]."""
+_OFFERED: Final = 40
+"""Longest list that's offered."""
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 class Files:
     """A directory of files."""
 
-    def __init__(self, directory: Path, *, anywhere: bool = False) -> None:
+    def __init__(self, directory: Path, *, anywhere: bool = False, examples: Path | None = None) -> None:
         """Say where.
 
         Args:
             directory: Where files without a path are.
             anywhere: Whether paths may lead out of it; else only plain names ending in `.v2` are taken.
+            examples: Where files are looked for that aren't there; nothing is written to it.
         """
-        self.directory, self.anywhere = directory, anywhere
+        self.directory, self.anywhere, self._examples = directory, anywhere, examples
 
     def path(self, name: str) -> Path:
         """The file that a name stands for.
@@ -50,6 +53,25 @@ class Files:
         if not path.resolve().is_relative_to(self.directory.resolve()):
             raise ValError("Invalid file name", f"{name}: it leads somewhere else")
         return path
+
+    def found(self, name: str) -> Path:
+        """The file that's read for a name: in the directory, or else an example.
+
+        Raises:
+            ValError: See `path`.
+        """
+        path = self.path(name)
+        if self._examples is None or path.is_file():
+            return path
+        example = Files(self._examples).path(name) if _PLAIN.fullmatch(path.name) else path
+        return example if example.is_file() else path
+
+    def offered(self) -> list[str]:
+        """Names of examples, then of the files in the directory, that LOAD takes; not too many."""
+        examples = [] if self._examples is None else Files(self._examples).listed()
+        with contextlib.suppress(ValError):
+            examples += [name for name in self.listed() if name not in examples]
+        return [name for name in examples if _PLAIN.fullmatch(name)][:_OFFERED]
 
     def read(self, path: Path) -> str:
         """A file's text.

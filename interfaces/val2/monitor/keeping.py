@@ -28,7 +28,7 @@ def flist(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - comma
 
 def load(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """LOAD file: programs and values; all of it or nothing."""
-    path = desk.files.path(rest)
+    path = desk.files.found(rest)
     source = parse_file(desk.files.read(path), path.name)
     running = desk.in_use()
     for program in source.programs:

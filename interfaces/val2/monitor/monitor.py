@@ -16,7 +16,7 @@ from interfaces.val2.monitor.editing import Editing
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.handlers import HANDLERS
 from interfaces.val2.monitor.locations import Teach
-from interfaces.val2.monitor.switchboard import Switchboard
+from interfaces.val2.monitor.switchboard import Person, Switchboard
 from interfaces.val2.monitor.text import split_word
 from vrs.errors import VrsError
 
@@ -36,7 +36,14 @@ class Monitor:
     """One terminal's monitor. Errors are said; they never end it."""
 
     def __init__(
-        self, board: Switchboard, files: Files, version: str, *, patient: bool = False, barred: str = ""
+        self,
+        board: Switchboard,
+        files: Files,
+        version: str,
+        *,
+        patient: bool = False,
+        barred: str = "",
+        person: Person | None = None,
     ) -> None:
         """Begin; `start` greets.
 
@@ -47,8 +54,11 @@ class Monitor:
             patient: Whether lines that can't be done while a program runs wait for its end, as they do where all
                 come at once; else they are errors.
             barred: Why this terminal only looks, whoever is in control.
+            person: Who sits here, where they command by a session of their own, too: control is theirs, and isn't
+                asked for before a command needs it.
         """
-        self._board, self._patient, self._barred = board, patient, barred
+        self._person = person
+        self._board, self._patient, self.barred = board, patient, barred
         self.desk = Desk(board.controller, files, version)
         self._dialogue: Dialogue | None = None
         self._asked: str | None = None
@@ -56,6 +66,8 @@ class Monitor:
         self._greeting = False
         self._ended = False
         self._due = math.inf
+        self._claimed = ("", "")
+        """A command's name, and its line that waits for control."""
         self._trouble, self._looked = "", -math.inf
         self.done = False
         """Whether it's over: QUIT, or the end of the input."""
@@ -106,7 +118,7 @@ class Monitor:
     def start(self, *, now: float) -> None:
         """Say what this is, and ask for control."""
         self.desk.say(f"{self.desk.version}. HELP lists the commands.", style=Style.NOTE)
-        self._greeting = True
+        self._greeting = self._person is None or bool(self.barred)
         self.advance(now=now)
 
     def line(self, text: str, *, now: float) -> None:
@@ -211,10 +223,10 @@ class Monitor:
             self._end(now)
             return
         if not command.looks(rest):
-            answer = self._barred or self._board.wanted(self, now=now)
+            answer = self.barred or self._board.wanted(self, self._person, now=now)
             if answer is None and command.name not in _URGENT:
                 self._waiting.appendleft(text)
-                self._due = now + ASKING
+                self._due, self._claimed = now + ASKING, (command.name, text)
                 return
             if answer:
                 raise ValError("No control", f"{command.name}: {answer}")
@@ -305,7 +317,7 @@ class Monitor:
 
     def _settle_control(self, now: float) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self._barred or self._board.wanted(self, now=now)
+        answer = self.barred or self._board.wanted(self, self._person, now=now)
         if answer is None:
             self._due = now + ASKING
             return
@@ -314,6 +326,9 @@ class Monitor:
             self._greeting = False
             if answer:
                 self.desk.say(f"*No control* {answer}: looking only", style=Style.NOTE)
+        elif answer and self._waiting and self._waiting[0] is self._claimed[1]:
+            self._waiting.popleft()
+            self.desk.fail(ValError("No control", f"{self._claimed[0]}: {answer}"))
 
     def _look(self, now: float) -> None:
         """Say when the robot has stopped by itself, or can't be reached; and when that's over."""

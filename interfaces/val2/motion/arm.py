@@ -10,7 +10,7 @@ from interfaces.val2.motion.places import NEST, READY, aligned, behind, shifted
 from interfaces.val2.motion.requests import Requests
 from interfaces.val2.motion.speeds import Speed, bounded
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
-from vrs.commands import Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
+from vrs.commands import Cancel, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
 from vrs.model import Array
 
@@ -153,6 +153,24 @@ class Arm(Requests):
         self._give_up(now, self.robot.timeline.end)
         if now < self.robot.timeline.end or self._open:
             self._send(Stop(), False, now)
+
+    def give_up(self, *, now: float) -> None:
+        """Somebody else commands the arm: what isn't over is for RETRY, and no answer is waited for any more."""
+        self._look(now)
+        fate = None if self._bound is None else self.robot.fate(self._bound, now=now)
+        end = None if fate is None or fate.receipt is None else fate.receipt.end
+        self._ahead = tuple(n for n, _ in self._recent if (begins := self._begins(n)) is None or begins > now)
+        self._give_up(now, math.inf if end is None else end)
+        self._open.clear()
+
+    def withdraw(self, *, now: float) -> None:
+        """Take out of the plan what `give_up` found asked for ahead, as far as it has been accepted."""
+        ahead, self._ahead = self._ahead, ()
+        for number in ahead:
+            fate = self.robot.fate(number, now=now)
+            receipt = None if fate is None else fate.receipt
+            if receipt is not None and receipt.stands:
+                self._taken_out.append(self.robot.ask(Cancel(receipt.command_id), now=now))
 
     def retry(self, *, now: float) -> bool:
         """Ask again for the motion that `brake` interrupted; False if there was none."""

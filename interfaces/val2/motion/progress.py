@@ -9,8 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from interfaces.stream.control import OVERRULED
 from interfaces.teleop.operator import NOT_FOLLOWING
-from interfaces.val2.errors import ValError, robot_halted
+from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.altering import Alterations
 from interfaces.val2.motion.hand import Gripped, Hand
 from interfaces.val2.motion.pacing import MonitorSpeed
@@ -72,6 +73,10 @@ class Progress:
         """What has no answer yet, and whether it's a straight line."""
         self._recent: deque[tuple[int, MotionCommand]] = deque(maxlen=_RECENT)
         self._interrupted: tuple[MotionCommand, ...] = ()
+        self._ahead: tuple[int, ...] = ()
+        """What was asked for ahead when somebody else took the arm over."""
+        self._taken_out: list[int] = []
+        """What was asked for to take those out of the plan, and has no answer."""
         self._bound: int | None = None
         """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
         self._made = Manner()
@@ -118,6 +123,7 @@ class Progress:
     def _look(self, now: float) -> None:
         self._now = now
         self._pace.advance(now=now)
+        self._taken_out = [n for n in self._taken_out if self.robot.fate(n, now=now) is None]
         self._hand.begin(self._begins, now)
 
     def _begins(self, number: int) -> float | None:
@@ -252,6 +258,8 @@ class Progress:
 
 def _refusal(fate: Fate, straight: bool) -> ValError:
     """What a refusal is in VAL's words."""
+    if fate.refusal == OVERRULED:
+        return ValError("Motion interrupted", TAKEN)
     if fate.receipt is None:
         return ValError("Command refused", fate.reason)
     if fate.reason.startswith(NOT_FOLLOWING):

@@ -63,6 +63,7 @@ def motion(
                 (t, m.CommandEntry.of(number, t, command, receipt)),
                 (t, edit),
                 (t, m.ReceiptEntry(t, "real", m.FullReceipt.of(receipt))),
+                (t, m.GivenEntry(t, m.FullReceipt.of(receipt), smooth=True)),
                 (t, m.PacketEntry(number, receipt.command_id, t, t + 0.2, receipt.command_id)),
                 (t, m.LinkEntry("forward", t, t + 0.2)),
                 (t, m.LinkEntry("backward", t, lost=True, attempts=2)),

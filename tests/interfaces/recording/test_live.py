@@ -21,6 +21,7 @@ from interfaces.recording.track import REAL
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
+from interfaces.stream.network import Impair, Way
 from interfaces.stream.server import application
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until
 from tests.interfaces.recording import shown
@@ -59,6 +60,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             site.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
             site.undo(now=clock.now())
             await until(lambda: set(site.receipts) >= {1, 3, 4})
+            live.emulation.impair(Impair(1, 1, Way("constant:0.03", "0", "in-order")), "Ada", now=clock.now())
             await until(lambda: len({report.measured_at for report in reports}) > 30)
             # What came last is waited for to be written.
             await asyncio.sleep(0.5)
@@ -90,6 +92,8 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
         assert abs(recording.session.began - time.time()) < 60
         kinds = [event.kind for event in recording.events]
         assert {"up", "followed"} <= set(kinds)
+        (rerouted,) = [event.text for event in recording.events if event.kind == "rerouted"]
+        assert rerouted.startswith("Ada changed the way to the robot: delay constant:0.03, loss 0, in-order; back ")
         found, value = figures(recording), summary(recording)
         assert any("own references" in line for line in found.missing)
         assert value["commands"]["virtual"] == {"accepted": 3, "postponed": 0, "rejected": 1}
@@ -113,7 +117,7 @@ def test_a_disk_that_fills_up_is_told_and_nothing_else_happens(tmp_path, monkeyp
         def close(self):
             self.file.close()
 
-    monkeypatch.setattr(sink.Sink, "create", classmethod(lambda cls, path: cls(Small(path), str(path))))
+    monkeypatch.setattr(sink.Sink, "create", classmethod(lambda cls, path, **_: cls(Small(path), str(path))))
     told = []
 
     async def main():

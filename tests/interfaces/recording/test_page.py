@@ -147,6 +147,8 @@ def test_keys_and_buttons_move_the_head(files, open_page):
         near(server, 2.4)
         press("p")
         near(server, 2.0)
+        # The page marks the time that it shows.
+        wait(page, "Math.abs(replay.state.t - 2) < 1e-6")
         press("a")
         until(lambda: head.loop == (pytest.approx(2.0), 12.0))
         wait(page, "replay.state.loop !== null")

@@ -8,7 +8,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from interfaces import messages as m
+from interfaces.link import Measured
 from interfaces.stream import control as c
+from interfaces.stream import network as n
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs import commands as v
@@ -98,7 +100,7 @@ frames = st.builds(m.Frame, counts, times, times, arrays, statuses, ids)
 verdicts = st.builds(m.Verdicts, counts, counts, st.lists(st.tuples(counts, counts, ids), max_size=4).map(tuple))
 leases = st.builds(
     c.Lease, st.sampled_from(LeaseState), st.none() | epochs, st.none() | names, st.booleans(), st.none() | one,
-    st.none() | st.sampled_from(LeaseEnd),
+    st.none() | st.sampled_from(LeaseEnd), st.booleans(),
 )  # fmt: skip
 
 
@@ -114,6 +116,9 @@ def welcomes(draw):
     return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(st.floats(0.1, 60)))
 
 
+ways = st.builds(n.Way, words, words, words)
+spans = st.none() | st.floats(0, 1e9)
+measured = st.builds(Measured, counts, st.none() | st.floats(0, 1), spans, spans)
 plans = st.builds(PlanPart, counts, times, arrays, runs())
 entries = st.builds(Entry, numbers, times, st.none() | commands, counts)
 echoes = st.none() | st.tuples(numbers, times, times)
@@ -132,12 +137,14 @@ messages = {
     c.Hello: st.builds(c.Hello, st.sampled_from(c.Role), names, st.none() | words, st.none() | words, numbers),
     c.Welcome: welcomes(),
     c.Attached: st.builds(
-        c.Attached, words, arrays, words, st.floats(0.1, 60), stamps, words, words, numbers
+        c.Attached, words, arrays, words, st.floats(0.1, 60), stamps, words, words, numbers,
+        st.none() | st.floats(0.01, 2),
     ),
     c.Ping: st.builds(c.Ping, numbers, times),
     c.Pong: st.builds(c.Pong, numbers, times, times, times),
     c.Acquire: st.builds(c.Acquire, numbers),
     c.TakeOver: st.builds(c.TakeOver, numbers),
+    c.Share: st.builds(c.Share, numbers, words),
     c.Release: st.builds(c.Release, numbers, epochs),
     c.Resume: st.builds(c.Resume, numbers, epochs),
     c.Beat: st.builds(c.Beat, epochs),
@@ -145,14 +152,22 @@ messages = {
     c.Problem: st.builds(c.Problem, st.sampled_from(c.ProblemCode), words, st.none() | numbers, st.booleans()),
     c.State: st.builds(
         c.State, numbers, times, arrays, times, finite, times, finite, st.integers(0, 2**64 - 1), st.booleans(),
-        words, counts,
+        words, counts, st.none() | arrays, st.none() | finite,
+        st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
     ),
     Orders: st.builds(
         Orders, epochs, numbers, times, counts, times, times, counts, st.lists(entries, max_size=3).map(tuple)
     ),
     Report: st.builds(
         Report, epochs, numbers, times, echoes, counts, times, finite, arrays, times, times, words,
-        st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans,
+        st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans, st.none() | arrays,
+        st.none() | st.floats(0, 1e3),
+    ),
+    n.Survey: st.builds(n.Survey, numbers),
+    n.Impair: st.builds(n.Impair, numbers, epochs, st.none() | ways, st.none() | ways),
+    n.Network: st.builds(
+        n.Network, ways, ways, measured, measured, measured, counts, stamps, words, words, words,
+        spans, words, spans, spans, stamps, words, st.none() | numbers,
     ),
 }  # fmt: skip
 """What draws each message."""

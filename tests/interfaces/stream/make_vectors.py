@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from interfaces import messages as m
-from interfaces.link import ClockSync, RoundTrip
+from interfaces.link import ClockSync, Measured, RoundTrip
 from interfaces.site import Site
 from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
+from interfaces.stream import network as n
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from robots import puma560
 from robots.onboard.lease import LeaseEnd, LeaseState
@@ -87,19 +88,37 @@ def values() -> dict[str, Any]:
             "xyz", "vrs 0.1.0",
         ),
         "attached": c.Attached("puma560", Q, "halt", 0.5, None, "xyz", "vrs 0.1.0"),
+        "attached, with an age": c.Attached("puma560", Q, "halt", 0.5, -0.5, "xyz", "vrs 0.1.0", max_age=0.4),
         "ping": c.Ping(1, 123.456),
         "pong": c.Pong(1, 123.456, 2.5, 2.5001),
         "acquire": c.Acquire(3),
         "take over": c.TakeOver(4),
+        "share": c.Share(5, "abc"),
         "release": c.Release(5, 2**64 - 1),
         "resume": c.Resume(6, 7_730_941_132_801),
         "beat": c.Beat(7_730_941_132_801),
         "lease held by the receiver": held,
         "lease held by another": c.Lease(LeaseState.HELD, None, "Ada"),
+        "lease shared by the receiver": c.Lease(LeaseState.HELD, 7_730_941_132_801, "Ada", answers=5, shared=True),
         "lease ending": c.Lease(LeaseState.ENDING, answers=4, ended=LeaseEnd.TAKEN_OVER),
         "problem": c.Problem(c.ProblemCode.STALE_EPOCH, "the lease has ended", 5),
         "state": c.State(31, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7_730_941_132_801, True, "", 2),
         "state of a halted robot": c.State(32, 2.5, Q, 2.0, 0.0, -0.5, 0.2, 0, False, "following error", 2),
+        "state with a reference and what the link did": c.State(
+            33, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7, True, "", 0, 1.001 * Q, 0.41, ((2.0, 2.25), (2.05, None))
+        ),
+        "survey": n.Survey(7),
+        "impair both ways": n.Impair(8, 7_730_941_132_801, n.Way("mon", "0.05"), n.Way("constant:0.3")),
+        "impair one way": n.Impair(9, 7_730_941_132_801, n.Way("none", "burst:0.1,3", "in-order")),
+        "network": n.Network(
+            n.Way("mon", "0.05"), n.Way("none"), Measured(412, 0.05, 0.139, 1.9), Measured(300, 0.0, 0.0, 0.0),
+            Measured(290, None, 0.141, 1.91), 7, 31.5, "Ada", "ws://127.0.0.1:41000/site", "", 0.002, "halt", 0.5,
+            0.5, -0.5, "messages will often be old", 7,
+        ),
+        "network without a robot": n.Network(
+            n.Way("none"), n.Way("none"), Measured(0, None, None, None), Measured(0, None, None, None),
+            Measured(0, None, None, None), problem="not connected yet",
+        ),
         **orders,
         "ask": m.Ask(9, 2.75),
         "ask for the present": m.Ask(10, None),
@@ -126,8 +145,14 @@ def values() -> dict[str, Any]:
         "report": Report(
             7_730_941_132_801, 3, 2.75, (5, 2.5, 2.7), 1, 2.0, 0.95, Q, 2.72, 2.0, "", ((1, receipt),), plan
         ),
+        "report of a robot that knows the time": Report(
+            7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0, uncertainty=0.015
+        ),
         "report of a halted robot": Report(
             7_730_941_132_801, 4, 2.85, None, 1, 2.0, 0.0, Q, 2.82, 2.0, "link lost"
+        ),
+        "report with a reference": Report(
+            7_730_941_132_801, 5, 2.95, None, 1, 2.1, 1.0, Q, 2.92, 2.07, "", (), None, 1.001 * Q
         ),
     }  # fmt: skip
 

@@ -40,7 +40,7 @@ class Robot:
         return self.refusal
 
 
-def make_hub(*, now: float = 0.0, stops: bool = True, epoch: int = 0, **options) -> Hub:
+def make_hub(*, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, **options) -> Hub:
     site = Site(Engine(MODEL, q=HOME, clock=ManualClock(now)))
     robot = Robot(stops)
     access = Access({"admin": ADMIN})
@@ -51,6 +51,7 @@ def make_hub(*, now: float = 0.0, stops: bool = True, epoch: int = 0, **options)
         access,
         robot,
         config=HubConfig(instance="one", server="test", **options),
+        emulation=emulation,
         random_bytes=lambda n: next(counter).to_bytes(n, "big"),
     )
     robot.hub = hub

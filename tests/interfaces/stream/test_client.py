@@ -107,6 +107,37 @@ def test_take_over_and_release():
     assert joined.wish(admin, control.Release).state == "free"
 
 
+def test_a_share_commands_without_beats_and_counts_its_lapses():
+    joined = Joined()
+    core, designer = operator(joined)
+    other, commands = operator(joined)
+    epoch = lease(joined, core).epoch
+    share = joined.wish(other, lambda number: control.Share(number, core.welcome.session))
+    assert (share.shared, other.epoch, other.lapses) == (True, epoch, 0)
+    joined.run(5.0)
+    assert other.epoch == epoch
+    mine = commands.issue(to(1), now=joined.time(other))
+    joined.run(0.1)
+    assert commands.issued(mine.number).receipt.status == "accepted"
+    designer.issue(to(2), now=joined.time(core))
+    joined.run(0.1)
+    assert (other.epoch, other.lapses, core.lapses) == (0, 1, 0)
+    joined.clients[core] = None
+    assert joined.wish(other, lambda number: control.Share(number, core.welcome.session)).shared
+    joined.run(2.1)
+    assert joined.hub.robot.log[-1] == ("ended", epoch, "expired")
+    assert (other.epoch, other.lapses) == (0, 2)
+
+
+def test_a_wish_that_was_refused_leaves_nothing_to_do():
+    joined = Joined()
+    core, _ = operator(joined)
+    other, _ = operator(joined)
+    lease(joined, core)
+    assert lease(joined, other).code is ProblemCode.LEASE
+    assert other.next_deadline() > joined.now + joined.ahead[other]
+
+
 def test_an_order_is_carried_out_once_whenever_the_connection_is_lost():
     """The connection is cut at every moment between sending and the answer, and taken up again."""
     for moment in range(6):

@@ -11,6 +11,7 @@ from interfaces.stream.limits import Limits
 from tests.interfaces.joined import to
 from tests.interfaces.stream.served import ADMIN, make_hub
 from tests.interfaces.stream.test_session import Peer, holder, kinds
+from vrs.commands import Stop
 
 
 def leases(messages):
@@ -218,3 +219,127 @@ def test_the_end_is_told():
     for peer in peers:
         last = peer.got(now=0.1)[-1]
         assert (last.code, last.fatal, peer.session.closing[0]) == (ProblemCode.STOPPING, True, 1012)
+
+
+def refusal(peer, order, now):
+    """Why an order wasn't carried out."""
+    return next(m.refusal for m in peer.tell(order, now=now) if m.kind == "outcome")
+
+
+def problem(peer, wish, now):
+    """What couldn't be done of a wish."""
+    return next(m for m in peer.tell(wish, now=now) if m.kind == "problem")
+
+
+def sharing(hub, **options):
+    """A holder, its epoch, and one who shares its lease."""
+    owner, epoch = holder(hub)
+    other = Peer(hub, **options)
+    other.tell(control.Share(1, owner.welcome.session), now=0.0)
+    owner.got(now=0.0)
+    return owner, epoch, other
+
+
+def test_who_shows_the_holder_s_session_commands_under_its_epoch():
+    hub = make_hub()
+    owner, epoch = holder(hub)
+    other, third = Peer(hub), Peer(hub)
+    (lease,) = leases(other.tell(control.Share(7, owner.welcome.session), now=0.1))
+    assert (lease.state, lease.epoch, lease.holder, lease.yours, lease.shared, lease.answers) == (
+        "held", epoch, "peer", False, True, 7,
+    )  # fmt: skip
+    assert [(m.epoch, m.shared) for m in leases(third.got(now=0.1))] == [(None, False)]
+    assert refusal(other, Order(1, to(1), epoch), 0.2) == ""
+    assert refusal(owner, Order(1, to(2), epoch), 0.2) == ""
+    assert hub.robot.log == [("began", epoch)]
+    resumed = leases(other.tell(control.Share(8, owner.welcome.session), now=0.3))[-1]
+    assert resumed.shared, "it may be shared again"
+    assert leases(other.tell(control.Resume(9, epoch), now=0.3))[-1].answers == 9
+    assert refusal(other, Order(2, to(3), epoch - 1), 0.4).startswith("no lease: epoch")
+
+
+@pytest.mark.parametrize("shown", ["", "wrong", "own", "of one who has no lease"])
+def test_only_the_holder_s_session_opens_its_lease(shown):
+    hub = make_hub()
+    owner, epoch = holder(hub)
+    other, third, viewer = Peer(hub), Peer(hub), Peer(hub, role=Role.VIEWER)
+    names = {"own": other.welcome.session, "of one who has no lease": third.welcome.session}
+    found = problem(other, control.Share(2, names.get(shown, shown)), 0.1)
+    assert (found.code, found.number, found.fatal) == (ProblemCode.LEASE, 2, False)
+    assert refusal(other, Order(1, to(1), epoch), 0.1) == "no lease: acquire it first"
+    found = problem(viewer, control.Share(3, owner.welcome.session), 0.1)
+    assert found.code is ProblemCode.NOT_ALLOWED
+    owner.tell(control.Release(2, epoch), now=0.2)
+    assert problem(other, control.Share(4, owner.welcome.session), 0.3).code is ProblemCode.LEASE
+    assert hub.site.engine.newest == 0
+
+
+def test_only_its_holder_keeps_a_shared_lease():
+    hub = make_hub(stops=False)
+    owner, epoch, other = sharing(hub)
+    for k in range(1, 10):
+        assert refusal(other, Order(k, to(k), epoch), 0.2 * k) == ""
+    assert problem(other, control.Beat(epoch), 1.9).code is ProblemCode.STALE_EPOCH
+    hub.advance(now=2.0)
+    assert hub.robot.log == [("began", epoch), ("ended", epoch, "expired")]
+    assert "no lease" in refusal(other, Order(10, to(1), epoch), 2.1)
+    assert problem(other, control.Share(2, owner.welcome.session), 2.1).code is ProblemCode.LEASE
+
+
+@pytest.mark.parametrize("how", ["released", "taken over"])
+def test_a_share_ends_with_its_lease_and_none_is_left_for_the_next(how):
+    hub = make_hub()
+    owner, epoch, other = sharing(hub)
+    admin = Peer(hub, role=Role.ADMIN, token=ADMIN)
+    if how == "released":
+        owner.tell(control.Release(2, epoch), now=0.1)
+    else:
+        admin.tell(control.TakeOver(1), now=0.1)
+    assert not leases(other.got(now=0.1))[-1].commands
+    assert "no lease" in refusal(other, Order(1, to(1), epoch), 0.1)
+    new = leases(admin.tell(control.Acquire(2), now=0.2))[-1].epoch
+    assert new == epoch + 1
+    assert "no lease" in refusal(other, Order(2, to(1), new), 0.2)
+    assert hub.site.engine.newest == 0
+
+
+def test_who_shares_a_lease_gives_its_share_back_alone():
+    hub = make_hub()
+    owner, epoch, other = sharing(hub)
+    gone = leases(other.tell(control.Release(2, epoch), now=0.1))[-1]
+    assert (gone.state, gone.epoch, gone.shared) == ("held", None, False)
+    assert "no lease" in refusal(other, Order(1, to(1), epoch), 0.1)
+    assert refusal(owner, Order(1, to(1), epoch), 0.1) == ""
+    assert hub.robot.log == [("began", epoch)]
+
+
+@pytest.mark.parametrize("command", [Stop(), to(2), None])
+def test_an_order_of_one_ends_the_shares_of_the_others_until_they_share_anew(command):
+    hub = make_hub()
+    owner, epoch, other = sharing(hub)
+    third = Peer(hub)
+    third.tell(control.Share(1, owner.welcome.session), now=0.0)
+    other.tell(Order(1, to(1), epoch), now=0.1)
+    assert not leases(third.got(now=0.1))[-1].commands
+    newest = hub.site.engine.newest
+    owner.tell(Order(1, command, epoch), now=0.2)
+    assert not leases(other.got(now=0.2))[-1].commands
+    made = hub.site.engine.newest
+    assert made >= newest
+    assert refusal(other, Order(2, to(3), epoch), 0.3) == control.OVERRULED
+    assert hub.site.engine.newest == made
+    assert leases(other.tell(control.Share(2, owner.welcome.session), now=0.4))[-1].commands
+    assert refusal(other, Order(3, to(3), epoch), 0.5) == ""
+
+
+def test_few_share_a_lease_and_who_was_forgotten_shares_none():
+    hub = make_hub(limits=Limits(sharers=2, absence=1.0))
+    owner, epoch, other = sharing(hub)
+    second, third = Peer(hub), Peer(hub)
+    assert leases(second.tell(control.Share(1, owner.welcome.session), now=0.1))[-1].shared
+    assert problem(third, control.Share(1, owner.welcome.session), 0.1).code is ProblemCode.LEASE
+    hub.leave(other.session, done=False, now=0.2)
+    for k in range(1, 5):
+        owner.tell(control.Beat(epoch), now=0.5 * k)
+        hub.advance(now=0.5 * k)
+    assert leases(third.tell(control.Share(2, owner.welcome.session), now=2.1))[-1].shared

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from interfaces.stream.control import Lease
+from interfaces.stream.control import Lease, Problem, ProblemCode
 from interfaces.val2.control import MEETING, PATIENCE, LeaseControl
 from robots.onboard.lease import LeaseState
 
@@ -12,6 +12,7 @@ FREE = Lease(LeaseState.FREE)
 ENDING = Lease(LeaseState.ENDING)
 MINE = Lease(LeaseState.HELD, 7, "me", yours=True)
 THEIRS = Lease(LeaseState.HELD, None, "Ann")
+SHARED = Lease(LeaseState.HELD, 7, "Ann", shared=True)
 
 
 class Server:
@@ -20,11 +21,19 @@ class Server:
     def __init__(self, lease, *, halted=""):
         self.lease, self.is_connected = lease, True
         self.state = SimpleNamespace(connected=True, halted=halted)
-        self.asked = self.released = self.resumed = 0
+        self.asked = self.released = self.resumed = self.lapses = 0
+        self.shown, self.answers = [], {}
 
     def acquire(self, *, wait):
         assert wait == 0.0
         self.asked += 1
+
+    def ask_to_share(self, session):
+        self.shown.append(session)
+        return len(self.shown)
+
+    def answer(self, number):
+        return self.answers.get(number)
 
     def release(self, *, wait):
         assert wait == 0.0
@@ -33,6 +42,18 @@ class Server:
     def resume(self, *, wait):
         assert wait == 0.0
         self.resumed += 1
+
+
+class Ann:
+    """A person with a session of her own."""
+
+    session = "ann's"
+
+    def __init__(self, *, holds=True):
+        self.holds, self.taken = holds, 0
+
+    def take(self):
+        self.taken += 1
 
 
 def test_a_free_lease_is_asked_for_and_waited_for():
@@ -124,3 +145,61 @@ def test_a_server_that_is_gone_is_told_of():
     server = Server(MINE)
     server.is_connected = False
     assert LeaseControl(server).trouble(now=0.0).what == "No connection"
+
+
+def test_the_lease_of_a_person_is_shared_by_showing_her_session_once():
+    server, ann = Server(THEIRS), Ann()
+    control = LeaseControl(server)
+    assert [control.wanted(ann, now=0.1 * k) for k in range(20)] == [None] * 20
+    assert server.shown == ["ann's"]
+    assert not control.kept
+    server.lease, server.answers = SHARED, {1: SHARED}
+    assert control.wanted(ann, now=2.0) == ""
+    assert control.kept
+    assert control.wanted(now=2.1) == "Ann has control"
+    assert (server.asked, ann.taken) == (0, 0)
+    control.release(now=3.0)
+    assert (server.released, control.kept) == (1, False)
+    assert control.wanted(ann, now=3.0) is None, "what was given back isn't there any more"
+
+
+def test_a_person_without_control_takes_it_herself_or_is_told_who_has_it():
+    server, ann = Server(FREE), Ann(holds=False)
+    control = LeaseControl(server)
+    assert control.wanted(ann, now=0.0) is None
+    assert (ann.taken, server.asked, server.shown) == (1, 0, [])
+    server.lease = THEIRS
+    assert control.wanted(ann, now=0.05) is None, "she hasn't said yet that it's hers"
+    ann.holds = True
+    assert control.wanted(ann, now=0.1) is None
+    server.answers = {1: Problem(ProblemCode.LEASE, "that session doesn't have the lease")}
+    assert control.wanted(ann, now=0.2) == "that session doesn't have the lease"
+    ann.holds = False
+    assert control.wanted(ann, now=0.3) == "Ann has control"
+    server.lease = FREE
+    assert control.wanted(ann, now=1.0) is None
+    assert "wasn't given" in control.wanted(ann, now=1.0 + PATIENCE)
+    assert server.asked == 0
+
+
+def test_the_share_of_one_person_is_none_of_another():
+    server, ann, bea = Server(SHARED), Ann(), Ann(holds=False)
+    bea.session = "bea's"
+    control = LeaseControl(server)
+    control.wanted(ann, now=0.0)
+    assert control.wanted(ann, now=0.1) == ""
+    assert control.wanted(bea, now=0.2) == "Ann has control"
+    bea.holds = True
+    assert control.wanted(bea, now=0.3) is None
+    assert server.shown == ["ann's", "bea's"]
+
+
+def test_a_lapse_is_told_once_and_why():
+    server = Server(SHARED)
+    control = LeaseControl(server)
+    assert control.lapsed() == ""
+    server.lease, server.lapses = THEIRS, 1
+    assert "another command" in control.lapsed()
+    assert control.lapsed() == ""
+    server.lease, server.lapses = ENDING, 2
+    assert control.lapsed() == "control has ended"

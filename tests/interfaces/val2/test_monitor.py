@@ -656,15 +656,21 @@ class Held:
     """Control that somebody else has, or that takes time to come; of a robot that may be in trouble."""
 
     looks = 0.1
+    kept = True
 
     def __init__(self, *answers):
         self.answers, self.released = list(answers), 0
+        self.why = ""
         self.wrong = None
 
     def trouble(self, *, now):
         return self.wrong
 
-    def wanted(self, *, now):
+    def lapsed(self):
+        why, self.why = self.why, ""
+        return why
+
+    def wanted(self, person=None, *, now):
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 
     def release(self, *, now):
@@ -693,6 +699,47 @@ def test_a_command_waits_until_control_has_come(tmp_path):
     assert sitting.monitor.prompt == ""
     sitting.until(lambda: sitting.monitor.prompt == ".")
     assert sitting.type("LISTR x") == "x = 1\n"
+
+
+def test_a_command_that_waits_in_vain_is_told_so_once(tmp_path):
+    control = Held("", None, None, "nobody gave it", None, None, "nobody gave it", None)
+    sitting = Sitting(tmp_path, control=control)
+    sitting.line("DO x = 1")
+    sitting.line("DO y = 1")
+    sitting.until(lambda: sitting.monitor.prompt == ".")
+    assert sitting.shown == "*No control* DO: nobody gave it\n" * 2
+    assert sitting.type("LISTR x") != "x = 1\n"
+
+
+@pytest.mark.parametrize("line", ["EXECUTE loop", "DO DELAY 5"])
+def test_a_lapse_of_control_interrupts_what_runs_even_if_it_is_there_again(tmp_path, line):
+    control = Held("")
+    sitting = Sitting(tmp_path, control=control)
+    sitting.type(*LOOP)
+    sitting.line(line)
+    sitting.pass_time(0.5)
+    assert sitting.controller.running or sitting.controller.doing
+    sitting.shown, control.why = "", "somebody else commands"
+    sitting.line("SPEED 50")
+    assert not sitting.controller.running
+    assert not sitting.controller.doing
+    assert "*Motion interrupted* somebody else commands" in sitting.shown
+    sitting.pass_time(5.0)
+    assert sitting.shown.count("*Motion interrupted*") == 1
+    assert sitting.type("DO x = 1", "LISTR x").endswith("x = 1\n")
+
+
+def test_a_terminal_that_has_lost_control_gives_way_to_another(tmp_path):
+    control = Held("")
+    sitting = Sitting(tmp_path, control=control)
+    second = sitting.terminal()
+    sitting.type(*LOOP, "EXECUTE loop")
+    control.kept = False
+    second.line("DO x = 1", now=sitting.now)
+    assert not sitting.controller.running
+    sitting.pass_time(0.1)
+    assert "loop stands before" in sitting.shown
+    assert second.prompt == "."
 
 
 def test_a_robot_in_trouble_is_told_of_at_once_and_once(tmp_path):

@@ -297,8 +297,8 @@ def test_a_server_with_a_port_for_val(tmp_path):
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
     try:
-        said = [process.stdout.readline(), process.stdout.readline()]
-        found = re.search(r"VAL-II on 127\.0\.0\.1 port (\d+)", said[1])
+        said = [process.stdout.readline() for _ in range(3)]
+        found = re.search(r"VAL-II on 127\.0\.0\.1 port (\d+)", said[2])
         assert found, said
         with socket.create_connection(("127.0.0.1", int(found[1])), timeout=WAIT) as client:
             client.settimeout(WAIT)

@@ -1,0 +1,109 @@
+"""The emulated way to a live robot: told to clients, and changed by the one who has control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from interfaces.link import Conditions, LinkConditions, Service, delay_profile, loss_model, spelled_loss
+from interfaces.link.delay import DelayProfile
+from interfaces.link.gauge import Measured
+from interfaces.link.profiles import ALLOWED
+from interfaces.runtime.ages import late_often
+from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.stream.network import Impair, Network, Way
+from interfaces.teleop import RobotLine
+from vrs.errors import InvalidValueError
+
+
+class LiveEmulation:
+    """Answers for a `RobotLine`, as `interfaces.stream.hub.Emulation`."""
+
+    def __init__(
+        self, line: RobotLine, robot: RobotClient, seed: int, changed: Callable[[float, str], None]
+    ) -> None:
+        """Answer for a line.
+
+        Args:
+            line: The way to the robot, as it was begun.
+            robot: The connection at its end.
+            seed: Of what is random in it.
+            changed: Is told when [s] the conditions changed, and how, for people.
+        """
+        self._line, self._robot, self._seed, self._changed = line, robot, seed, changed
+        self._begun = line.link.conditions
+        self._at: float | None = None
+        self._by = ""
+
+    def network(self, *, now: float) -> Network:
+        """How it is; see `Emulation`."""
+        line, attached, report = self._line, self._robot.attached, self._line.operator.report
+        conditions, trips = line.link.conditions, line.operator.round_trips
+        return Network(
+            _way(conditions.forward),
+            _way(conditions.backward),
+            line.there.measured(now=now),
+            line.back.measured(now=now),
+            Measured(len(trips), None, _positive(trips.quantile(0.5)), _positive(trips.quantile(0.95))),
+            seed=self._seed,
+            changed_at=self._at,
+            changed_by=self._by,
+            robot=self._robot.url,
+            problem=self._robot.problem,
+            clock=None if report is None else report.uncertainty,
+            link_loss="" if attached is None else attached.link_loss,
+            timeout=None if attached is None else attached.timeout,
+            max_age=None if attached is None else attached.max_age,
+            offset=None if attached is None else attached.offset,
+            advice="" if attached is None else late_often(conditions, attached.link_loss, attached.max_age),
+        )
+
+    def impair(self, wish: Impair, who: str, *, now: float) -> None:
+        """Change it; see `Emulation`."""
+        before = self._line.link.conditions
+        conditions = LinkConditions(
+            self._conditions(before.forward, wish.forward), self._conditions(before.backward, wish.backward)
+        )
+        if conditions == before:
+            return
+        self._line.change(conditions, now=now)
+        self._at, self._by = now, who
+        self._changed(now, f"{who} changed the way to the robot: {described(conditions)}")
+
+    def _conditions(self, before: Conditions, wish: Way | None) -> Conditions:
+        """What a direction does from now on, if it can be as is wished."""
+        if wish is None:
+            return before
+        profile, loss = self._profile(wish.delay), loss_model(wish.loss)
+        if wish.service not in list(Service):
+            raise InvalidValueError("service", wish.service, " or ".join(Service))
+        return replace(before, delay=profile, loss=loss, service=Service(wish.service))
+
+    def _profile(self, text: str) -> DelayProfile:
+        """The delay profile of a name; of traces, which are files here, only those that it began with."""
+        for known in (self._begun.forward.delay, self._begun.backward.delay):
+            if text == known.name:
+                return known
+        if text.partition(":")[0] == "trace":
+            allowed = f"{ALLOWED}; and a trace only if the server was started with it"
+            raise InvalidValueError("delay profile", text, allowed)
+        return delay_profile(text)
+
+
+def _positive(seconds: float | None) -> float | None:
+    """A round trip [s]: clocks that run apart make short ones negative."""
+    return None if seconds is None else max(0.0, seconds)
+
+
+def _way(conditions: Conditions) -> Way:
+    return Way(conditions.delay.name, spelled_loss(conditions.loss), str(conditions.service))
+
+
+def described(conditions: LinkConditions) -> str:
+    """Conditions in a line, for people."""
+    there, back = (_words(_way(way)) for way in (conditions.forward, conditions.backward))
+    return f"{there}, both ways" if there == back else f"{there}; back {back}"
+
+
+def _words(way: Way) -> str:
+    return f"delay {way.delay}, loss {way.loss}, {way.service}"

@@ -1,0 +1,142 @@
+"""What stands between the world and NiceGUI: few paths, few visitors, few messages, no script that isn't ours."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from interfaces.station.files import HEADERS, POLICY
+from interfaces.stream.limits import Bucket
+from vrs.checks import number_in
+
+SOCKET: Final = "/_nicegui_ws/"
+"""Where NiceGUI's own messages go, by WebSocket only."""
+_PARTS: Final = "/_nicegui/"
+_SCRIPT: Final = re.compile(rb"<script(?=[ >])")
+_POLICY_VIOLATION: Final = 1008
+
+
+@dataclass(frozen=True, slots=True)
+class BoundsConfig:
+    """How much NiceGUI is asked to do."""
+
+    visitors: int = 256
+    """Pages that it keeps at once, 1 to 10,000."""
+    rate: float = 40.0
+    """Messages a second that a page may send for long, 1 to 10,000."""
+    burst: float = 200.0
+    """Messages that it may send at once, 1 to 10,000."""
+    blocked: float = 2.0
+    """A page is cut off when a message has waited so long to be sent [s], 0.1 to 60."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("visitors", 1, 1e4), ("rate", 1, 1e4), ("burst", 1, 1e4), ("blocked", 0.1, 60)):
+            number_in(name, getattr(self, name), low, high)
+
+
+class Bounds:
+    """Stands before NiceGUI's application."""
+
+    def __init__(
+        self, app: ASGIApp, page: str, visitors: Callable[[], int], config: BoundsConfig | None = None
+    ) -> None:
+        """Stand before an application.
+
+        Args:
+            app: NiceGUI's.
+            page: Path of the only page.
+            visitors: How many pages are kept now.
+            config: How much is let through.
+        """
+        self._app, self._page, self._visitors = app, page, visitors
+        self._config = BoundsConfig() if config is None else config
+        self._sockets = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, or refuse."""
+        path = scope["path"]
+        if scope["type"] == "websocket":
+            await self._socket(path, scope, receive, send)
+        elif scope["type"] != "http":
+            await self._app(scope, receive, send)
+        elif scope["method"] not in {"GET", "HEAD"} or not (path == self._page or path.startswith(_PARTS)):
+            await PlainTextResponse("not here\n", 404, HEADERS)(scope, receive, send)
+        elif path == self._page and self._visitors() >= self._config.visitors:
+            await PlainTextResponse("too many visitors: try again\n", 503, HEADERS)(scope, receive, send)
+        else:
+            await self._app(scope, receive, _Signed(send) if path == self._page else send)
+
+    async def _socket(self, path: str, scope: Scope, receive: Receive, send: Send) -> None:
+        if not path.startswith(SOCKET) or self._sockets >= self._config.visitors:
+            await receive()
+            await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": ""})
+            return
+        self._sockets += 1
+        try:
+            ends = _Ends(scope, receive, send, self._config)
+            await self._app(scope, ends.receive, ends.send)
+        finally:
+            self._sockets -= 1
+
+
+class _Ends:
+    """The two ends of a page's socket, bounded."""
+
+    def __init__(self, scope: Scope, receive: Receive, send: Send, config: BoundsConfig) -> None:
+        self._socket = scope.get("state", {}).get("socket")
+        self._receive, self._send, self._blocked = receive, send, config.blocked
+        self._clock = asyncio.get_running_loop().time
+        self._allowed = Bucket(config.rate, config.burst, self._clock())
+
+    async def receive(self) -> Message:
+        message = await self._receive()
+        if message["type"] != "websocket.receive" or self._allowed.take(self._clock()):
+            return message
+        await self.send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": "too many messages"})
+        return {"type": "websocket.disconnect", "code": _POLICY_VIOLATION}
+
+    async def send(self, message: Message) -> None:
+        try:
+            async with asyncio.timeout(self._blocked):
+                await self._send(message)
+        except TimeoutError:
+            if self._socket is not None:
+                self._socket.abort()
+            raise ConnectionResetError from None
+
+
+class _Signed:
+    """Sends a page whose scripts carry a word that nobody else knows, and a policy that lets only those run.
+
+    NiceGUI's page makes functions of text (Vue's templates, its events), hence `unsafe-eval`.
+    """
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
+        self._start: dict[str, Any] | None = None
+        self._parts: list[bytes] = []
+
+    async def __call__(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self._start = dict(message)
+            return
+        self._parts.append(message.get("body", b""))
+        if message.get("more_body") or self._start is None:
+            return
+        word = secrets.token_urlsafe(16)
+        body = _SCRIPT.sub(f'<script nonce="{word}"'.encode(), b"".join(self._parts))
+        policy = POLICY.format(scripts=f" 'nonce-{word}' 'unsafe-eval'")
+        headers = {**HEADERS, "Content-Security-Policy": policy, "Cache-Control": "no-store"}
+        given = [(name, value) for name, value in self._start["headers"] if name.decode().title() not in headers]
+        kept = [(name, value) for name, value in given if name != b"content-length"]
+        own = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+        start = self._start | {"headers": [*kept, *own, (b"content-length", str(len(body)).encode())]}
+        await self._send(start)
+        await self._send({"type": "http.response.body", "body": body})

@@ -1,0 +1,61 @@
+"""The station's own scripts and style: what is in `static/`, and the reader of the stream."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from importlib import resources
+from typing import Final
+
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+POLICY: Final = (
+    "default-src 'none'; script-src 'self'{scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""Nothing from elsewhere, and no script in the page but those that the server put there."""
+HEADERS: Final = {
+    "Content-Security-Policy": POLICY.format(scripts=""),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+_TYPES: Final = {"css": "text/css", "js": "text/javascript"}
+_READER: Final = "vrs.js"
+_TERMINAL: Final = {"xterm.js": "index.js", "xterm.css": "xterm.css"}
+"""What NiceGUI has of xterm.js, by the names under which it's served here."""
+
+
+@lru_cache(maxsize=1)
+def names() -> frozenset[str]:
+    """What is served below `/station/`."""
+    own = resources.files("interfaces.station").joinpath("static").iterdir()
+    return frozenset({_READER, *_TERMINAL, *(file.name for file in own if file.name.rpartition(".")[2] in _TYPES)})
+
+
+def route() -> Route:
+    """The route of the files."""
+    return Route("/station/{name}", _answer)
+
+
+async def _answer(request: Request) -> Response:
+    name = request.path_params["name"]
+    if name not in names():
+        return Response("not here", 404, HEADERS, "text/plain")
+    content, tag = _content(name)
+    headers = {**HEADERS, "ETag": tag}
+    if request.headers.get("if-none-match") == tag:
+        return Response(None, 304, headers)
+    return Response(content, 200, headers, _TYPES[name.rpartition(".")[2]])
+
+
+@lru_cache(maxsize=64)
+def _content(name: str) -> tuple[bytes, str]:
+    if name in _TERMINAL:
+        content = resources.files("nicegui").joinpath(f"elements/xterm/dist/{_TERMINAL[name]}").read_bytes()
+    else:
+        package = "interfaces.stream" if name == _READER else "interfaces.station"
+        content = resources.files(package).joinpath(f"static/{name}").read_bytes()
+    return content, f'"{hashlib.sha256(content).hexdigest()[:32]}"'

@@ -1,0 +1,252 @@
+"""Recording on the fly and the list of recordings: what the panel is told, and what it may ask for."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import secrets
+from collections import OrderedDict
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.types import Receive, Scope, Send
+
+from interfaces.recording.errors import RecordingError
+from interfaces.recording.live import LiveRecording
+from interfaces.station.files import HEADERS
+from interfaces.station.replays import Replays
+from interfaces.station.shelf import Shelf
+from interfaces.stream.access import LONGEST_TOKEN, Access
+from interfaces.stream.control import Role
+from interfaces.stream.limits import Bucket
+from interfaces.stream.meshcat.newest import Newest
+from interfaces.stream.meshcat.viewers import Viewers
+from vrs.errors import InvalidValueError, VrsError
+
+if TYPE_CHECKING:
+    from interfaces.runtime.live.operator import LiveOperator
+
+STATE: Final = 0.25
+"""Time between two looks at the recording that is made [s]."""
+LIST: Final = 2.0
+"""Time between two looks at the directory, while somebody has a page open [s]."""
+LARGEST: Final = 4096
+"""Bytes of a request."""
+RATE, BURST = 5.0, 30.0
+"""Requests a second of each role, for long and at once."""
+TICKET: Final = 30.0
+"""How long a download may be begun [s]."""
+SENT_AT_ONCE: Final = 4
+"""Downloads at once."""
+
+
+class _Ask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a page asks for."""
+
+    do: str
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFacts:
+    """What a recording says of the robot, and who is told when it fails."""
+
+    offset: str
+    """How far the robot plays behind, as it was asked for."""
+    link_loss: str
+    """What it does when messages stay away."""
+    failed: Callable[[str], None]
+
+
+class Recordings:
+    """Joins the operator's site, the directory and the pages. Enter `running` in the loop that serves."""
+
+    def __init__(self, operator: LiveOperator, shelf: Shelf, access: Access, facts: RecordingFacts) -> None:
+        """Wait for pages.
+
+        Args:
+            operator: Whose doings are recorded.
+            shelf: Where recordings are put.
+            access: Who may do what: viewers look, replay and take copies, operators record.
+            facts: What is said in a recording.
+        """
+        self._operator, self._shelf, self._access, self._facts = operator, shelf, access, facts
+
+        def allowed(token: str | None) -> bool:
+            return not access.refusal(Role.VIEWER, token)
+
+        self.replays = Replays(shelf, operator.clock, allowed)
+        self._board = Newest(b'{"kind":"begin"}')
+        self._viewers = Viewers(self._board, None, allowed)
+        self._looking = asyncio.Event()
+        self._asked = {role: Bucket(RATE, BURST, operator.clock.now()) for role in Role}
+        self._tickets: OrderedDict[str, tuple[Path, float]] = OrderedDict()
+        self.sent = 0
+        """Downloads under way."""
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """What it answers."""
+        return [
+            Route("/recordings", self._answer, methods=["POST"]),
+            Route("/recordings/copy/{ticket}", self._copy),
+            WebSocketRoute("/recordings/board", self._viewers.serve),
+            *self.replays.routes,
+        ]
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[Recordings]:
+        """Tell pages what is going on."""
+        tasks = [asyncio.create_task(work) for work in (self._tell_state(), self._tell_list())]
+        try:
+            async with self.replays.running():
+                yield self
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _tell_state(self) -> None:
+        before: str | None = None
+        while True:
+            recorder, now = self._operator.recorder, None
+            if recorder is not None:
+                facts = recorder.health()
+                now = {
+                    "name": recorder.path.name,
+                    "length": round(self._operator.clock.now() - recorder.since),
+                    "size": recorder.size,
+                    "dropped": facts["dropped"],
+                    "problem": facts["problem"],
+                }
+            self._put("recording", {"kind": "recording", "now": now})
+            name = None if recorder is None else recorder.path.name
+            if name != before:
+                before = name
+                self._looking.set()
+            await asyncio.sleep(STATE)
+
+    async def _tell_list(self) -> None:
+        while True:
+            if self._board.readers:
+                recorder = self._operator.recorder
+                growing = None if recorder is None else recorder.path.name
+                entries, more = await asyncio.to_thread(self._shelf.entries, growing)
+                items = [entry.facts() for entry in entries]
+                told = {"kind": "list", "directory": str(self._shelf.directory), "items": items, "more": more}
+                self._put("list", told)
+            self._looking.clear()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(LIST):
+                    await self._looking.wait()
+
+    def _put(self, key: str, value: dict[str, Any]) -> None:
+        version = self._board.version
+        self._board.put(key, json.dumps(value, allow_nan=False, separators=(",", ":")).encode())
+        if self._board.version != version:
+            self._board.wake()
+
+    async def _answer(self, request: Request) -> Response:
+        """Do what a page asks for."""
+        scheme, _, token = request.headers.get("authorization", "").partition(" ")
+        shown = token[: LONGEST_TOKEN + 1] if scheme.lower() == "bearer" and token else None
+        try:
+            if refusal := self._access.refusal(Role.VIEWER, shown):
+                return _said(403, refusal)
+            ask = msgspec.json.decode(await _body(request), type=_Ask)
+            role = Role.VIEWER if ask.do == "copy" else Role.OPERATOR
+            if refusal := self._access.refusal(role, shown):
+                return _said(403, refusal)
+            if not self._asked[role].take(self._operator.clock.now()):
+                return _said(429, "too many requests: try again in a moment")
+            return JSONResponse(await self._do(ask), 200, HEADERS)
+        except msgspec.MsgspecError:
+            return _said(400, "this isn't a request that is known here")
+        except VrsError as error:
+            return _said(409 if isinstance(error, RecordingError) else 400, str(error))
+
+    async def _do(self, ask: _Ask) -> dict[str, Any]:
+        match ask.do:
+            case "begin":
+                await self.begin(ask.name)
+            case "end":
+                problem = await self._operator.end_recording()
+                return {"problem": problem}
+            case "copy":
+                return {"path": f"/recordings/copy/{self._ticket(ask.name)}"}
+            case _:
+                raise InvalidValueError("do", ask.do, "begin, end or copy")
+        return {}
+
+    async def begin(self, name: str) -> None:
+        """Record into a new file of the directory.
+
+        Raises:
+            InvalidValueError: If the name can't be, or something is being recorded already.
+            RecordingError: If the file can't be made.
+        """
+        path = self._shelf.place(name)
+        facts = self._facts
+        await self._operator.begin_recording(
+            LiveRecording(path, facts.offset, facts.link_loss, facts.failed, over=False)
+        )
+
+    def _ticket(self, name: str) -> str:
+        """A word by which a recording can be fetched once, soon; it opens nothing else."""
+        recorder = self._operator.recorder
+        path = self._shelf.path(name)
+        if recorder is not None and recorder.path.resolve() == path.resolve():
+            raise InvalidValueError("recording", name, "one that has ended: this one is being written")
+        ticket = secrets.token_urlsafe(18)
+        self._tickets[ticket] = path, self._operator.clock.now() + TICKET
+        while len(self._tickets) > 2 * SENT_AT_ONCE:
+            self._tickets.popitem(last=False)
+        return ticket
+
+    async def _copy(self, request: Request) -> Response:
+        path, until = self._tickets.pop(request.path_params["ticket"], (None, 0.0))
+        if path is None or self._operator.clock.now() > until:
+            return _said(404, "not here, or not any more")
+        if self.sent >= SENT_AT_ONCE:
+            return _said(503, "too many downloads at once: try again")
+        return _Copy(self, path)
+
+
+class _Copy(FileResponse):
+    """A file on its way, counted."""
+
+    def __init__(self, counted: Recordings, path: Path) -> None:
+        super().__init__(path, headers=HEADERS, media_type="application/octet-stream", filename=path.name)
+        self._counted = counted
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._counted.sent += 1
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._counted.sent -= 1
+
+
+async def _body(request: Request) -> bytes:
+    """A request's body.
+
+    Raises:
+        InvalidValueError: If it's too long.
+    """
+    found = b""
+    async for part in request.stream():
+        found += part
+        if len(found) > LARGEST:
+            raise InvalidValueError("request", "more", f"up to {LARGEST} bytes")
+    return found
+
+
+def _said(status: int, text: str) -> Response:
+    return JSONResponse({"problem": text}, status, HEADERS)

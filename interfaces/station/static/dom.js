@@ -1,0 +1,58 @@
+// Elements, and numbers as people read them.
+
+/**
+ * An element.
+ * @param {string} tag with classes after dots: "div.row.wide"
+ * @param {object} props attributes; `on…` are listeners, null and false leave one out
+ * @param {...(Node|string|null)} children
+ */
+export function h(tag, props = {}, ...children) {
+  const [name, ...classes] = tag.split(".");
+  const element = document.createElement(name);
+  if (classes.length) element.className = classes.join(" ");
+  for (const [key, value] of Object.entries(props)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
+    else element.setAttribute(key, value === true ? "" : value);
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+/** A symbol of the icon font; people hear and read the words beside it. */
+export function icon(name) {
+  return h("i.material-icons", { "aria-hidden": "true" }, name);
+}
+
+/** Write a text, but touch nothing if it's there already. */
+export function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Set an attribute, but touch nothing if it's so already; null takes it away. */
+export function mark(element, name, value) {
+  if (value === null || value === false) element.removeAttribute(name);
+  else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
+}
+
+/** Whether a key that is pressed belongs to what is written in. */
+export function isTyping(event) {
+  const target = event.target;
+  if (!(target instanceof HTMLElement)) return false;
+  if (target.isContentEditable || target.tagName === "TEXTAREA") return true;
+  return target.tagName === "INPUT" && !["range", "checkbox", "radio", "button"].includes(target.type);
+}
+
+/** Radians as degrees, with a real minus. */
+export function degrees(angle) {
+  const text = ((angle * 180) / Math.PI).toFixed(1);
+  return (text === "-0.0" ? "0.0" : text).replace("-", "−") + "°";
+}
+
+/** Seconds of the session as m:ss.s. */
+export function clockText(t) {
+  const tenths = Math.round(Math.abs(t) * 10);
+  const minutes = Math.floor(tenths / 600);
+  const seconds = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
+  return (t < 0 ? "−" : "") + minutes + ":" + seconds;
+}

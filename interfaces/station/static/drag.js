@@ -1,0 +1,131 @@
+// Dragging the tool: a handle at the virtual tool; where it's dropped, the tool goes.
+import { h } from "./dom.js";
+import { steering } from "./steer.js";
+
+/** The handle is taken within so many pixels. */
+const REACH = 26;
+/** The nearer the tool is, the slower it goes: speed by distance [1/s]. */
+const GAIN = 3;
+/** So near it has arrived [m], and so long it may take after it was dropped [s]. */
+const THERE = 8e-4;
+const PATIENCE = 12;
+
+export function mount(station) {
+  const { session, chain, shared } = station;
+  const { pane, scene } = shared.pane;
+  if (!scene) return;
+  const steer = steering(station);
+  const THREE = window.MeshCat.THREE;
+  const handle = h("div.handle", { id: "handle", "aria-hidden": "true", title: "Drag the tool" });
+  const goal = h("div.goal", { id: "goal", "aria-hidden": "true", hidden: true });
+  pane.parentElement.append(handle, goal);
+  /** Where the tool is to go, in the base frame [m]; null while nothing is dragged. */
+  let target = null;
+  let droppedAt = null;
+  let plane = null;
+  let offset = null;
+
+  /** The tool in the base frame [m], as the picture shows it. */
+  const tool = () => (shared.pane.shown ? chain.toolAt(shared.pane.shown) : null);
+  // The scene's z is up; the camera lives in a frame with y up: (x, y, z) is (x, z, −y) there.
+  const seen = ([x, y, z]) => new THREE.Vector3(x, z, -y);
+  const back = ({ x, y, z }) => [x, -z, y];
+
+  function project(point) {
+    const at = seen(point).project(scene.viewer.camera);
+    const box = pane.getBoundingClientRect();
+    return { x: ((at.x + 1) / 2) * box.width, y: ((1 - at.y) / 2) * box.height, behind: at.z > 1 };
+  }
+
+  /** Where the pointer's ray meets the plane through the tool that faces the camera. */
+  function pointed(event) {
+    const box = pane.getBoundingClientRect();
+    const at = new THREE.Vector3(
+      (2 * (event.clientX - box.left)) / box.width - 1,
+      1 - (2 * (event.clientY - box.top)) / box.height,
+      0.5,
+    );
+    const camera = scene.viewer.camera;
+    const eye = camera.getWorldPosition(new THREE.Vector3());
+    const ray = new THREE.Ray(eye, at.unproject(camera).sub(eye).normalize());
+    return ray.intersectPlane(plane, new THREE.Vector3());
+  }
+
+  /** Towards the target, slower as it comes near. */
+  function input() {
+    const here = tool();
+    if (target === null || here === null) return null;
+    const way = target.map((x, k) => x - here[k]);
+    const distance = Math.hypot(...way);
+    const late = droppedAt !== null && performance.now() / 1000 - droppedAt > PATIENCE;
+    if (late || (droppedAt !== null && distance < THERE)) return null;
+    const fastest = shared.jog.share * station.config.robot.tool_speed;
+    const speed = Math.min(fastest, GAIN * distance);
+    const scale = distance > 1e-9 ? speed / distance : 0;
+    return { twist: [...way.map((x) => x * scale), 0, 0, 0], frame: "base" };
+  }
+
+  function end() {
+    target = droppedAt = null;
+    scene.viewer.controls.enabled = true;
+    handle.classList.remove("held");
+  }
+
+  function take(event) {
+    const here = tool();
+    if (event.button !== 0 || !here || shared.pane.cursor !== null || !session.holds) return;
+    const at = project(here);
+    const box = pane.getBoundingClientRect();
+    if (Math.hypot(event.clientX - box.left - at.x, event.clientY - box.top - at.y) > REACH) return;
+    event.preventDefault();
+    event.stopPropagation();
+    scene.viewer.controls.enabled = false;
+    const camera = scene.viewer.camera;
+    plane = new THREE.Plane().setFromNormalAndCoplanarPoint(
+      camera.getWorldDirection(new THREE.Vector3()),
+      seen(here),
+    );
+    const met = pointed(event);
+    offset = seen(here).sub(met);
+    target = here;
+    droppedAt = null;
+    if (!steer.hold("drag", input, end)) return;
+    handle.classList.add("held");
+    pane.setPointerCapture(event.pointerId);
+  }
+
+  function move(event) {
+    if (target === null || droppedAt !== null) return;
+    const met = pointed(event);
+    if (met) target = back(met.add(offset));
+  }
+
+  function drop() {
+    if (target === null || droppedAt !== null) return;
+    droppedAt = performance.now() / 1000;
+    scene.viewer.controls.enabled = true;
+    handle.classList.remove("held");
+  }
+
+  pane.addEventListener("pointerdown", take, { capture: true });
+  pane.addEventListener("pointermove", move, { capture: true });
+  for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) pane.addEventListener(type, drop);
+
+  /** The handle stands at the tool, and the mark where it's to go, in every frame of the picture. */
+  function place() {
+    const here = tool();
+    const shown = here !== null && session.holds && session.link === "live" && shared.pane.cursor === null;
+    put(handle, shown ? project(here) : null);
+    put(goal, shown && target !== null ? project(target) : null);
+    requestAnimationFrame(place);
+  }
+
+  function put(element, at) {
+    const hidden = at === null || at.behind;
+    if (element.hidden !== hidden) element.hidden = hidden;
+    if (!hidden) element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px)`;
+  }
+
+  shared.drag = { get target() { return target; }, tool, project };
+  place();
+}

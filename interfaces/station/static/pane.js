@@ -1,0 +1,156 @@
+// The 3D view: both robots, the committed path, what is shown and how far it can be trusted, and the past.
+import { clockText, h, icon, mark, write } from "./dom.js";
+import { History } from "./history.js";
+import { StationScene } from "./twins.js";
+
+const PERIOD = 80;
+/** How long a falsified frame is spoken of [s]. */
+const FALSIFIED = 2.5;
+const BADGES = {
+  predicted: ["auto_awesome", "Predicted", "The server's clock hasn't passed what is shown: a command may still change it"],
+  confirmed: ["verified", "Confirmed", "The server's clock has passed what is shown: it came true"],
+  falsified: ["report", "Falsified", "A command changed what had been shown"],
+  none: ["help", "Nothing known", "Nothing has come from the server yet, or nothing comes any more"],
+};
+const OLD = {
+  stale: ["hourglass_empty", "Stale: what you see is old"],
+  lost: ["wifi_off", "Lost: what you see is old. Trying again"],
+};
+const LEGEND = [
+  ["virtual", "Virtual", "ghost, as commanded"],
+  ["real", "Real", "solid, as measured"],
+  ["committed", "Committed path", "where the real tool will go"],
+];
+
+export function mount(station, box) {
+  const session = station.session;
+  const pane = h("div.pane", { id: "pane", role: "img", "aria-label": "Both robots in 3D" });
+  const labels = h("div.labels", { "aria-hidden": "true" });
+  const badgeIcon = icon("help");
+  const badgeText = h("span");
+  const badge = h("span.badge", { id: "badge", role: "status" }, badgeIcon, badgeText);
+  const banner = h("div.banner", { id: "banner", hidden: true });
+  const legend = h("ul.legend");
+  const home = h("button.quiet", { type: "button", id: "home", title: "Reset the view", "aria-label": "Reset the view" },
+    icon("center_focus_strong"));
+  const ahead = h("span.ahead", { "aria-hidden": "true" });
+  box.append(pane, labels, legend, h("div.corner", {}, badge, ahead), home, banner);
+
+  const history = new History(station);
+  let scene = null;
+  let falsifiedAt = -Infinity;
+  let falsifiedBy = null;
+  let newest = -Infinity;
+  /** The time of the past that is shown [s]; null: now. */
+  let cursor = null;
+
+  const shared = (station.shared.pane = {
+    pane,
+    get scene() { return scene; },
+    /** Joints of the virtual robot as the picture shows them; null where nothing is known. */
+    get shown() {
+      const t = cursor ?? session.now;
+      return t === null || !session.timeline ? null : session.timeline.joints(t);
+    },
+    get cursor() { return cursor; },
+    /** Show a time of the timeline [s]; null for now, and on with the time. */
+    show(t) {
+      if (scene && cursor === null && t !== null) scene.leave();
+      if (scene && cursor !== null && t === null) scene.resume();
+      cursor = t;
+      falsifiedAt = -Infinity;
+      dress();
+      station.dispatchEvent(new CustomEvent("cursor", { detail: t }));
+      say();
+    },
+  });
+
+  for (const [name, title, note] of LEGEND) {
+    const button = h("button", { type: "button", "aria-pressed": "true", title: note, "data-path": name },
+      h("i.key.key-" + name), title);
+    button.addEventListener("click", () => scene && mark(button, "aria-pressed", String(scene.toggle(name))));
+    legend.append(h("li", {}, button));
+  }
+  home.addEventListener("click", () => scene?.home());
+
+  try {
+    scene = new StationScene(pane, labels, () => {});
+  } catch {
+    pane.replaceChildren(h("p.no-3d", {}, "No 3D view: this browser offers no WebGL."));
+    legend.hidden = home.hidden = true;
+  }
+  if (scene) {
+    const connection = new window.VrsLink("/meshcat", ["vrs.meshcat.1"], {
+      take: (data) => scene.take(data),
+      state: () => {},
+    });
+    station.addEventListener("theme", (event) => scene.paint(event.detail));
+    station.addEventListener("unlocked", () => connection.connect());
+    scene.paint(station.shared.theme?.dark ?? document.documentElement.dataset.theme === "dark");
+    connection.connect();
+  }
+
+  /** Put both robots where they were. */
+  function dress() {
+    const q = shared.shown;
+    if (!scene || cursor === null || !q) return;
+    const measured = history.at(cursor);
+    scene.pose("virtual", station.chain.links(q));
+    scene.pose("real", measured ? station.chain.links(measured) : null);
+  }
+
+  station.on("edit", ({ before, after, change }) => {
+    dress();
+    const shown = cursor ?? newest;
+    if (!before || !change || shown === -Infinity) return;
+    // What was shown after the server's clock, and is otherwise now, was falsified.
+    const from = Math.max(session.past, change.start ?? change.end);
+    if (shown <= from) return;
+    const [then, now] = [before.joints(shown), after.joints(shown)];
+    if (then.some((x, k) => Math.abs(x - now[k]) > 1e-9)) {
+      falsifiedAt = performance.now() / 1000;
+      falsifiedBy = change.command_id ?? null;
+    }
+  });
+
+  function standing() {
+    if (!session.timeline || session.now === null) return "none";
+    if (cursor !== null && cursor <= session.past) return "confirmed";
+    if (session.link !== "live") return "none";
+    if (performance.now() / 1000 - falsifiedAt < FALSIFIED) return "falsified";
+    return "predicted";
+  }
+
+  function say() {
+    const status = standing();
+    const [symbol, word, meaning] = BADGES[status];
+    mark(badge, "data-status", status);
+    write(badgeIcon, symbol);
+    const by = status === "falsified" && falsifiedBy !== null ? ` by #${falsifiedBy}` : "";
+    write(badgeText, word + by + (cursor === null ? "" : ` · ${clockText(cursor)}`));
+    badge.title = meaning;
+    const live = session.link === "live";
+    const left = live && cursor === null && scene ? scene.ahead : null;
+    write(ahead, left === null ? "" : `real robot at rest in ${left.toFixed(1)} s`);
+    const shown = OLD[session.link];
+    banner.hidden = !shown && cursor === null;
+    mark(box, "data-link", session.link);
+    mark(banner, "data-kind", shown ? session.link : "past");
+    if (shown) fill(...shown);
+    else if (cursor !== null) fill("history", "You look at another time; the robot goes on");
+  }
+
+  let filled = "";
+  function fill(symbol, text) {
+    if (filled === text) return;
+    filled = text;
+    banner.replaceChildren(icon(symbol), h("span", {}, text));
+  }
+
+  setInterval(() => {
+    if (cursor === null && session.link === "live" && session.now !== null) newest = session.now;
+    say();
+  }, PERIOD);
+  station.on("link", say);
+  say();
+}

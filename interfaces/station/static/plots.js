@@ -1,0 +1,295 @@
+// Live plots: how far the robots are apart, why, and what the network does.
+import { ACROSS, Chart, swatch } from "./chart.js";
+import { save, textOf } from "./csv.js";
+import { clockText, h, mark, write } from "./dom.js";
+import { Figures } from "./figures.js";
+import { graphs } from "./graphs.js";
+import { Happenings, KINDS } from "./happenings.js";
+import { Samples } from "./samples.js";
+
+/** Windows that one may choose: seconds, name, time between two pictures of a plot [ms], and two comparisons [ms]. */
+const SPANS = [
+  [30, "30 s", 180, 1000],
+  [120, "2 min", 300, 2500],
+  [600, "10 min", 800, 8000],
+];
+const TURN = 50;
+/** Drawing takes this share of the time at most. */
+const SHARE = 0.2;
+/** Values older than this aren't the present ones [s]. */
+const OLD = 1.5;
+/** The paths are compared from so long before the window [s]. */
+const LEAD = 10;
+/** Values in words are written, and told to screen readers, so often [ms]. */
+const SAID = 250;
+const SPOKEN = 2000;
+const COMPARED = [
+  ["timeline", "at the same place in the plan"],
+  ["user", "at the same moment"],
+];
+const NOTES = [
+  "The virtual robot is as shown, corrections included; the report and vrs compare take what the commands alone make.",
+  "The report's own attribution switches causes off in runs of its own: that can't be had live. Payload and friction are in the servo's part.",
+  "Times of the real robot are by the clocks as they were compared, sure to half the shortest round trip.",
+  "Time difference and path error are of this window; what is still to come of a path isn't reached.",
+];
+
+export function mount(station, box) {
+  const style = (name) => document.head.append(h("link", { rel: "stylesheet", href: `/station/${name}.css` }));
+  style("uplot");
+  style("plots");
+  station.shared.plots = new Plots(station, box);
+}
+
+class Plots {
+  constructor(station, box) {
+    this.station = station;
+    this.session = station.session;
+    this.samples = new Samples(station);
+    this.happenings = new Happenings(station);
+    this.charts = graphs(this.samples.joints).map((graph) => new Chart(graph));
+    this.figures = new Figures();
+    this.span = SPANS[0];
+    this.basis = "timeline";
+    this.paths = null;
+    this.compared = this.said = this.spoken = this.counted = -Infinity;
+    this.saidAt = null;
+    this.comparing = 0;
+    this.number = 0;
+    this.cost = 0;
+    this.next = 0;
+    this.colours = new Map();
+    this.cached = { key: "", events: [] };
+    this.build(box);
+    station.addEventListener("theme", () => {
+      this.colours.clear();
+      this.again();
+    });
+    station.addEventListener("cursor", () => this.again());
+    setInterval(() => this.turn(), TURN);
+  }
+
+  build(box) {
+    this.spans = SPANS.map((span) => {
+      const button = h(
+        "button",
+        {
+          type: "button",
+          "aria-pressed": String(span === this.span),
+          "data-span": span[0],
+          onclick: () => this.choose(span),
+        },
+        span[1],
+      );
+      return button;
+    });
+    this.basisBox = h(
+      "select",
+      { id: "plots-basis", "aria-label": "Where the errors are compared" },
+      ...COMPARED.map(([value, text]) => h("option", { value }, text)),
+    );
+    this.basisBox.addEventListener("change", () => {
+      this.basis = this.basisBox.value;
+      this.again();
+    });
+    this.shows = h("p.muted.plots-shows", { id: "plots-shows" });
+    const file = h(
+      "button",
+      {
+        type: "button",
+        id: "plots-save",
+        title: "Save what is kept, ten minutes at most",
+        onclick: () => this.save(),
+      },
+      "CSV",
+    );
+    const keys = KINDS.map(([kind, text]) => h("li", {}, swatch(...ACROSS[kind]), text));
+    box.append(
+      h(
+        "div.row.plots-head",
+        {},
+        h("div.row.spans", { role: "group", "aria-label": "Time that is shown" }, ...this.spans),
+        h("span.grow"),
+        file,
+      ),
+      h("label.row.plots-head", {}, h("span", {}, "Errors"), this.basisBox),
+      this.shows,
+      ...this.charts.map((chart) => chart.element),
+      h("ul.plot-key", { "aria-label": "Lines across the plots" }, ...keys),
+      this.figures.element,
+      h(
+        "details.plot",
+        {},
+        h("summary", {}, h("span.plot-title", {}, "What these show")),
+        h(
+          "dl.plot-notes",
+          {},
+          ...this.charts.flatMap(({ graph }) => [h("dt", {}, graph.title), h("dd", {}, graph.note)]),
+          h("dt", {}, "What isn't known live"),
+          ...NOTES.map((text) => h("dd", {}, text)),
+        ),
+      ),
+    );
+    this.figures.element.addEventListener("toggle", () => {
+      this.counted = -Infinity;
+    });
+  }
+
+  choose(span) {
+    this.span = span;
+    this.spans.forEach((button, k) => mark(button, "aria-pressed", String(SPANS[k] === span)));
+    this.paths = null;
+    this.compared = -Infinity;
+    this.again();
+  }
+
+  again() {
+    this.counted = -Infinity;
+    for (const chart of this.charts) chart.wanted = true;
+  }
+
+  colour(name) {
+    if (!this.colours.has(name))
+      this.colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+    return this.colours.get(name);
+  }
+
+  /** What is shown now; null where nothing is known yet. */
+  view() {
+    const { now } = this.session;
+    if (now === null) return null;
+    const [span] = this.span;
+    const cursor = this.station.shared.pane?.cursor ?? null;
+    const until = cursor === null ? now : Math.min(now, cursor + span / 2);
+    return {
+      samples: this.samples,
+      from: until - span,
+      until,
+      span,
+      cursor,
+      now,
+      basis: this.basis,
+      paths: this.paths,
+    };
+  }
+
+  /** Draw one plot that is due: never two at once. */
+  turn() {
+    this.samples.advance();
+    if (document.hidden || !this.shown) return;
+    const view = this.view();
+    if (!view) return;
+    this.library ??= import("./uplot.js").then(({ default: UPlot }) => {
+      this.UPlot = UPlot;
+    });
+    const at = performance.now();
+    this.say(view, at);
+    if (!this.UPlot) return;
+    this.compare(view, at);
+    const seen = this.charts.filter((chart) => chart.visible);
+    const period = Math.max(this.span[2], (this.cost * seen.length) / SHARE);
+    const due = seen.filter((chart) => chart.wanted || at - chart.drawn >= period);
+    const chart = due[this.next++ % Math.max(due.length, 1)];
+    if (chart) this.draw(chart, view, at);
+    else if (this.figures.element.open && at - this.counted > 1000) {
+      this.counted = at;
+      this.figures.draw(view, this.title(view));
+    }
+  }
+
+  get shown() {
+    return this.station.layout.shown === "plots";
+  }
+
+  draw(chart, view, at) {
+    if (!chart.plot) chart.begin(this.UPlot, (name) => this.colour(name));
+    chart.draw({ ...view, events: this.events(view) });
+    chart.drawn = at;
+    chart.wanted = false;
+    this.cost += 0.2 * (performance.now() - at - this.cost);
+  }
+
+  /** Say how everything stands, also of plots that are folded or out of sight. */
+  say(view, at) {
+    if (at - this.said < SAID && view.cursor === this.saidAt) return;
+    [this.said, this.saidAt] = [at, view.cursor];
+    const speaks = at - this.spoken > SPOKEN;
+    if (speaks) this.spoken = at;
+    const shown = this.title(view);
+    for (const chart of this.charts) {
+      const { title, unit } = chart.graph;
+      const text = this.words(chart, view);
+      write(chart.value, text);
+      if (speaks) mark(chart.area, "aria-label", `${title}, ${unit}, ${shown}: ${text}`);
+    }
+    write(this.shows, `${shown}${view.cursor === null ? "" : `, values at ${clockText(view.cursor)}`}`);
+  }
+
+  title({ from, until, cursor }) {
+    return cursor === null ? `Newest ${this.span[1]}` : `${clockText(from)} to ${clockText(until)}`;
+  }
+
+  /** The value at the cursor, or the newest one. */
+  words({ graph }, view) {
+    const { table } = this.samples;
+    const t = view.cursor ?? view.now;
+    const index = table.before(t + 1e-9) - 1;
+    if (graph.ofPaths) return graph.words(view);
+    if (index < 0 || t - table.get("t", index) > OLD) {
+      if (view.cursor !== null) return "not kept here";
+      return table.length ? "nothing heard now" : "nothing heard yet";
+    }
+    return graph.words({ ...view, index });
+  }
+
+  /** Lines across; for all plots of a turn or two the same. */
+  events({ from, until }) {
+    const key = `${Math.floor(until * 4)} ${this.span[0]}`;
+    if (this.cached.key !== key) this.cached = { key, events: this.happenings.between(from, until) };
+    return this.cached.events;
+  }
+
+  /** Let the paths be compared now and then, where somebody looks at that. */
+  compare({ from, until, samples }, at) {
+    const chart = this.charts.find(({ graph }) => graph.ofPaths);
+    const looked = chart.visible || this.figures.element.open;
+    if (!looked || this.comparing || at - this.compared < this.span[3]) return;
+    const { path, table } = samples;
+    const last = Math.min(until, table.newest);
+    const leader = [path.before(from - LEAD), path.before(last + 1e-9)];
+    const follower = [Math.max(table.before(from - LEAD) - 1, 0), table.length];
+    if (leader[1] - leader[0] < 3 || follower[1] - follower[0] < 2) return;
+    this.compared = at;
+    if (!this.worker) {
+      this.worker = new Worker("/station/pathworker.js", { type: "module" });
+      this.worker.onmessage = ({ data }) => this.found(data);
+    }
+    const points = (from_, [low, high]) => {
+      const columns = ["x", "y", "z"].map((name) => from_.column(name));
+      const joined = new Float64Array(3 * (high - low));
+      for (let k = low; k < high; k++) for (let i = 0; i < 3; i++) joined[3 * (k - low) + i] = columns[i][k];
+      return joined;
+    };
+    this.comparing = ++this.number;
+    this.worker.postMessage({
+      number: this.number,
+      t: path.column("t").slice(...leader),
+      leader: points(path, leader),
+      times: table.column("t").slice(...follower),
+      follower: points(table, follower),
+    });
+  }
+
+  found(paths) {
+    if (paths.number !== this.comparing) return;
+    this.comparing = 0;
+    this.paths = paths;
+    this.charts.find(({ graph }) => graph.ofPaths).wanted = true;
+  }
+
+  async save() {
+    const parts = await textOf(this.samples.table);
+    save(parts, `vrs-plots-${Math.round(this.session.now ?? 0)}s.csv`);
+    this.station.announce(`${this.samples.table.length} samples saved.`);
+  }
+}

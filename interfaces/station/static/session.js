@@ -1,0 +1,256 @@
+// The page's connection to the server: greeted, followed, kept alive, and made again by itself.
+import { ClockSync, Reader } from "./vrs.js";
+import { Orders } from "./orders.js";
+import { Wire } from "./wire.js";
+
+/** Silence after which what is shown is stale, and after which the connection counts as lost [s]. */
+const STALE = 0.6;
+const LOST = 1.4;
+/** Time between two looks at all that [ms]; where one comes later than this, the page itself was held up [s]. */
+const LOOK = 100;
+const HELD_UP = 0.4;
+const LONGEST_WAIT = 1500;
+const PINGS = 10;
+const KEY = "vrs-session";
+/** A token opens its own role and those below it. */
+const ROLES = ["admin", "operator", "viewer"];
+/** Requests of who has control. */
+const HOLDERS = ["release", "resume", "impair"];
+
+const seconds = () => performance.now() / 1000;
+
+/**
+ * Events: "link" (how the connection is), "welcome", "lease", "state" (the real robot), "edit" (of the timeline),
+ * "network" (the way to the robot), "rerouted" (that it has changed), "order" and "outcome" (of commands), "problem" (what couldn't be done), "locked" (a token is asked for).
+ */
+export class Session extends EventTarget {
+  /** @param {{name: string, token: ?string}} who */
+  constructor({ name, token }) {
+    super();
+    this.name = name;
+    this.token = token;
+    /** "connecting", "live", "stale", "lost" or "locked". */
+    this.link = "connecting";
+    this.welcome = null;
+    this.lease = { state: "free" };
+    this.state = null;
+    /** How the way to the robot is; null before that was asked. */
+    this.network = null;
+    this.epoch = null;
+    this.sync = new ClockSync();
+    this.reader = null;
+    this.orders = new Orders((message) => this.send(message));
+    this.roles = token ? [...ROLES] : ["operator", "viewer"];
+    this.requests = 0;
+    this.pings = 0;
+    this.tries = 0;
+    this.heard = seconds();
+    this.looked = this.heard;
+    this.wire = new Wire({
+      open: () => this.greet(),
+      message: (text) => this.take(JSON.parse(text)),
+      close: () => this.lose(),
+    });
+    this.key = sessionStorage.getItem(KEY);
+    // A tab that is duplicated must not go on with the session of the first.
+    sessionStorage.removeItem(KEY);
+    window.addEventListener("pagehide", () => this.key && sessionStorage.setItem(KEY, this.key));
+    setInterval(() => this.look(), LOOK);
+    this.connect();
+  }
+
+  /** Session time [s]; null before the clocks are compared. */
+  get now() {
+    return this.sync.time(seconds());
+  }
+
+  /** The copy of the timeline; null until it's whole. */
+  get timeline() {
+    return this.reader?.timeline ?? null;
+  }
+
+  /** Up to this time [s] what is shown has happened. */
+  get past() {
+    return this.reader ? this.reader.past : -Infinity;
+  }
+
+  get holds() {
+    return Boolean(this.lease.yours && this.epoch);
+  }
+
+  get mayCommand() {
+    return this.welcome !== null && this.welcome.role !== "viewer";
+  }
+
+  /** Let a token count from now on; null for none. */
+  unlock(token) {
+    this.token = token;
+    this.roles = token ? [...ROLES] : ["operator", "viewer"];
+    this.become("connecting");
+    this.connect();
+  }
+
+  connect() {
+    clearTimeout(this.again);
+    const scheme = location.protocol === "https:" ? "wss://" : "ws://";
+    this.heard = seconds();
+    this.greeted = false;
+    this.connected = true;
+    this.wire.connect(scheme + location.host + "/ws");
+  }
+
+  greet() {
+    this.heard = seconds();
+    const hello = { type: "hello", protocol: 1, role: this.roles[0], name: this.name };
+    if (this.token) hello.token = this.token;
+    if (this.key) hello.session = this.key;
+    this.wire.send(hello);
+  }
+
+  /** The connection is gone: try again, later each time. */
+  lose() {
+    this.connected = this.greeted = false;
+    this.wire.close();
+    if (this.link === "locked") return;
+    if (this.refused) {
+      this.refused = false;
+      this.roles.shift();
+      if (this.roles.length === 0) {
+        this.become("locked");
+        return;
+      }
+      this.connect();
+      return;
+    }
+    this.become("lost");
+    this.again = setTimeout(() => this.connect(), Math.min(LONGEST_WAIT, 200 * 2 ** this.tries++));
+  }
+
+  become(link) {
+    if (link === this.link) return;
+    this.link = link;
+    this.emit("link", link);
+  }
+
+  emit(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+
+  /** Send a message; whether there's a connection. */
+  send(message) {
+    const open = this.greeted && this.wire.isOpen;
+    if (open) this.wire.send(message);
+    return open;
+  }
+
+  take(message) {
+    const now = (this.heard = seconds());
+    if (message.type === "problem") this.object(message);
+    else if (message.type === "welcome") this.begin(message, now);
+    else if (message.type === "lease") this.setLease(message);
+    else if (message.type === "pong") this.sync.receive(message.t, message.received, message.answered, now);
+    else if (message.type === "state") {
+      this.state = message;
+      this.emit("state", message);
+    } else if (message.type === "network") {
+      const before = this.network;
+      this.network = message;
+      this.emit("network", message);
+      if (before && message.changed_at !== before.changed_at) this.emit("rerouted", message);
+    } else if (message.type === "outcome") {
+      const entry = this.orders.answer(message);
+      if (entry) this.emit("outcome", entry);
+    } else if (this.reader) this.read(message, now);
+  }
+
+  read(message, now) {
+    const before = this.timeline;
+    this.reader.receive(message, now);
+    if (this.timeline !== before) {
+      const change = message.type === "change" ? message : null;
+      this.emit("edit", { before, after: this.timeline, change });
+    }
+    if (message.type === "pulse" && this.timeline) this.become("live");
+  }
+
+  begin(welcome, now) {
+    const same = this.welcome !== null && this.welcome.instance === welcome.instance;
+    this.greeted = true;
+    this.tries = 0;
+    this.welcome = welcome;
+    this.key = welcome.session;
+    this.roles = [welcome.role];
+    this.orders.renew(welcome.resumed === true, now);
+    if (!same) {
+      this.sync = new ClockSync();
+      this.reader = new Reader((message) => this.send(message));
+      this.state = this.network = null;
+      this.pings = 0;
+    } else this.reader.number += 1;
+    for (let k = 0; k < PINGS; k++) this.ping();
+    this.emit("welcome", welcome);
+    this.setLease(welcome.lease);
+    this.reader.follow(now);
+  }
+
+  setLease(lease) {
+    this.lease = lease;
+    this.epoch = lease.yours ? lease.epoch : null;
+    this.beat();
+    this.emit("lease", lease);
+  }
+
+  /** A message that the server couldn't take. */
+  object(problem) {
+    if (!this.greeted && problem.code === "refused") {
+      this.refused = true;
+      return;
+    }
+    if (problem.fatal) this.key = null;
+    this.emit("problem", problem);
+  }
+
+  ping() {
+    this.send({ type: "ping", number: ++this.pings, t: seconds() });
+  }
+
+  /** What keeps the lease. */
+  beat() {
+    this.wire.beat(this.holds && this.greeted ? { type: "beat", epoch: this.epoch } : null);
+  }
+
+  look() {
+    const now = seconds();
+    const late = now - this.looked;
+    this.looked = now;
+    this.beat();
+    // What has come meanwhile waits behind this look: nothing is known of the server yet.
+    if (late > HELD_UP) return;
+    const silent = now - this.heard;
+    if (this.connected && silent > LOST) this.lose();
+    else if (this.link === "live" && silent > STALE) this.become("stale");
+    if (!this.greeted) return;
+    this.reader.advance(now);
+    this.orders.advance(now);
+    if (Math.floor(now) !== Math.floor(now - late)) this.ping();
+  }
+
+  /** Give a command, null to take back the newest; a label says for people where it goes. Null where it isn't sent. */
+  order(command, label = "") {
+    const why = !this.holds ? "You don't have control" : this.link === "live" ? "" : "There's no connection";
+    if (why && !(this.holds && command?.type === "stop")) {
+      this.emit("problem", { code: "lease", text: why + ": nothing was sent." });
+      return null;
+    }
+    const entry = this.orders.give(command, this.epoch, seconds(), label);
+    this.emit("order", entry);
+    return entry;
+  }
+
+  /** Ask something of the lease, or of the way to the robot; the request's number, 0 where it couldn't be sent. */
+  wish(type, fields = {}) {
+    const message = { type, number: ++this.requests, ...fields };
+    if (HOLDERS.includes(type)) message.epoch = this.epoch ?? "1";
+    return this.send(message) ? message.number : 0;
+  }
+}

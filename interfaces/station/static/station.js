@@ -1,0 +1,78 @@
+// The station: one session for the page, and the panels, each mounted into its own element.
+import { Chain } from "./chain.js";
+import { h } from "./dom.js";
+import { Layout } from "./layout.js";
+import { Session } from "./session.js";
+
+const NAME = "vrs-name";
+
+/** What panels are given: the session, what the robot is, a voice for screen readers, and what they share. */
+class Station extends EventTarget {
+  constructor(root, config) {
+    super();
+    this.config = config;
+    this.chain = new Chain(config.robot);
+    this.session = new Session({ name: myName(), token: sessionStorage.getItem("token") });
+    this.layout = new Layout(root, config.panels);
+    /** What panels offer each other, by the panel's name. */
+    this.shared = {};
+    this.polite = root.appendChild(h("div.spoken", { "aria-live": "polite" }));
+    this.urgent = root.appendChild(h("div.spoken", { role: "alert", "aria-live": "assertive", id: "alert" }));
+  }
+
+  /** Say something to those who listen to the page. */
+  announce(text, { urgent = false } = {}) {
+    (urgent ? this.urgent : this.polite).textContent = text;
+  }
+
+  /** Let people be known by a name from now on. */
+  rename(name) {
+    localStorage.setItem(NAME, name);
+    this.session.name = name;
+  }
+
+  on(type, listener) {
+    this.session.addEventListener(type, (event) => listener(event.detail));
+  }
+}
+
+function myName() {
+  const known = localStorage.getItem(NAME);
+  if (known) return known;
+  const made = "Operator " + (100 + Math.floor(Math.random() * 900));
+  localStorage.setItem(NAME, made);
+  return made;
+}
+
+/** Wait for the server's part of the page. */
+function present(id) {
+  return new Promise((resolve) => {
+    const look = () => {
+      const found = document.getElementById(id);
+      if (found) resolve(found);
+      else requestAnimationFrame(look);
+    };
+    look();
+  });
+}
+
+/** Show the server's part who this is, once its own connection is there. */
+function knock(session) {
+  const say = () => {
+    if (window.did_handshake) window.emitEvent("door", session.token ?? null);
+    else setTimeout(say, 50);
+  };
+  say();
+}
+
+const root = await present("strip-box").then(() => document.getElementById("station"));
+const config = JSON.parse(root.dataset.config);
+const station = new Station(root, config);
+window.station = station;
+const scripted = config.panels.filter((panel) => panel.script);
+const modules = await Promise.all(scripted.map((panel) => import(`./${panel.name}.js`)));
+scripted.forEach((panel, k) => modules[k].mount(station, document.getElementById(`panel-${panel.name}`)));
+station.on("welcome", () => knock(station.session));
+if (station.session.welcome) knock(station.session);
+root.dataset.ready = "";
+station.dispatchEvent(new Event("ready"));

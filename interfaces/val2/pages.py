@@ -1,0 +1,380 @@
+"""VAL's monitor on pages: a terminal a page, over a WebSocket, at the controller that all terminals share."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final
+
+import msgspec
+from msgspec import Meta
+from starlette.routing import WebSocketRoute
+from starlette.types import Receive, Scope, Send
+from websockets.frames import Opcode
+
+from interfaces.stream.limits import Bucket
+from interfaces.timer import Turning
+from interfaces.val2.monitor.completion import suggestions
+from interfaces.val2.monitor.desk import Said, Style
+from interfaces.val2.monitor.monitor import LONGEST, Monitor
+from interfaces.val2.monitor.switchboard import Person, Switchboard
+from vrs.clock import Clock
+from vrs.errors import VrsError
+
+PATH: Final = "/val"
+"""Where pages open their terminals."""
+MOST: Final = 16
+"""Terminals at a time."""
+LARGEST: Final = 16_384
+"""Longest message of a page [B]."""
+RATE: Final = 40.0
+"""Messages a second that a page may send for long."""
+BURST: Final = 120.0
+"""Messages that it may send at once."""
+UNREAD: Final = 262_144
+"""Characters that may wait for a page; what is said beyond them is lost to it."""
+WINDOW: Final = 65_536
+"""Characters that a page is sent before it has shown those before."""
+FRAME: Final = 8_192
+"""Characters that are sent in one message, about."""
+GREETING: Final = 5.0
+"""Time for the first message [s]."""
+BLOCKED: Final = 2.0
+"""A page is cut off when a message has waited so long to be sent [s]."""
+SUGGESTED: Final = 60
+"""Words that are suggested at once."""
+_POLICY, _TRY_AGAIN, _FAILED = 1008, 1013, 1011
+_Text = Annotated[str, Meta(max_length=4 * LONGEST)]
+_Key = Annotated[str, Meta(max_length=256)]
+
+
+class Hello(msgspec.Struct, frozen=True, tag="hello"):
+    """The page's first message: its token, and the session by which it commands."""
+
+    token: _Key | None = None
+    session: _Key = ""
+    holds: bool = False
+
+
+class Who(msgspec.Struct, frozen=True, tag="who"):
+    """The page has another session, or its lease has come or gone."""
+
+    session: _Key
+    holds: bool
+
+
+class Lines(msgspec.Struct, frozen=True, tag="lines"):
+    """What was typed."""
+
+    lines: Annotated[list[_Text], Meta(max_length=256)]
+
+
+class Interrupt(msgspec.Struct, frozen=True, tag="interrupt"):
+    """Ctrl-C."""
+
+
+class Complete(msgspec.Struct, frozen=True, tag="complete"):
+    """Asks what may follow."""
+
+    text: _Text
+
+
+class Shown(msgspec.Struct, frozen=True, tag="shown"):
+    """So many characters have been shown in all."""
+
+    size: Annotated[int, Meta(ge=0, le=2**53)]
+
+
+_read: Final = msgspec.json.Decoder(Hello | Who | Lines | Interrupt | Complete | Shown).decode
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """What terminals are at."""
+
+    board: Switchboard
+    clock: Clock
+    """Session time."""
+    terminal: Callable[[str | None, Person | None], Monitor | None]
+    """Makes a monitor for a token, and a person who commands elsewhere, too; None where the token opens nothing."""
+
+
+@dataclass(slots=True)
+class PageTerminal:
+    """A page's terminal: messages in, messages out. It's the person, too, whose control the monitor asks for."""
+
+    token: str | None = None
+    session: str = ""
+    """Of the page, by which it commands; empty before it's known."""
+    holds: bool = False
+    """Whether the page says that it has the lease."""
+    closing: tuple[int, str] | None = None
+    """Code and reason with which the connection is to be closed."""
+    monitor: Monitor | None = None
+    greeted: bool = False
+    _said: deque[Said] = field(default_factory=deque)
+    _waiting: int = 0
+    """Characters that wait to be sent."""
+    _sent: int = 0
+    _shown: int = 0
+    _lost: bool = False
+    _answers: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=32))
+    _prompt: str | None = None
+    """The prompt that the page was told last; None where it's to be told again."""
+
+    def take(self) -> None:
+        """Let the page ask for the lease."""
+        self._answers.append({"type": "take"})
+
+    def begin(self, monitor: Monitor, *, now: float) -> None:
+        """Let a monitor speak and listen."""
+        self.monitor = monitor
+        files = monitor.desk.files.offered()
+        self._answers.append({"type": "ready", "files": files, "barred": bool(monitor.barred)})
+        monitor.start(now=now)
+
+    def receive(self, data: str | bytes, *, now: float) -> None:
+        """Take a message of the page; one that can't be read ends the connection.
+
+        Args:
+            data: What has come.
+            now: Session time [s].
+        """
+        if len(data) > LARGEST:
+            self.close(_POLICY, f"at most {LARGEST} bytes a message")
+            return
+        try:
+            message = _read(data)
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+            self.close(_POLICY, f"not a message of a terminal: {error}")
+            return
+        if isinstance(message, Hello) == self.greeted:
+            self.close(_POLICY, "hello comes first, and once")
+        elif isinstance(message, Hello | Who):
+            self.session, self.holds = message.session, message.holds
+            if isinstance(message, Hello):
+                self.token, self.greeted = message.token, True
+        elif isinstance(message, Shown):
+            self._shown = max(self._shown, min(message.size, self._sent))
+        elif self.monitor is not None:
+            self._act(self.monitor, message, now)
+
+    def _act(self, monitor: Monitor, message: Lines | Interrupt | Complete, now: float) -> None:
+        if isinstance(message, Complete):
+            fragment, words = suggestions(message.text[:LONGEST], monitor.desk, program=monitor.edits)
+            takes = monitor.takes_commands or monitor.edits
+            listed = [one.word for one in words[:SUGGESTED]] if takes else []
+            self._answers.append({"type": "completed", "text": message.text, "fragment": fragment, "words": listed})
+            return
+        self._prompt = None
+        if isinstance(message, Interrupt):
+            monitor.interrupt(now=now)
+            return
+        for text in message.lines:
+            if not monitor.done:
+                monitor.line(text, now=now)
+                self._listen(monitor)
+
+    def advance(self, *, now: float) -> None:
+        """Do what is due."""
+        if self.monitor is None:
+            return
+        self.monitor.advance(now=now)
+        self._listen(self.monitor)
+        if self.monitor.done and not self._said:
+            self.close(1000, "the monitor was left")
+
+    def _listen(self, monitor: Monitor) -> None:
+        """Take what was said, as far as there's room."""
+        for piece in monitor.output():
+            if self._waiting + len(piece.text) > UNREAD:
+                self._lost = True
+                continue
+            if self._lost:
+                self._lost = False
+                self._put(Said("\n*Output lost* it came faster than it could be shown\n", Style.ERROR))
+            self._put(piece)
+
+    def _put(self, piece: Said) -> None:
+        self._waiting += len(piece.text)
+        last = self._said[-1] if self._said else None
+        if last is not None and last.style is piece.style and len(last.text) + len(piece.text) <= FRAME:
+            self._said[-1] = Said(last.text + piece.text, piece.style)
+        else:
+            self._said.append(piece)
+
+    def next_deadline(self) -> float:
+        """When `advance` has something to do [s]; infinity for not before a message comes."""
+        return math.inf if self.monitor is None else self.monitor.next_deadline()
+
+    def outgoing(self) -> bytes | None:
+        """The next message for the page; None while there's none, or the page hasn't shown those before."""
+        if self._answers:
+            return json.dumps(self._answers.popleft()).encode()
+        if self.monitor is None or self._sent - self._shown > WINDOW:
+            return None
+        prompt = self.monitor.prompt
+        if not self._said and prompt == self._prompt:
+            return None
+        pieces, size = [], 0
+        while self._said and size < FRAME:
+            text, style = self._said[0].text, self._said[0].style
+            part = text[:FRAME]
+            if len(part) < len(text):
+                self._said[0] = Said(text[FRAME:], style)
+            else:
+                self._said.popleft()
+            size += len(part)
+            pieces.append((part, style.value))
+        self._waiting -= size
+        self._sent += size
+        self._prompt = prompt
+        message = {
+            "type": "said", "pieces": pieces, "prompt": prompt, "size": self._sent,
+            "commands": self.monitor.takes_commands,
+        }  # fmt: skip
+        return json.dumps(message).encode()
+
+    def close(self, code: int, reason: str) -> None:
+        """End it, with a reason for people."""
+        if self.closing is None:
+            self.closing = code, reason
+
+    def leave(self, *, now: float) -> None:
+        """The page is gone: what its terminal ran is stopped."""
+        if self.monitor is not None:
+            self.monitor.leave(now=now)
+
+
+class _Client:
+    """A terminal and its socket."""
+
+    def __init__(self, terminal: PageTerminal) -> None:
+        self.terminal = terminal
+        self.wake, self.heard = asyncio.Event(), asyncio.Event()
+
+
+class PageDoor:
+    """Terminals of pages; its route goes into an application. What they are at is made for the first of them."""
+
+    def __init__(self, enter: Callable[[], Awaitable[Room]]) -> None:
+        """Begin with nobody.
+
+        Args:
+            enter: Gives what terminals are at, which may take a while.
+        """
+        self._enter = enter
+        self._clients: set[_Client] = set()
+        self._room: Room | None = None
+        self._turning: Turning | None = None
+
+    @property
+    def route(self) -> WebSocketRoute:
+        """Where pages come."""
+        return WebSocketRoute(PATH, self)
+
+    def _now(self) -> float:
+        return 0.0 if self._room is None else self._room.clock.now()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one page, until it goes."""
+        await receive()
+        await send({"type": "websocket.accept"})
+        client = _Client(PageTerminal())
+        terminal = client.terminal
+        if len(self._clients) >= MOST:
+            terminal.close(_TRY_AGAIN, f"there are {MOST} terminals already: close one elsewhere")
+        self._clients.add(client)
+        writing = asyncio.create_task(self._write(client, scope["state"]["socket"], send))
+        greeting = asyncio.create_task(self._greet(client))
+        client.wake.set()
+        clock = asyncio.get_running_loop().time
+        allowed = Bucket(RATE, BURST, clock())
+        try:
+            while (message := await receive())["type"] != "websocket.disconnect":
+                if not allowed.take(clock()):
+                    terminal.close(_POLICY, f"at most {RATE:g} messages a second")
+                elif terminal.closing is None:
+                    text = message.get("text")
+                    terminal.receive(message.get("bytes") or b"" if text is None else text, now=self._now())
+                client.heard.set()
+                client.wake.set()
+                self._soon()
+        finally:
+            greeting.cancel()
+            self._clients.discard(client)
+            terminal.leave(now=self._now())
+            if not self._clients and self._turning is not None:
+                self._turning.stop()
+            writing.cancel()
+            await asyncio.wait([writing, greeting])
+
+    async def _greet(self, client: _Client) -> None:
+        """Give a page its monitor, once it has said who it is."""
+        terminal = client.terminal
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(GREETING):
+                while not terminal.greeted and terminal.closing is None:
+                    await client.heard.wait()
+                    client.heard.clear()
+        if not terminal.greeted or terminal.closing is not None:
+            terminal.close(_POLICY, f"hello must come within {GREETING:g} s")
+            client.wake.set()
+            return
+        try:
+            self._room = room = await self._enter()
+        except (VrsError, OSError) as error:
+            terminal.close(_FAILED, f"VAL-II isn't there: {error}")
+            client.wake.set()
+            return
+        if self._turning is None:
+            self._turning = Turning(room.clock, self._turn)
+        self._turning.start()
+        monitor = room.terminal(terminal.token, terminal)
+        if monitor is None:
+            terminal.close(_POLICY, "this token opens no terminal")
+        else:
+            terminal.begin(monitor, now=room.clock.now())
+        client.wake.set()
+
+    def _soon(self) -> None:
+        if self._turning is not None:
+            self._turning.soon()
+
+    def _turn(self, now: float) -> float:
+        assert self._room is not None
+        self._room.board.advance(now=now)
+        for client in tuple(self._clients):
+            client.terminal.advance(now=now)
+            client.wake.set()
+        deadlines = [client.terminal.next_deadline() for client in self._clients]
+        return min([self._room.board.next_deadline(), *deadlines])
+
+    async def _write(self, client: _Client, socket: Any, send: Send) -> None:
+        """Send what there is; a page that takes nothing is cut off."""
+        terminal = client.terminal
+        try:
+            while True:
+                await client.wake.wait()
+                client.wake.clear()
+                while (data := terminal.outgoing()) is not None:
+                    async with asyncio.timeout(BLOCKED):
+                        await socket.put(data, Opcode.TEXT)
+                if terminal.closing is not None:
+                    code, reason = terminal.closing
+                    async with asyncio.timeout(BLOCKED):
+                        await send({"type": "websocket.close", "code": code, "reason": _short(reason)})
+                    asyncio.get_running_loop().call_later(BLOCKED, socket.abort)
+                    return
+        except (TimeoutError, OSError):
+            socket.abort()
+
+
+def _short(reason: str) -> str:
+    """As much of a reason as a closing frame holds."""
+    return reason.encode()[:120].decode(errors="ignore")

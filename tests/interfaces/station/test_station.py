@@ -1,0 +1,344 @@
+"""The station of `vrs serve` in a real browser: what it shows, and what it does."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from axe_core_python.sync_playwright import Axe
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from tests.interfaces.live_rig import Child, child
+from tests.interfaces.station.opened import SERVE, Page, paged, station, until
+
+TOOL = "station.shared.drag.tool()"
+HOLDS = "station.session.holds"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Child]:
+    with child(*SERVE, "--port", "0") as running:
+        yield running
+
+
+@pytest.fixture
+def page(browser: Any, server: Child) -> Iterator[Page]:
+    with paged(browser, station(server)) as opened:
+        yield opened.open()
+
+
+def moved(page: Page, by: float, since: list[float]) -> bool:
+    """Whether both robots have moved."""
+    return all(max(abs(a - b) for a, b in zip(q, since, strict=True)) > by for q in (page.virtual, page.real))
+
+
+def test_the_page_is_there_soon(server: Child) -> None:
+    with urllib.request.urlopen(station(server), timeout=20) as answer:
+        assert answer.status == 200
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+    ticks = os.sysconf("SC_CLK_TCK")
+    with open(f"/proc/{server.process.pid}/stat", encoding="ascii") as file:
+        used = file.read().rpartition(")")[2].split()
+    # On a machine with nothing else to do that's the time which it takes.
+    assert (int(used[11]) + int(used[12])) / ticks < 5.0
+
+
+def test_a_jog_moves_both_robots(page: Page) -> None:
+    page.take_control().rest()
+    before = page.virtual
+    button = page.page.locator("button[aria-label='Joint 1 up']")
+    button.hover()
+    page.page.mouse.down()
+    page.until(lambda: moved(page, 0.05, before))
+    page.shoot("jog")
+    page.page.mouse.up()
+    page.rest()
+    between = page.virtual
+    assert between[0] > before[0] + 0.05
+    assert between[1:] == pytest.approx(before[1:], abs=1e-6)
+    page.page.keyboard.down("a")
+    page.until(lambda: moved(page, 0.05, between))
+    page.page.keyboard.up("a")
+    page.rest()
+    assert page.virtual[0] < between[0] - 0.05
+    between = page.virtual
+    button.focus()
+    page.page.keyboard.down("Enter")
+    page.until(lambda: moved(page, 0.05, between))
+    page.page.keyboard.up("Enter")
+    page.rest()
+    stick = page.page.locator(".stick").bounding_box()
+    height = page.get(TOOL)[2]
+    page.page.mouse.move(stick["x"] + 52, stick["y"] + 52)
+    page.page.mouse.down()
+    start = page.virtual
+    # Not far: on a busy machine the tool would be at the end of its reach before the next look.
+    page.page.mouse.move(stick["x"] + 52, stick["y"] + 66, steps=4)
+    page.until(lambda: moved(page, 0.02, start))
+    page.page.mouse.up()
+    page.rest()
+    assert page.get(TOOL)[2] == pytest.approx(height, abs=0.02)
+    assert "Steering" in page.page.locator("#receipts").text_content()
+
+
+def test_stop_stops(page: Page) -> None:
+    page.take_control()
+    for stop in (
+        lambda: page.page.keyboard.press("Space"),
+        lambda: page.page.click("#stop"),
+        lambda: page.page.locator("#stop").press("Enter"),
+    ):
+        page.page.fill("#speed", "10")
+        target = "ready" if page.virtual[1] < 1.2 else "nominal"
+        start = page.virtual
+        page.page.click(f"[data-pose={target}]")
+        page.until(lambda start=start: moved(page, 0.02, start))
+        stop()
+        page.wait("document.getElementById('alert').textContent === 'Stopping'")
+        page.shoot("stop")
+        page.rest()
+        asked = page.get(f"station.session.welcome.poses.{target}")
+        assert max(abs(a - b) for a, b in zip(page.virtual, asked, strict=True)) > 0.1
+        page.page.evaluate("document.activeElement.blur()")
+
+
+def test_the_tool_goes_where_it_is_dragged(page: Page) -> None:
+    page.take_control()
+    page.page.fill("#speed", "60")
+    page.page.click("[data-pose=nominal]")
+    page.wait("station.session.timeline.end > station.session.now")
+    page.rest()
+    page.wait("!document.getElementById('handle').hidden")
+    pane = page.page.locator("#pane").bounding_box()
+    start = page.get(TOOL)
+    at = page.get(f"station.shared.drag.project({TOOL})")
+    x, y = pane["x"] + at["x"], pane["y"] + at["y"]
+    camera = page.get("station.shared.pane.scene.viewer.camera.position.toArray()")
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x - 70, y - 45, steps=6)
+    target = page.get("station.shared.drag.target")
+    assert target is not None
+    page.shoot("drag")
+    page.page.mouse.up()
+    assert sum((a - b) ** 2 for a, b in zip(target, start, strict=True)) ** 0.5 > 0.05
+    page.wait("station.shared.drag.target === null")
+    page.rest()
+    assert page.get(TOOL) == pytest.approx(target, abs=0.005)
+    real = page.get("station.chain.toolAt(station.session.state.q)")
+    assert real == pytest.approx(target, abs=0.005)
+    assert page.get("station.shared.pane.scene.viewer.camera.position.toArray()") == pytest.approx(camera)
+
+
+def scheduled(page: Page) -> dict[str, tuple[float, float]]:
+    """Moves to come, as the plan has them."""
+    moves = page.get(
+        """(() => { const found = {}; const { timeline, now } = station.session;
+        for (const { commandId, start, duration } of timeline.segments) if (commandId !== null && start > now) {
+            const known = (found[commandId] ??= [start, start]); known[1] = start + duration; }
+        return found; })()"""
+    )
+    return {name: tuple(span) for name, span in moves.items()}
+
+
+def same(plan: dict[str, tuple[float, float]], other: dict[str, tuple[float, float]]) -> bool:
+    return plan.keys() == other.keys() and all(plan[name] == pytest.approx(other[name], abs=1e-6) for name in plan)
+
+
+def plan(page: Page, pose: str, seconds: float) -> str:
+    """Schedule a move; its number."""
+    known = scheduled(page)
+    page.page.select_option("#when", "later")
+    page.page.fill("#later", str(seconds))
+    page.page.click(f"[data-pose={pose}]")
+    until(lambda: len(scheduled(page)) > len(known))
+    return next(name for name in scheduled(page) if name not in known)
+
+
+def test_a_scheduled_move_is_drawn_along_and_runs_then(page: Page) -> None:
+    page.take_control().rest()
+    page.page.fill("#speed", "30")
+    first = plan(page, "ready" if page.virtual[1] < 1.2 else "nominal", 14)
+    begin, end = scheduled(page)[first]
+    bar = page.page.locator(f".move[data-id='{first}']")
+    track = page.page.locator("#track").bounding_box()
+    # The strip goes on while the hand comes: it's put to the left part of the bar.
+    box = bar.bounding_box()
+    x, y = box["x"] + 0.3 * box["width"], box["y"] + 20
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + track["width"] / 10, y, steps=3)
+    page.page.mouse.up()
+    page.until(lambda: scheduled(page).get(first, (0, 0))[0] > begin + 1)
+    shifted = scheduled(page)[first][0] - begin
+    # A tenth of the strip is 3 s, and the hand takes its time.
+    assert 1.5 < shifted < 12
+    page.shoot("strip")
+    bar.focus()
+    for key in ("Shift+ArrowLeft", "ArrowRight", "ArrowRight"):
+        page.page.keyboard.press(key)
+    page.until(lambda: abs(scheduled(page)[first][0] - begin - shifted + 0.8) < 1e-3)
+    begin, end = scheduled(page)[first]
+    still = page.virtual
+    page.wait(f"station.session.now > {begin - 1}")
+    assert page.virtual == pytest.approx(still, abs=1e-6)
+    page.wait(f"station.session.now > {end}")
+    page.rest()
+    assert max(abs(a - b) for a, b in zip(page.virtual, still, strict=True)) > 0.5
+
+
+def test_scheduled_moves_are_split_taken_back_and_deleted(page: Page) -> None:
+    page.take_control().rest()
+    move = plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 40)
+    page.page.click("#zoom-out")
+    page.page.locator(f".move[data-id='{move}']").press("Enter")
+    page.page.select_option("#via-place", "stretch")
+    before = scheduled(page)
+    page.page.click("#via")
+    until(lambda: not same(scheduled(page), before))
+    page.page.click("#tab-receipts")
+    until(lambda: "By another place" in page.page.locator("#receipts li").first.text_content())
+    page.page.click("#undo")
+    page.until(lambda: same(scheduled(page), before))
+    page.page.locator(f".move[data-id='{move}']").press("Delete")
+    until(lambda: scheduled(page) == {})
+    page.page.click("#tab-jog")
+    move = plan(page, "stretch", 40)
+    page.page.locator(f".move[data-id='{move}']").press("Enter")
+    page.page.click("#delete")
+    until(lambda: scheduled(page) == {})
+
+
+def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
+    page.take_control().rest()
+    rest = page.virtual
+    page.page.fill("#speed", "100")
+    page.page.click("[data-pose=zero]")
+    page.until(lambda: moved(page, 0.3, rest))
+    page.rest()
+    track = page.page.locator("#track").bounding_box()
+    page.page.mouse.move(track["x"] + 0.39 * track["width"], track["y"] + 90)
+    page.page.mouse.down()
+    page.page.mouse.move(track["x"] + 5, track["y"] + 90, steps=3)
+    page.page.mouse.up()
+    shown = page.get("station.shared.pane.cursor")
+    assert shown < page.get("station.session.now") - 5
+    assert "Confirmed" in page.page.locator("#badge").text_content()
+    assert "another time" in page.page.locator("#banner").text_content()
+    drawn = "station.shared.pane.scene.node('vrs', '%s', 'body', '6').position.toArray()"
+    then = page.get(f"station.chain.links(station.session.timeline.joints({shown})).at(-1).slice(12, 15)")
+    assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
+    page.page.select_option("#when", "now")
+    before = page.virtual
+    page.page.click("[data-pose=nominal]")
+    page.until(lambda: moved(page, 0.3, before))
+    assert page.get("station.shared.pane.cursor") == shown
+    page.shoot("past")
+    assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
+    page.page.click("#live")
+    page.rest()
+    now = page.get("station.chain.links(station.session.timeline.joints(station.session.now)).at(-1).slice(12, 15)")
+    for twin in ("virtual", "real"):
+        until(lambda twin=twin: page.get(drawn % twin) == pytest.approx(now, abs=2e-3))
+    assert page.page.locator("#banner").is_hidden()
+
+
+def test_a_second_one_watches_until_control_is_given(browser: Any, server: Child, page: Page) -> None:
+    page.take_control().rest()
+    with paged(browser, station(server)) as second:
+        second.open()
+        assert "has control" in second.page.locator("#control-pill").text_content()
+        assert second.page.locator("#take").is_hidden()
+        second.shoot("watching")
+        before = page.virtual
+        second.page.evaluate("window.said = []; station.on('problem', (problem) => said.push(problem.text))")
+        second.page.click("[data-pose=ready]")
+        second.page.locator("button[aria-label='Joint 1 up']").click(delay=300)
+        second.page.keyboard.press("q", delay=300)
+        # A page that pretends to have control is refused by the server.
+        second.page.evaluate(
+            """window.pretended = station.session.orders.give({type: 'move',
+            target: {type: 'joints', q: station.session.welcome.poses.zero}}, '1', performance.now() / 1000, '')"""
+        )
+        second.wait("pretended.outcome !== null && pretended.outcome.refusal.startsWith('no lease')")
+        until(lambda: len(second.get("said")) >= 2)
+        second.page.keyboard.press("Space")
+        second.wait("document.getElementById('alert').textContent.includes(\"can't stop the robot\")")
+        time.sleep(0.3)
+        assert page.virtual == pytest.approx(before, abs=1e-9)
+        assert page.get(HOLDS)
+        page.page.click("#give")
+        second.wait("!document.getElementById('take').hidden")
+        second.take_control()
+        page.wait("document.getElementById('control-pill').textContent.includes('has control')")
+        second.page.click("[data-pose=ready]" if before[1] < 1.2 else "[data-pose=nominal]")
+        page.until(lambda: moved(page, 0.05, before))
+        assert not page.get(HOLDS)
+
+
+@pytest.mark.parametrize(("scheme", "width", "height"), [("light", 1280, 720), ("dark", 1920, 1080)])
+def test_everyone_can_use_it(browser: Any, server: Child, scheme: str, width: int, height: int) -> None:
+    with paged(browser, station(server), viewport={"width": width, "height": height}, color_scheme=scheme) as page:
+        page.open().take_control().rest()
+        plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 30)
+        page.shoot(scheme)
+        axe = Axe()
+        for tab in ("jog", "receipts", "network"):
+            page.page.click(f"#tab-{tab}")
+            found = axe.run(page.page)["violations"]
+            grave = [one for one in found if one["impact"] in {"serious", "critical"}]
+            assert json.dumps([(one["id"], [node["html"] for node in one["nodes"]]) for one in grave]) == "[]"
+        assert page.get("document.documentElement.dataset.theme") == scheme
+        size = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+        assert page.get(size) == [width, height]
+        page.page.click("#tab-jog")
+        panels = page.page.locator("#tab-panels")
+        assert panels.evaluate(
+            "(box) => box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth"
+        )
+        stop = page.page.locator("#stop").bounding_box()
+        assert (stop["x"] + stop["width"], stop["y"]) == (width, 0)
+        page.page.click("#theme")
+        assert page.get("document.documentElement.dataset.theme") != scheme
+        page.page.keyboard.press("Space")
+
+
+def test_strangers_are_turned_away(server: Child) -> None:
+    base = station(server).rstrip("/")
+    port = base.rpartition(":")[2]
+    for name, value in (
+        ("Origin", "http://evil.example"),
+        ("Host", "evil.example"),
+        ("Host", f"localhost.evil:{port}"),
+    ):
+        for path in ("/", "/station/station.js", "/_nicegui_ws/socket.io/?EIO=4&transport=polling"):
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(urllib.request.Request(base + path, headers={name: value}), timeout=5)
+            refused.value.close()
+            assert refused.value.code == 403
+    for path in (
+        "/elsewhere",
+        "/_nicegui_ws/socket.io/?EIO=4&transport=polling",
+        "/station/../page.py",
+        "/station/x.js",
+    ):
+        with pytest.raises(urllib.error.HTTPError) as missing:
+            urllib.request.urlopen(base + path, timeout=5)
+        missing.value.close()
+        assert missing.value.code == 404
+    socket = f"ws://127.0.0.1:{port}/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    for url in (socket, f"ws://127.0.0.1:{port}/ws"):
+        with pytest.raises(InvalidStatus), connect(url, origin="http://evil.example", subprotocols=["vrs.1.json"]):
+            pass
+    # Without a page of its own nobody is connected.
+    with connect(socket + "&client_id=none&implicit_handshake=true") as stranger:
+        assert stranger.recv(timeout=5).startswith("0")
+        stranger.send("40")
+        assert stranger.recv(timeout=5).startswith("44")
