@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 
@@ -16,6 +16,7 @@ SCHEMA = "vrs.timeline"
 SCHEMA_VERSION = 1
 
 _Row = Annotated[list[float], msgspec.Meta(min_length=1, max_length=64)]
+_Made = TypeVar("_Made")
 
 
 class PolynomialWire(msgspec.Struct, tag="polynomial", tag_field="type", forbid_unknown_fields=True, frozen=True):
@@ -57,10 +58,24 @@ def _rows(a: Array) -> list[list[float]]:
     return rows
 
 
+def arc_to_wire(arc: ArcSegment) -> ArcWire:
+    """The wire form of an arc."""
+    return ArcWire(arc.start, arc.duration, arc.posture, arc.v, arc.w, arc.command_id)
+
+
+def arc_from_wire(wire: ArcWire) -> ArcSegment:
+    """The arc that a wire form stands for.
+
+    Raises:
+        InvalidValueError: If it's none.
+    """
+    return ArcSegment(wire.start, wire.duration, wire.posture, wire.v, wire.w, wire.command_id)
+
+
 def segment_to_wire(segment: Segment) -> SegmentWire:
     """The wire form of a segment."""
     if isinstance(segment, ArcSegment):
-        return ArcWire(segment.start, segment.duration, segment.posture, segment.v, segment.w, segment.command_id)
+        return arc_to_wire(segment)
     return PolynomialWire(segment.start, segment.duration, _rows(segment.coefficients), segment.command_id)
 
 
@@ -71,9 +86,7 @@ def segment_from_wire(wire: SegmentWire) -> Segment:
         FormatError: If it's none.
     """
     try:
-        if isinstance(wire, ArcWire):
-            return ArcSegment(wire.start, wire.duration, wire.posture, wire.v, wire.w, wire.command_id)
-        return _polynomial(wire)
+        return arc_from_wire(wire) if isinstance(wire, ArcWire) else _polynomial(wire)
     except InvalidValueError as error:
         raise FormatError("segment", str(error)) from None
 
@@ -119,14 +132,33 @@ def from_msgpack(data: bytes) -> Timeline:
 
 
 def _read(data: bytes, decode: Callable[..., Any]) -> Timeline:
+    return read(data, decode, TimelineWire, (SCHEMA, SCHEMA_VERSION), _timeline)
+
+
+def _timeline(wire: TimelineWire) -> Timeline:
+    return Timeline(wire.initial, wire.start, [_polynomial(one) for one in wire.segments], wire.version)
+
+
+def read(
+    data: bytes, decode: Callable[..., Any], form: type[Any], schema: tuple[str, int], make: Callable[[Any], _Made]
+) -> _Made:
+    """Read a timeline of any kind from a document.
+
+    Args:
+        data: The document.
+        decode: Of JSON or msgpack.
+        form: What the document must be.
+        schema: Its name and version.
+        make: Makes the timeline of it; what isn't sound raises an `InvalidValueError`.
+
+    Raises:
+        FormatError: If the bytes are anything else.
+    """
     try:
-        wire: TimelineWire = decode(data, type=TimelineWire)
-        if (wire.schema, wire.schema_version) != (SCHEMA, SCHEMA_VERSION):
+        wire = decode(data, type=form)
+        if (wire.schema, wire.schema_version) != schema:
             found = f"{wire.schema} {wire.schema_version}"
-            raise FormatError("timeline", f"must be of schema {SCHEMA} {SCHEMA_VERSION}, not {found}")
-        segments = [_polynomial(segment) for segment in wire.segments]
-        return Timeline(wire.initial, wire.start, segments, wire.version)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise FormatError("timeline", str(error)) from None
-    except InvalidValueError as error:
+            raise FormatError("timeline", f"must be of schema {schema[0]} {schema[1]}, not {found}")
+        return make(wire)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, InvalidValueError) as error:
         raise FormatError("timeline", str(error)) from None

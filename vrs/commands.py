@@ -395,6 +395,6 @@ class Position:
     t: float
     """Timeline time the answer is for [s]."""
     q: Array
-    """Joint values [rad], (n,)."""
+    """Joint values [rad], (n,); of a mobile robot the posture (x, y, θ), (3,)."""
     X: Array
-    """Pose of the last link in the base frame, (4, 4)."""
+    """Pose of the last link in the base frame, (4, 4); of a mobile robot its own in the world frame."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
+from vrs.path_matching import PathMatch, histories, match_paths, resample
 
 _STILL = 1e-6
 """Values that change by no more are at rest [rad, or their unit]."""
@@ -70,7 +70,7 @@ def agreement(model: RobotModel, q_a: ArrayLike, q_b: ArrayLike) -> Agreement:
     Raises:
         InvalidValueError: If the shapes differ or a value isn't finite.
     """
-    a, b = _histories(q_a, q_b)
+    a, b = histories(q_a, q_b)
     error = np.abs(a - b)
     X_a, X_b = model.forward(a), model.forward(b)
     distance = np.linalg.norm(X_a[:, :3, 3] - X_b[:, :3, 3], axis=1)
@@ -85,12 +85,6 @@ def agreement(model: RobotModel, q_a: ArrayLike, q_b: ArrayLike) -> Agreement:
         angle_rms=_rms(angle),
         angle_max=float(angle.max()),
     )
-
-
-def resample(t: Array, values: Array, t_new: Array) -> Array:
-    """Values (k, d) known at ascending times t (k,), linear in between and held outside, at t_new (m,)."""
-    columns = [np.interp(t_new, t, values[:, i]) for i in range(values.shape[1])]
-    return np.stack(columns, axis=1)
 
 
 def shifted(t: Array, values: Array, offset: float) -> Array:
@@ -121,7 +115,7 @@ def best_lag(t: ArrayLike, q_leader: ArrayLike, q_follower: ArrayLike, longest: 
     Raises:
         InvalidValueError: If the shapes differ or a value isn't finite.
     """
-    a, b = _histories(q_leader, q_follower)
+    a, b = histories(q_leader, q_follower)
     if min(float(np.ptp(q, axis=0).max()) for q in (a, b)) <= _STILL:
         return None
     times = np.asarray(t, dtype=np.float64)
@@ -155,11 +149,7 @@ def compare_paths(
     dt: float = 0.05,
     v_min: float = 0.02,
 ) -> PathComparison:
-    """Path error and time difference by a causal, monotone match of the follower to the leader's path.
-
-    The match j(t) is a non-decreasing cell along the leader's path, reached by the leader no later than t,
-    that advances by at most 2 v_max dt a step and has the smallest sum of squared distances. It is exact:
-    dynamic programming over the whole record, ties going to the smaller advance.
+    """Path error and time difference of a follower on a leader's path, by `match_paths`.
 
     Args:
         t: Ascending times [s], (k,), k ≥ 2.
@@ -176,39 +166,18 @@ def compare_paths(
     Raises:
         InvalidValueError: If shapes differ, or a value isn't finite or positive where it must be.
     """
-    leader, follower = _histories(p_leader, p_follower)
-    times = np.asarray(t, dtype=np.float64)
-    if times.shape != (len(leader),) or len(times) < 2 or not (np.diff(times) > 0).all():
-        raise InvalidValueError("t", times.shape, f"ascending times, shape ({len(leader)},), two or more")
-    for name, value in (("v_max", v_max), ("cell", cell), ("dt", dt), ("v_min", v_min)):
-        if not 0 < value < np.inf:
-            raise InvalidValueError(name, value, "positive and finite")
-    grid = times[0] + dt * np.arange(int(np.floor((times[-1] - times[0]) / dt + 1e-9)) + 1)
-    follower = resample(times, follower, grid)
+    return summed_up(match_paths(t, p_leader, p_follower, v_max=v_max, cell=cell, dt=dt, v_min=v_min))
 
-    s_of_t = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(leader, axis=0), axis=1))))
-    cells = int(np.floor(s_of_t[-1] / cell + 1e-9)) + 1
-    s = cell * np.arange(cells, dtype=np.float64)
-    t_leader = _first_arrival(times, s_of_t, s)
-    path = resample(times, leader, t_leader)
+
+def summed_up(match: PathMatch) -> PathComparison:
+    """The figures of a match."""
+    mean, p95, largest = _spread(match.distance)
+    cells, reached = len(match.s), len(match.t_follower)
     if cells < 3:
-        distance = np.linalg.norm(follower - path[0], axis=1)
-        return PathComparison(*_spread(distance), None, None, None, None, None, None)
-
-    match = _match(grid, follower, t_leader, path, max(1, round(2 * v_max * dt / cell)))
-    s_all = np.append(s, s_of_t[-1])
-    distance, s_follower = _project(follower, np.vstack((path, leader[-1])), s_all, match)
-    reached = np.arange(cells) <= match[-1]
-    window = (-dt, dt + 0.5 * cell / v_min)
-    t_follower = _arrivals(grid, match, s_follower, s[reached], window)
-
-    # The start is reached by definition; a cell beside a standstill says nothing about delay.
-    moving = np.zeros(cells, dtype=bool)
-    moving[1:-1] = 2 * cell > v_min * (t_leader[2:] - t_leader[:-2])
-    counted = moving & reached
-    late = t_follower[counted[reached]] - t_leader[counted]
-    bounded = np.concatenate((late, grid[-1] - t_leader[moving & ~reached]))
-    mean, p95, largest = _spread(distance)
+        return PathComparison(mean, p95, largest, None, None, None, None, None, None)
+    late = match.time_difference[1]
+    unreached = match.t_leader[reached:][match.moving[reached:]]
+    bounded = np.concatenate((late, match.t[-1] - unreached))
     return PathComparison(
         path_error_mean=mean,
         path_error_p95=p95,
@@ -217,71 +186,9 @@ def compare_paths(
         time_difference_sd=float(late.std()) if late.size else None,
         time_difference_max=float(late.max()) if late.size else None,
         time_difference_bound=float(bounded.mean()) if bounded.size else None,
-        speed_error=_speed_error(t_leader[reached], t_follower, 10, cell),
-        progress=float(match[-1] / (cells - 1)),
+        speed_error=_speed_error(match.t_leader[:reached], match.t_follower, 10, float(match.s[1])),
+        progress=float((reached - 1) / (cells - 1)),
     )
-
-
-def _match(t: Array, follower: Array, t_leader: Array, path: Array, advance: int) -> NDArray[np.intp]:
-    """Best matched cell at every time, (k,)."""
-    cells = len(path)
-    known = np.searchsorted(t_leader, t + 1e-9, side="right")
-    cost = np.full(cells, np.inf)
-    cost[0] = 0.0
-    steps = np.zeros((len(t), cells), dtype=np.min_scalar_type(advance))
-    padded = np.full(cells + advance, np.inf)
-    for k in range(len(t)):
-        n = int(known[k])
-        padded[advance:] = cost
-        best, step = cost[:n].copy(), steps[k, :n]
-        if k:
-            for a in range(1, advance + 1):
-                other = padded[advance - a : advance - a + n]
-                better = other < best
-                best[better] = other[better]
-                step[better] = a
-        cost[:n] = best + np.sum((path[:n] - follower[k]) ** 2, axis=1)
-    match = np.empty(len(t), dtype=np.intp)
-    match[-1] = int(np.argmin(cost))
-    for k in range(len(t) - 1, 0, -1):
-        match[k - 1] = match[k] - int(steps[k, match[k]])
-    return match
-
-
-def _project(follower: Array, path: Array, s_path: Array, match: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Distance to the polyline beside each matched cell, and the path length of the nearest point."""
-    distance, s = np.full(len(follower), np.inf), np.zeros(len(follower))
-    for start in (match - 1, match):
-        low = np.clip(start, 0, len(path) - 2)
-        along = path[low + 1] - path[low]
-        squared = np.maximum(np.sum(along**2, axis=1), 1e-300)
-        share = np.clip(np.sum((follower - path[low]) * along, axis=1) / squared, 0.0, 1.0)
-        gap = np.linalg.norm(follower - path[low] - share[:, None] * along, axis=1)
-        nearer = gap < distance
-        distance[nearer], s[nearer] = (
-            gap[nearer],
-            (s_path[low] + share * (s_path[low + 1] - s_path[low]))[nearer],
-        )
-    return distance, s
-
-
-def _arrivals(t: Array, match: NDArray[np.intp], s_follower: Array, s: Array, window: tuple[float, float]) -> Array:
-    """Times at which the follower first reaches each s, refined below a step by the projected path length."""
-    first = t[np.searchsorted(match, np.arange(len(s)), side="left")]
-    # The mean of both monotone envelopes is unbiased under noise; a running maximum alone comes early.
-    upper = np.maximum.accumulate(s_follower)
-    lower = np.minimum.accumulate(s_follower[::-1])[::-1]
-    crossing = _first_arrival(t, np.asarray((upper + lower) / 2, dtype=np.float64), s)
-    return np.clip(crossing, first + window[0], first + window[1])
-
-
-def _first_arrival(t: Array, s_of_t: Array, s: Array) -> Array:
-    """First time at which the non-decreasing s_of_t (k,) reaches each s (m,), at latest the last time."""
-    i = np.clip(np.searchsorted(s_of_t, s, side="left"), 0, len(t) - 1)
-    low = np.maximum(i - 1, 0)
-    rise = s_of_t[i] - s_of_t[low]
-    share = np.where(rise > 0, (s - s_of_t[low]) / np.where(rise > 0, rise, 1.0), 1.0)
-    return np.asarray(t[low] + np.clip(share, 0.0, 1.0) * (t[i] - t[low]), dtype=np.float64)
 
 
 def _speed_error(t_leader: Array, t_follower: Array, window: int, cell: float) -> float | None:
@@ -299,12 +206,3 @@ def _spread(distance: Array) -> tuple[float, float, float]:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _histories(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
-    first, second = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    if first.ndim != 2 or first.shape != second.shape or not len(first):
-        raise InvalidValueError("histories", (first.shape, second.shape), "of one shape (k, n), k ≥ 1")
-    if not (np.isfinite(first).all() and np.isfinite(second).all()):
-        raise InvalidValueError("histories", "NaN or infinity", "finite")
-    return first, second

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from vrs import tempo
+from vrs.agenda import Moment
 from vrs.chunk import State
 from vrs.commands import (
     Cancel,
@@ -27,7 +28,8 @@ from vrs.model import Array, Limits, frozen_array
 from vrs.planning import Plan, rounding
 from vrs.receipt import Receipt, Status
 from vrs.rescheduling import braked, moved, removed, room, span
-from vrs.scheduler import REFUSALS, Moment, Scheduler
+from vrs.scheduler import REFUSALS, Scheduler
+from vrs.timeline import Timeline
 
 
 def edit(plan: Scheduler, command: PlanEdit, now: float | None) -> Receipt:
@@ -143,7 +145,9 @@ def _united(first: Receipt, second: Receipt, names: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(i for i in both if i != first.command_id))
 
 
-def _as_planned(plan: Scheduler, receipt: Receipt, made: Edit, moment: Moment, reason: str, at: float) -> Receipt:
+def _as_planned(
+    plan: Scheduler, receipt: Receipt, made: Edit[Timeline], moment: Moment, reason: str, at: float
+) -> Receipt:
     """A command's receipt after it was planned anew, by an edit that changes nothing before a time."""
     shifted, dropped = plan.touched(made, at)
     return replace(
@@ -201,7 +205,9 @@ def _take_out(plan: Scheduler, receipt: Receipt, t: float, now: float | None) ->
     return plan.accept(answer, plan.ledger.command(receipt.command_id), made, t, others=others)
 
 
-def _replanned(plan: Scheduler, gap: Gap, following: int, cancelled: int) -> tuple[Edit, tuple[Entry, ...]]:
+def _replanned(
+    plan: Scheduler, gap: Gap, following: int, cancelled: int
+) -> tuple[Edit[Timeline], tuple[Entry, ...]]:
     """Plan the move that begins with a segment anew, from where a gap leaves the arm."""
     timeline = plan.timeline
     other = timeline.owner_of(following)

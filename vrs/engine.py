@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,18 +42,43 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from vrs.anchoring import Anchored
+    from vrs.mobile.engine import MobileEngine
+    from vrs.mobile.model import MobileModel
+    from vrs.mobile.timeline import ArcTimeline
     from vrs.standing import Standing
-
-_LIMIT_NAMES = ("qd_max", "qdd_max", "qddd_max")
 
 
 class Engine:
     """A virtual robot: commands edit the future of its timeline, queries read any time.
 
     With a clock it runs in real-time mode and the past can't be changed; without one it's offline and every
-    time is open to edits.
+    time is open to edits. Of a mobile robot's model it makes a `vrs.mobile.MobileEngine`.
     """
 
+    _limit_names: ClassVar[tuple[str, ...]] = ("qd_max", "qdd_max", "qddd_max")
+    """Limits that a `ParameterChange` changes."""
+
+    def __new__(cls, *given: object, **named: object) -> Self:
+        """Choose the kind of engine for a robot; copies of an engine have their kind, and so have other classes."""
+        model = given[0] if given else named.get("model")
+        if cls is Engine and model is not None and not isinstance(getattr(model, "limits", None), Limits):
+            # Arms don't wait for what is about wheels.
+            from vrs.mobile.engine import MobileEngine
+
+            return cast("Self", object.__new__(MobileEngine))
+        return object.__new__(cls)
+
+    @overload
+    def __init__(  # type: ignore[misc]
+        self: MobileEngine,
+        model: MobileModel,
+        *,
+        posture: ArrayLike | None = None,
+        timeline: ArcTimeline | None = None,
+        clock: Clock | None = None,
+        lateness: Lateness = Lateness.POSTPONE,
+    ) -> None: ...
+    @overload
     def __init__(
         self,
         model: RobotModel,
@@ -62,6 +87,16 @@ class Engine:
         timeline: Timeline | None = None,
         clock: Clock | None = None,
         lateness: Lateness = Lateness.POSTPONE,
+    ) -> None: ...
+    def __init__(
+        self,
+        model: Any,
+        *,
+        q: ArrayLike | None = None,
+        timeline: Any = None,
+        clock: Clock | None = None,
+        lateness: Lateness = Lateness.POSTPONE,
+        posture: object = None,
     ) -> None:
         """Make an engine at rest at q, or a branch that goes on from a timeline.
 
@@ -71,10 +106,13 @@ class Engine:
             timeline: What to branch from, instead of q.
             clock: Real-time mode under this clock; None is the offline mode.
             lateness: What happens to commands whose execution time has passed.
+            posture: For mobile robots; see `vrs.mobile.MobileEngine`.
 
         Raises:
             InvalidValueError: If both q and a timeline are given, or one doesn't fit the robot.
         """
+        if posture is not None:
+            raise InvalidValueError("posture", posture, f"left out: {model.name} has joints and no wheels")
         n = model.limits.dof
         if timeline is None:
             start = frozen_array(
@@ -90,10 +128,10 @@ class Engine:
             raise InvalidValueError("q", q, "left out where a timeline is given")
         elif not isinstance(timeline, Timeline) or timeline.dof != n:
             raise InvalidValueError("timeline", timeline, f"a Timeline of {n} joints")
-        self._model = model
+        self._model: RobotModel = model
         self._clock = clock
-        ledger = Ledger(max(timeline.owners(0, len(timeline)), default=0))
-        self._plan = Scheduler(model, timeline, ledger, _lateness(lateness))
+        ledger: Ledger[Timeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
+        self._plan = Scheduler(model, timeline, ledger, lateness_of(lateness))
         self._keeper = Keeper()
 
     @property
@@ -121,7 +159,7 @@ class Engine:
         """Internal simulation parameters by name, with their values."""
         return {
             "lateness": self._plan.lateness,
-            **{name: getattr(self._plan.limits, name) for name in _LIMIT_NAMES},
+            **{name: getattr(self._plan.limits, name) for name in self._limit_names},
         }
 
     @property
@@ -297,22 +335,31 @@ class Engine:
     def _set_parameter(self, change: ParameterChange) -> None:
         plan = self._plan
         if change.name == "lateness":
-            plan.lateness = _lateness(change.value)
+            plan.lateness = lateness_of(change.value)
             return
-        if change.name not in _LIMIT_NAMES:
+        if change.name not in self._limit_names:
             raise InvalidValueError("parameter", change.name, f"one of {', '.join(self.parameters)}")
         if self._clock is not None and self._clock.now() < plan.timeline.end:
             until = f"changed at rest, with nothing scheduled (the plan ends at {plan.timeline.end:.6g} s)"
             raise InvalidValueError(change.name, change.value, until)
-        n = plan.limits.dof
+        plan.limits = replace(plan.limits, **{change.name: self._limit(change)})
+
+    def _limit(self, change: ParameterChange) -> Any:
+        """A limit as it's to be."""
+        n = self._plan.limits.dof
         allowed = f"a positive number, or {n} of them"
         value = finite_array(change.name, change.value, None, allowed)
         if value.ndim > 1 or (value.ndim == 1 and len(value) != n) or not (value > 0).all():
             raise InvalidValueError(change.name, change.value, allowed)
-        plan.limits = replace(plan.limits, **{change.name: np.broadcast_to(value, (n,))})
+        return np.broadcast_to(value, (n,))
 
 
-def _lateness(value: object) -> Lateness:
+def lateness_of(value: object) -> Lateness:
+    """The lateness policy that a value names.
+
+    Raises:
+        InvalidValueError: If it names none.
+    """
     try:
         return Lateness(value)  # type: ignore[arg-type]
     except ValueError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import comb
-from typing import NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from vrs.model import Array
 from vrs.planning import Plan, empty
 from vrs.planning.plan import end_state, stacked
 from vrs.timeline import Timeline
+from vrs.track import Track
 
 MovePlanner = Callable[[State], tuple[Plan, Array, str]]
 """Plans the new move from the state at its start: the plan, the joints where it ends, what the user must know."""
@@ -21,6 +22,7 @@ JoinPlanner = Callable[[Array, State], tuple[Plan, str]]
 """Plans from rest at the new target to the state in which the tail begins."""
 
 _Row = TypeVar("_Row")
+_TrackT = TypeVar("_TrackT", bound=Track[Any])
 
 _SLIVER = 1e-12
 """Duration [s] below which a segment is only rounding."""
@@ -52,10 +54,10 @@ class Gap(NamedTuple):
     """What the user must know of that."""
 
 
-class Edit(NamedTuple):
+class Edit(NamedTuple, Generic[_TrackT]):
     """What an insertion makes."""
 
-    timeline: Timeline
+    timeline: _TrackT
     start: float
     """When the new move begins [s]."""
     arrival: float
@@ -71,14 +73,14 @@ class Edit(NamedTuple):
     notes: str = ""
 
 
-def next_move(timeline: Timeline, index: int) -> int | None:
+def next_move(timeline: Track[Any], index: int) -> int | None:
     """The first segment from an index on that isn't a hold; None if there's none."""
     if index < len(timeline) and timeline.owner_of(index) == HOLD:
         index = timeline.end_of_run(index)
     return index if index < len(timeline) else None
 
 
-def end_of_move(timeline: Timeline, index: int) -> int:
+def end_of_move(timeline: Track[Any], index: int) -> int:
     """One past the last segment of the move that a segment belongs to.
 
     A move is one command's segments; holds in which it spends slack before its joining move are part of it.
@@ -86,7 +88,7 @@ def end_of_move(timeline: Timeline, index: int) -> int:
     return _around(timeline, index, timeline.owner_of(index))[0]
 
 
-def _around(timeline: Timeline, index: int, owner: int) -> tuple[int, bool]:
+def _around(timeline: Track[Any], index: int, owner: int) -> tuple[int, bool]:
     """The end of the move that a command's segment belongs to, and whether another one follows."""
     count = len(timeline)
     while True:
@@ -111,7 +113,7 @@ def insert(
     command_id: int,
     plan_move: MovePlanner,
     plan_join: JoinPlanner,
-) -> Edit:
+) -> Edit[Timeline]:
     """Put a move into the timeline at t.
 
     The past stays; the interrupted move's rest is dropped; with SPLICE the moves after it follow, shifted as a
@@ -134,6 +136,12 @@ def insert(
 
 def gap_at(timeline: Timeline, t: float, how: Insertion) -> tuple[Gap, tuple[int, ...] | None]:
     """The gap that a move at t makes for itself, and the commands that lose segments to it; see Edit."""
+    tail, dropped = tail_at(timeline, t, how)
+    return Gap(t, t, timeline.state_before(t), tail), dropped
+
+
+def tail_at(timeline: Track[Any], t: float, how: Insertion) -> tuple[int | None, tuple[int, ...] | None]:
+    """The first segment that follows a move at t, and the commands that lose segments to it; see Gap and Edit."""
     tail: int | None = None
     dropped: tuple[int, ...] | None = ()
     if t < timeline.end and len(timeline):
@@ -147,7 +155,7 @@ def gap_at(timeline: Timeline, t: float, how: Insertion) -> tuple[Gap, tuple[int
         else:
             end, goes_on = _around(timeline, index, owner)
             tail, dropped = end if goes_on else None, (owner,)
-    return Gap(t, t, timeline.state_before(t), tail), dropped
+    return tail, dropped
 
 
 def move_before(
@@ -183,7 +191,7 @@ def fill(
     plan_move: MovePlanner,
     plan_join: JoinPlanner,
     dropped: tuple[int, ...] | None = (),
-) -> Edit:
+) -> Edit[Timeline]:
     """Put a move into a gap, with a joining move to what follows.
 
     Slack is spent at rest: at the tail's first state or, if that state moves, at the new target.

@@ -11,20 +11,22 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple, TypeAlias
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from vrs.commands import MotionCommand
 from vrs.errors import UnknownCommandError
 from vrs.receipt import Receipt, Status
-from vrs.timeline import Timeline
+from vrs.track import Track
 
 UNDO_DEPTH = 1000
 """Commands that can be taken back, one after the other; each keeps a timeline alive."""
 
 ARRIVED = 1e-9
 """A command that's this near to its end [s] has arrived: ends are sums of durations, and rounded."""
+
+_TrackT = TypeVar("_TrackT", bound=Track[Any])
 
 TimeMap: TypeAlias = Callable[[float], float]
 """New time of what was scheduled at a time."""
@@ -51,13 +53,13 @@ class Change(NamedTuple):
     """Whether commands to where the arm stood anyway are dropped too: they have no segments that could be kept."""
 
 
-class Undo(NamedTuple):
+class Undo(NamedTuple, Generic[_TrackT]):
     """What is needed to take an edit back."""
 
     command_id: int
     at: float
     """Nothing before this time was edited [s]."""
-    before: Timeline
+    before: _TrackT
     changes: tuple[int, tuple[Change, ...]]
     """Where in the log it wrote, and what stood there."""
     overwritten: dict[int, Entry | None]
@@ -66,7 +68,7 @@ class Undo(NamedTuple):
     """Where in the list of stills it changed something, and what stood there; put back one after the other."""
 
 
-class Ledger:
+class Ledger(Generic[_TrackT]):
     """Receipts by command id, as later edits left them."""
 
     def __init__(self, newest: int) -> None:
@@ -76,7 +78,7 @@ class Ledger:
         self._changes: list[Change] = []
         self._versions: list[int] = []
         self._stills: list[tuple[float, int]] = []
-        self._undo: deque[Undo] = deque(maxlen=UNDO_DEPTH)
+        self._undo: deque[Undo[_TrackT]] = deque(maxlen=UNDO_DEPTH)
         self.settled = ""
         """Why edits before the newest ones can't be taken back any more; empty where all can."""
 
@@ -174,7 +176,7 @@ class Ledger:
         self,
         receipt: Receipt,
         command: MotionCommand | None,
-        before: Timeline,
+        before: _TrackT,
         change: Change | None,
         others: Collection[Entry] = (),
     ) -> Receipt:
@@ -210,9 +212,7 @@ class Ledger:
         self.newest = max(self.newest, receipt.command_id)
         return receipt
 
-    def reinstate(
-        self, receipt: Receipt, before: Timeline, change: Change, others: Iterable[Entry] = ()
-    ) -> Receipt:
+    def reinstate(self, receipt: Receipt, before: _TrackT, change: Change, others: Iterable[Entry] = ()) -> Receipt:
         """Write down an edit that brings back what the newest one dropped.
 
         Args:
@@ -265,7 +265,7 @@ class Ledger:
         self._note_still(receipt)
 
     @property
-    def last(self) -> Undo | None:
+    def last(self) -> Undo[_TrackT] | None:
         """The newest edit that can be taken back."""
         return self._undo[-1] if self._undo else None
 

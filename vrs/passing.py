@@ -20,6 +20,7 @@ from vrs.tooled import tooled
 
 if TYPE_CHECKING:
     from vrs.scheduler import Scheduler
+    from vrs.timeline import Timeline
 
 _SAME = 1e-15
 """Times that differ by less, as a share of them or of a second, are one."""
@@ -35,7 +36,9 @@ class _Way(NamedTuple):
     note: str
 
 
-def passing(plan: Scheduler, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit:
+def passing(
+    plan: Scheduler, command: MotionCommand, t: float, command_id: int, now: float | None
+) -> Edit[Timeline]:
     """Insert a move that begins before the one that ends at t is over, and passes its target at a distance.
 
     Args:

@@ -58,7 +58,7 @@ def moved(
     plan_move: MovePlanner,
     plan_join: JoinPlanner,
     stopper: Stopper,
-) -> Edit:
+) -> Edit[Timeline]:
     """Let a move, segments low to high − 1, begin at t, in the room that it has.
 
     Holds next to it give and take; only where they don't suffice does what follows come later. If the arm moves

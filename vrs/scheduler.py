@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from operator import add
 from typing import NamedTuple
 
-from vrs.chunk import HOLD
+from vrs.agenda import Agenda, before_issue, passed
 from vrs.commands import (
     Insertion,
     Lateness,
     MotionCommand,
-    PlanEdit,
     Profile,
     SteerCommand,
-    Stop,
 )
 from vrs.errors import InvalidValueError, PlanningError, UnreachablePoseError
 from vrs.insertion import (
@@ -30,12 +27,12 @@ from vrs.insertion import (
     lengthened,
     piece,
 )
-from vrs.ledger import ARRIVED, Change, Entry, Ledger
+from vrs.ledger import Ledger
 from vrs.model import Limits, RobotModel, frozen_array
 from vrs.moves import join, move
 from vrs.planning import Plan
 from vrs.planning.plan import end_position
-from vrs.receipt import Names, Receipt, Status
+from vrs.receipt import Receipt, Status
 from vrs.rescheduling import owner_before
 from vrs.timeline import Timeline
 
@@ -44,9 +41,6 @@ REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
 
 FRESH = 0.2
 """Age [s] at which a steering input ends."""
-
-_NAMED_AT_ONCE = 64
-"""Segments whose commands are named at once; those of longer runs when somebody asks."""
 
 
 class Paused(NamedTuple):
@@ -70,24 +64,12 @@ class _Session(NamedTuple):
     """When the first began [s]."""
 
 
-class Moment(NamedTuple):
-    """When an edit acts, and what its receipt says of that."""
-
-    t: float
-    issued: float | None
-    asked: float | None
-    status: Status
-    reason: str
-
-
-class Scheduler:
+class Scheduler(Agenda[Timeline]):
     """What an engine has planned: a timeline, the limits in force, and a ledger of receipts."""
 
-    def __init__(self, model: RobotModel, timeline: Timeline, ledger: Ledger, lateness: Lateness) -> None:
+    def __init__(self, model: RobotModel, timeline: Timeline, ledger: Ledger[Timeline], lateness: Lateness) -> None:
+        super().__init__(timeline, ledger, lateness)
         self.model = model
-        self.timeline = timeline
-        self.ledger = ledger
-        self.lateness = lateness
         self.limits = model.limits
         self.paused: Paused | None = None
         self.profiles: dict[int, Profile] = {}
@@ -114,7 +96,7 @@ class Scheduler:
                 reason = passed(t, now)
                 if self.lateness is Lateness.REJECT:
                     return self.reject(issued, asked, reason)
-                t = self._end_of_active(now)
+                t = self.end_of_active(now)
                 status, reason = Status.POSTPONED, f"{reason}: postponed to {t:.9g} s"
         if command.insertion is Insertion.APPEND and t < end:
             t = end
@@ -141,34 +123,10 @@ class Scheduler:
         )  # fmt: skip
         return self.accept(receipt, command, edit, t, appended=appended)
 
-    def _passing(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit:
+    def _passing(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit[Timeline]:
         from vrs.passing import passing
 
         return passing(self, command, t, command_id, now)
-
-    def moment(self, command: PlanEdit | SteerCommand, now: float | None, soonest: float) -> Moment:
-        """When an edit acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
-
-        Args:
-            command: The edit.
-            now: Present time [s]; None offline.
-            soonest: As soon as it can, offline [s].
-
-        Raises:
-            PlanningError: If it's late and the policy rejects, or if it was to act before it was issued.
-        """
-        issued, t = command.issued_at, command.execute_at
-        if now is None:
-            return Moment(soonest if t is None else t, issued, t, Status.ACCEPTED, "")
-        issued, asked = now if issued is None else issued, t
-        t = max(now, issued) if t is None else t
-        if t < issued:
-            raise PlanningError(before_issue(t, issued))
-        if t >= now:
-            return Moment(t, issued, asked, Status.ACCEPTED, "")
-        if self.lateness is Lateness.REJECT and not isinstance(command, Stop):
-            raise PlanningError(passed(t, now))
-        return Moment(now, issued, asked, Status.POSTPONED, f"{passed(t, now)}: at once")
 
     def planner(self, command: MotionCommand, limits: Limits | None = None) -> MovePlanner:
         """Plan a command's move, under the limits in force now or others."""
@@ -198,63 +156,6 @@ class Scheduler:
         reason = self.ledger.receipt(command_id).reason if command_id in self.ledger else ""
         rough = "parabolas" in reason or "accelerations dropped" in reason
         return self.profile(command_id) is Profile.JERK_LIMITED and not rough
-
-    def touched(self, edit: Edit, t: float) -> tuple[Names, Names]:
-        """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
-        before = self.timeline
-        shifted: Names = ()
-        if edit.shift > ARRIVED and edit.tail is not None:
-            shifted = self.named(before, edit.tail, t)
-        if edit.dropped is None:
-            return shifted, self.named(before, max(before.index_at(t), 0), t)
-        return shifted, tuple(i for i in edit.dropped if not self.ledger.arrived(i, t))
-
-    def accept(
-        self,
-        receipt: Receipt,
-        command: MotionCommand | None,
-        edit: Edit,
-        at: float,
-        *,
-        appended: bool = False,
-        others: tuple[Entry, ...] = (),
-    ) -> Receipt:
-        """Put an edit in force, and write its receipt down.
-
-        Args:
-            receipt: Of the command that made the edit.
-            command: That command, where it's a motion.
-            edit: What it did.
-            at: Earliest time that the edit changed [s].
-            appended: Whether all that was scheduled stays.
-            others: Receipts and commands of other moves that were planned anew.
-        """
-        before, self.timeline = self.timeline, edit.timeline
-        change = None
-        if not appended:
-            dropped = None if edit.dropped is None else frozenset(edit.dropped)
-            moved = partial(add, edit.shift) if edit.shift > 0 else None
-            change = Change(edit.timeline.version, receipt.command_id, at, dropped, moved)
-        return self.ledger.accept(receipt, command, before, change, others)
-
-    def named(self, timeline: Timeline, index: int, t: float) -> Names:
-        """Commands that arrive after t and have segments from an index on."""
-        # Joining moves may stand there first whose commands have arrived.
-        if len(timeline) - index > _NAMED_AT_ONCE:
-            return partial(_names, self.ledger, timeline, index, t)
-        return tuple(i for i in timeline.owners(index, len(timeline)) if not self.ledger.arrived(i, t))
-
-    def reject(self, issued: float | None, asked: float | None, reason: str) -> Receipt:
-        """Answer a command that can't be."""
-        return self.ledger.reject(issued, asked, reason, self.timeline.version)
-
-    def _end_of_active(self, now: float) -> float:
-        """End of the segment that is valid now; in a hold, or where none is, now."""
-        timeline = self.timeline
-        index = timeline.index_at(now)
-        if 0 <= index < len(timeline) and timeline.owner_of(index) != HOLD:
-            return timeline.start_of(index + 1)
-        return now
 
     def steer(self, command: SteerCommand, now: float | None) -> Receipt:
         """Go on, from now, as a hand asks; inputs in a row with nothing else between are one command."""
@@ -301,6 +202,12 @@ class Scheduler:
         receipt = replace(receipt, superseded_names=self.touched(edit, t)[1])
         return self.accept(receipt, None, edit, t)
 
+    def brake(self, t: float, command_id: int) -> tuple[Timeline, str]:
+        """What is scheduled, with each joint braking from t on; and what must be said of it."""
+        stop, note = self.stop_at(t)
+        self.profiles[command_id] = self.profile(owner_before(self.timeline, t))
+        return self.timeline.edited(t, [piece(stop, command_id)]), note
+
     @property
     def steered(self) -> tuple[int, float] | None:
         """The command that the next steering input may go on with, and when it began [s]."""
@@ -312,43 +219,3 @@ class Scheduler:
     def go_on_steering(self, command_id: int, start: float) -> None:
         """Let the next steering input go on with a command that began at a time [s]."""
         self._session = _Session(command_id, self.timeline.version, start)
-
-    def undo(self, now: float | None) -> Receipt | None:
-        """Take back the newest edit; see `vrs.engine.Engine.undo`."""
-        last = self.ledger.last
-        if last is None:
-            return None
-        version = self.timeline.version + 1
-        if now is None or now <= last.at:
-            self.timeline = last.before.with_version(version)
-            return self.ledger.take_back(version)
-        if now >= self.timeline.end:
-            return None
-        stop, note = self.stop_at(now)
-        self.profiles[last.command_id] = self.profile(owner_before(self.timeline, now))
-        self.timeline = self.timeline.edited(now, [piece(stop, last.command_id)])
-        return self.ledger.break_off(Change(version, last.command_id, now, None), note)
-
-    def undo_refusal(self, now: float | None) -> str:
-        """Why there's nothing to take back; see `vrs.engine.Engine.undo_refusal`."""
-        last = self.ledger.last
-        if last is None:
-            return self.ledger.settled
-        if now is None or now <= last.at or now < self.timeline.end:
-            return ""
-        return f"command {last.command_id} is over: what has happened can't be taken back"
-
-
-def _names(ledger: Ledger, timeline: Timeline, index: int, t: float) -> tuple[int, ...]:
-    """Commands that have segments from an index on, and hadn't arrived at t when the timeline was edited."""
-    return tuple(i for i in timeline.owners(index, len(timeline)) if not ledger.arrived(i, t, timeline.version + 1))
-
-
-def before_issue(t: float, issued: float) -> str:
-    """Say that a command is to be executed before it was issued."""
-    return f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s"
-
-
-def passed(t: float, now: float) -> str:
-    """Say that a command is late."""
-    return f"t_exec = {t:.9g} s had passed at {now:.9g} s"

@@ -158,6 +158,21 @@ def known_segment(start: float, duration: float, coefficients: Array, owner: int
     return segment
 
 
+def known_arc(
+    start: float, duration: float, posture: tuple[float, float, float], v: float, w: float, owner: int | None = None
+) -> ArcSegment:
+    """An arc of numbers that were checked before, in a tenth of the time."""
+    arc = ArcSegment.__new__(ArcSegment)
+    put = object.__setattr__
+    put(arc, "start", start)
+    put(arc, "duration", duration)
+    put(arc, "posture", posture)
+    put(arc, "v", v)
+    put(arc, "w", w)
+    put(arc, "command_id", owner)
+    return arc
+
+
 def check_derivative(derivative: int) -> int:
     """Return an order of derivative, 0 to 3.
 

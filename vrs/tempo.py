@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vrs.agenda import Moment
 from vrs.chunk import HOLD, Piece, State
 from vrs.commands import JointTarget, MotionCommand, Profile, Resume, ScaleTime, Stop
 from vrs.errors import PlanningError
@@ -17,7 +18,7 @@ from vrs.planning import Plan, stopping, violation
 from vrs.planning.plan import end_state
 from vrs.receipt import Receipt
 from vrs.rescheduling import owner_before, span
-from vrs.scheduler import Moment, Paused, Scheduler
+from vrs.scheduler import Paused, Scheduler
 from vrs.timeline import Timeline
 
 _ROOM = 1e-3

@@ -10,7 +10,6 @@ import math
 import sys
 from bisect import bisect_right
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,8 +30,8 @@ from vrs.polynomials import (
     settled,
 )
 from vrs.segment import PolynomialSegment, check_derivative, evaluate, known_segment, times
-from vrs.segment_view import SegmentView
-from vrs.tree import Leaf, Node, Path, first_start, knots_of, last_end, leaves, path_at, path_to, splice
+from vrs.track import Track, remade
+from vrs.tree import Node, knots_of, leaves, path_at, splice
 
 _LARGEST = sys.float_info.max
 _POSITION = 0
@@ -41,19 +40,13 @@ _VISITS = 4096
 _Float64 = np.float64
 
 
-class Timeline:
+class Timeline(Track[PolynomialSegment]):
     """An immutable run of segments, half-open and contiguous.
 
     Before the start the initial position is held, after the end the last one.
     """
 
-    __slots__ = (
-        "_asked", "_count", "_end", "_final", "_first", "_free", "_initial", "_levels", "_missed", "_near",
-        "_places", "_root", "_start", "version",
-    )  # fmt: skip
-
-    version: int
-    """How many edits made it."""
+    __slots__ = ("_final", "_free", "_missed", "_places")
 
     def __init__(
         self, q: ArrayLike, start: float = 0.0, segments: Iterable[PolynomialSegment] = (), version: int = 0
@@ -76,30 +69,11 @@ class Timeline:
         self._set(initial, origin, *splice(0, None, None, checked_run(segments, origin, initial)), version)
 
     def _set(self, initial: Array, start: float, root: Node | None, height: int, version: int) -> None:
-        self._initial = initial
-        self._start = start
-        self._root = root
-        self._levels = range(height)
-        self._count = 0 if root is None else root.count
-        self._first = start if root is None else first_start(root, height, 0.0)
-        self._end = start if root is None else last_end(root, height)
+        super()._set(initial, start, root, height, version)
         self._free: list[Cursor] = []
         self._places: Places | None = None
         self._missed = 0
         self._final: Array | None = None
-        self._asked: tuple[float, int, Path] | None = None
-        self._near: tuple[int, Path] | None = None
-        self.version = version
-
-    @property
-    def start(self) -> float:
-        """Origin [s]."""
-        return self._start
-
-    @property
-    def end(self) -> float:
-        """End of the last segment [s]; the origin while there's none."""
-        return self._end
 
     @property
     def dof(self) -> int:
@@ -111,113 +85,15 @@ class Timeline:
         """Joints before the start [rad], (n,)."""
         return self._initial
 
-    @property
-    def segments(self) -> SegmentView:
-        """The segments, made when they're looked at."""
-        return SegmentView(self)
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (self._initial, self._start, self._root, len(self._levels), self.version)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Timeline):
-            return False
-        head = (self._start, self._end, len(self)) == (other._start, other._end, len(other))
-        if not head or not np.array_equal(self._initial, other._initial):
-            return False
-        if self._root is other._root:
-            return True
-        return all(a == b for a, b in zip(self.segments, other.segments, strict=True))
-
-    def __hash__(self) -> int:
-        return hash((self._start, self._end, len(self), self._initial.tobytes()))
-
-    def __repr__(self) -> str:
-        return f"Timeline({len(self)} segments, [{self._start:g}, {self._end:g}) s, version {self.version})"
-
-    def _way_at(self, t: float) -> tuple[int, Path]:
-        """Index of the segment at a time from the first start to before the end, and the way to it.
-
-        An edit asks for its own time again and again, so the newest is remembered.
-        """
-        newest = self._asked
-        if newest is None or newest[0] != t:
-            assert self._root is not None
-            index, path = path_at(self._root, len(self._levels), t)
-            self._asked = newest = t, index, path
-            self._near = index - path.place, path
-        return newest[1], newest[2]
-
-    def _way_to(self, index: int) -> Path:
-        """The way to a segment; one more step from its neighbours in the leaf that was asked for last."""
-        near = self._near
-        if near is None or not 0 <= index - near[0] < near[1].leaf.count:
-            if self._root is None or not 0 <= index < self._count:
-                raise IndexError(index)
-            path = path_to(self._root, len(self._levels), index)
-            self._near = near = index - path.place, path
-        first, path = near
-        return Path(path.steps, path.leaf, index - first, path.offset)
-
-    def _locate(self, index: int) -> tuple[Leaf, int, float]:
-        """A segment's leaf, its index there, and the leaf's offset."""
-        near = self._near
-        if near is None or not 0 <= index - near[0] < near[1].leaf.count:
-            return self._way_to(index)[1:]
-        first, (_, leaf, _, offset) = near
-        return leaf, index - first, offset
-
-    def index_at(self, t: float) -> int:
-        """Index of the segment with start ≤ t < end; −1 before the first, len(self) after the last."""
-        if t >= self._end:
-            return self._count
-        if self._root is None or t < self._first:
-            return -1
-        return self._way_at(t)[0]
-
-    def start_of(self, index: int) -> float:
-        """Start of a segment [s]; of index len(self), the end."""
-        if index >= self._count:
-            return self._end
-        leaf, i, offset = self._locate(index)
-        return offset + leaf.starts[i]
-
-    def owner_of(self, index: int) -> int:
-        """Command id of a segment, or HOLD."""
-        leaf, i, _ = self._locate(index)
-        return leaf.owners[i]
-
     def segment(self, index: int) -> PolynomialSegment:
         """The segment at an index, 0 to len(self) − 1."""
         leaf, i, offset = self._locate(index)
         a = rows_of(leaf.rows[i], self.dof)
         return known_segment(offset + leaf.starts[i], leaf.durations[i], a, leaf.owners[i] or None)
 
-    def owners(self, low: int, high: int) -> tuple[int, ...]:
-        """Distinct command ids of the segments low to high − 1, in order, without holds."""
-        parts = leaves(self._root, len(self._levels), low, high)
-        found = dict.fromkeys(owner for leaf, part, _ in parts for owner in leaf.owners[part])
-        found.pop(HOLD, None)
-        return tuple(found)
-
     def knots(self, low: int, high: int) -> tuple[Array, Array]:
         """Starts of the segments low to high − 1 [s], (m,), and their velocities there [rad/s], (m, n)."""
         return knots_of(leaves(self._root, len(self._levels), low, high), self.dof)
-
-    def end_of_run(self, index: int) -> int:
-        """One past the last segment, in a row from an index on, that the same command owns."""
-        leaf, i, _ = self._locate(index)
-        owner = leaf.owners[i]
-        while True:
-            owners = leaf.owners
-            while i < leaf.count and owners[i] == owner:
-                i, index = i + 1, index + 1
-            if i < leaf.count or index == self._count:
-                return index
-            leaf, i, _ = self._locate(index)
 
     def sample(self, t: ArrayLike, *, derivative: int = 0) -> Array:
         """Evaluate the timeline.
@@ -364,36 +240,21 @@ class Timeline:
             tail: Index, in this timeline, of the first segment that stays after the pieces; None for none.
             tail_start: Time at which the tail starts [s].
         """
-        start, left, last, right = self._start, None, None, None
+        start = self._start
+        left, last = self._cut(cut)
         if self._root is None or not self._first <= cut < self._end:
             start = min(start, cut)
             if cut > self._end:
                 pieces = (Piece([cut - self._end], [self._last()[None]], HOLD), *pieces)
                 cut = self._end
-            if self._count and cut == self._end:
-                left = self._way_to(self._count - 1)
-        else:
-            index, left = self._way_at(cut)
-            last = cut - (left.offset + left.leaf.starts[left.place])
-            if last <= 0:
-                left, last = self._way_to(index - 1) if index else None, None
+        right = None
         if tail is not None and tail_start is not None and tail < self._count:
             right = self._way_to(tail)
         tree = splice(len(self._levels), left, last, run_of(pieces, cut), right, tail_start or 0.0)
-        result = _remade(self._initial, start, *tree, self.version + 1)
+        result = remade(Timeline, self._initial, start, *tree, self.version + 1)
         try:
             cursor = self._free.pop()
         except IndexError:
             return result
         result._free.append((math.inf, -math.inf, *cursor[2:]))
         return result
-
-    def with_version(self, version: int) -> Timeline:
-        """The same timeline under another version number."""
-        return _remade(self._initial, self._start, self._root, len(self._levels), version)
-
-
-def _remade(initial: Array, start: float, root: Node | None, height: int, version: int) -> Timeline:
-    result = Timeline.__new__(Timeline)
-    result._set(initial, start, root, height, version)
-    return result

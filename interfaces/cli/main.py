@@ -14,6 +14,7 @@ from interfaces.cli.console import console
 from interfaces.cli.demo import demo
 from interfaces.cli.doctor import doctor
 from interfaces.cli.export import export
+from interfaces.cli.lab import lab
 from interfaces.cli.link import link
 from interfaces.cli.replay import replay
 from interfaces.cli.reproduce import reproduce
@@ -41,6 +42,7 @@ app.command()(doctor)
 app.command()(export)
 app.command()(link)
 app.command()(replay)
+app.command()(lab)
 app.command()(reproduce)
 app.command()(robot)
 app.command()(run)

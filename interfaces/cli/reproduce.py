@@ -14,17 +14,27 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="doulgeri, or all for every paper there is.")],
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="doulgeri, han2001, or all for every paper.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where PAPER.json and the figures go.")],
     seed: Annotated[
         int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="Seed of everything random.")
     ] = 0,
     runs: Annotated[
-        int, typer.Option("--runs", min=2, max=1000, metavar="K", help="Runs behind each random figure.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            "--runs", min=2, max=1000, metavar="K", help="Runs behind each random figure; 10 unless given."
+        ),
+    ] = None,
     length: Annotated[
-        float, typer.Option("--length", min=2, max=3600, metavar="S", help="Commands in each run last so long [s].")
-    ] = 20.0,
+        float | None,
+        typer.Option(
+            "--length",
+            min=2,
+            max=3600,
+            metavar="S",
+            help="Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001.",
+        ),
+    ] = None,
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
     ] = 2,
@@ -36,9 +46,10 @@ def reproduce(
     from interfaces.lab import Study, papers
     from interfaces.lab.output import to_json, write
 
-    chosen, study = papers(paper), Study(seed, runs, length)
+    chosen = papers(paper)
     prepare(out)
     for each in chosen:
+        study = Study(seed, each.runs if runs is None else runs, each.length if length is None else length)
         reproduction = _run(each, study, workers)
         path = write(reproduction, out)
         if as_json:

@@ -117,6 +117,10 @@ class Paper:
     """As the command line spells it."""
     citation: str
     parts: tuple[Part, ...]
+    runs: int = 10
+    """Behind each random figure, unless said otherwise."""
+    length: float = 20.0
+    """For how long each run's operator gives commands, unless said otherwise [s]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from interfaces.lab.claims import Paper
 from interfaces.lab.doulgeri import PAPER as DOULGERI
+from interfaces.lab.han2001 import PAPER as HAN2001
 from vrs.checks import one_of
 
-PAPERS: dict[str, Paper] = {paper.name: paper for paper in (DOULGERI,)}
+PAPERS: dict[str, Paper] = {paper.name: paper for paper in (DOULGERI, HAN2001)}
 """By the name that the command line uses."""
 
 ALL = "all"

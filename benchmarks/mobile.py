@@ -1,0 +1,103 @@
+"""How many times faster than real time the mobile robots run, on one core.
+
+Robots take turns in blocks of ten control periods, so that a busy machine slows all of them; processor time counts.
+A bare PyBullet step of the same world, beside the PyBullet robot, tells what is ours and what is PyBullet's.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from robots.ipr.bare import BareBody
+from robots.ipr.body import MobileBody
+from robots.ipr.chassis import Senses, SonarModel
+from robots.ipr.robot import MobileRobot
+
+if TYPE_CHECKING:
+    from benchmarks.results import Part
+
+PERIODS = 10
+"""Control periods of 0.1 s a block."""
+START = (1.2, 1.3, 0.0)
+"""Where in the furnished room a slow circle meets nothing."""
+
+
+def seconds(action: Callable[[], object]) -> float:
+    """Return the processor time that an action takes [s]."""
+    start = time.process_time()
+    action()
+    return time.process_time() - start
+
+
+def circle(body: MobileRobot) -> None:
+    """Drive a block of a circle 0.3 m in radius."""
+    for k in range(PERIODS):
+        body.follow(0.15, 0.5 + 0.01 * math.sin(k))
+
+
+def bare_steps(body: MobileBody, count: int) -> None:
+    """Step a robot's world without anything around it."""
+    step, client = body._world.bullet.stepSimulation, body._world.client
+    for _ in range(count):
+        step(physicsClientId=client)
+
+
+def measure(blocks: int = 40) -> dict[str, float]:
+    """Return times real time by robot, medians and bests of blocks, and what of PyBullet's robot PyBullet is."""
+    sonar = Senses(sonar=SonarModel(), camera=None)
+    blind = Senses(sonar=None, camera=None)
+    found: dict[str, list[float]] = {}
+    with (
+        MobileBody("ipr", START, room="furnished", rng=1) as simulated,
+        MobileBody("micro", START, room="furnished", rng=1) as micro,
+        MobileBody("ipr", START, room="furnished", rng=1) as stepped,
+    ):
+        bodies: dict[str, MobileRobot] = {
+            "simulated": simulated,
+            "micro": micro,
+            "bare": BareBody("ipr", START, room="furnished", rng=1, senses=blind),
+            "bare_sonar": BareBody("ipr", START, room="furnished", rng=1, senses=sonar),
+        }
+        actions = {name: partial(circle, body) for name, body in bodies.items()}
+        actions["pybullet"] = partial(bare_steps, stepped, PERIODS * 24)
+        for action in actions.values():
+            action()
+        for _ in range(blocks):
+            for name, action in actions.items():
+                found.setdefault(name, []).append(seconds(action) / (0.1 * PERIODS))
+    result = {name: 1 / statistics.median(costs) for name, costs in found.items()}
+    result |= {f"{name}_best": 1 / min(costs) for name, costs in found.items()}
+    pairs = zip(found["pybullet"], found["simulated"], strict=True)
+    result["pybullet_share"] = statistics.median(a / b for a, b in pairs)
+    return result
+
+
+def part() -> Part:
+    """Measure."""
+    from benchmarks.results import Bar, Cost, Part, Result
+
+    found = measure()
+
+    def row(what: str, name: str, asked: float | None, note: str = "") -> Result:
+        bar = Bar(median=None if asked is None else 1e6 / asked)
+        said = f"{found[name]:.0f} times real time, {found[f'{name}_best']:.0f} in the best block"
+        return Result(what, Cost(1e6 / found[name]), bar=bar, note=said + note)
+
+    share = f"; {100 * found['pybullet_share']:.0f} % of it is PyBullet's own step"
+    return Part(
+        "The mobile robots",
+        "A second of a real robot's life in the furnished room, in processor time on one core, blocks of "
+        f"{PERIODS} control periods of 0.1 s in turns. The simulated ones step at 1/240 s, with sonars at 10 Hz, "
+        "camera at 30 Hz and encoders at 20 Hz.",
+        (
+            row("IPR in PyBullet, sonars and camera", "simulated", 20.0, share),
+            row("micro-robot in PyBullet, sonars and camera", "micro", 20.0),
+            row("bare robot", "bare", 500.0),
+            row("bare robot with sonars", "bare_sonar", None),
+        ),
+    )

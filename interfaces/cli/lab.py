@@ -1,0 +1,98 @@
+"""`vrs lab`: seeded experiments with a mobile robot, with confidence intervals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from interfaces.cli.demo import prepare
+
+if TYPE_CHECKING:
+    from interfaces.lab.driving.run import Case
+    from interfaces.lab.driving.sweep import Row
+
+
+def lab(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where runs.csv, summary.json and figures go.")],
+    architecture: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--architecture", metavar="A", help="I, II, III, III-capped, extended or timeline; repeatable."
+        ),
+    ] = None,
+    transport: Annotated[
+        list[str] | None, typer.Option("--transport", metavar="T", help="stream or datagrams; repeatable.")
+    ] = None,
+    delay: Annotated[
+        list[str] | None, typer.Option("--delay", metavar="PROFILE", help="Delay one way, as thu@3.3; repeatable.")
+    ] = None,
+    robot: Annotated[
+        list[str] | None, typer.Option("--robot", metavar="R", help="ipr, micro or bare; repeatable.")
+    ] = None,
+    operator: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--operator",
+            metavar="O",
+            help="figure-eight, corridor, slalom, docking, mixed, or inputs:FILE.csv; repeatable.",
+        ),
+    ] = None,
+    runs: Annotated[int, typer.Option("--runs", min=1, max=10_000, metavar="K", help="Seeds of each.")] = 5,
+    seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="The first seed.")] = 0,
+    length: Annotated[
+        float, typer.Option("--length", min=2, max=3600, metavar="S", help="For how long the operator drives [s].")
+    ] = 120.0,
+    workers: Annotated[
+        int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
+    ] = 2,
+    as_json: Annotated[bool, typer.Option("--json", help="Write the summary on standard output too.")] = False,
+) -> None:
+    """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
+    from interfaces.lab.driving.operators import operator as make
+    from interfaces.lab.driving.output import rich_table, summary, write
+    from interfaces.lab.driving.pictures import pictures
+    from interfaces.lab.driving.run import ROBOTS
+    from interfaces.lab.driving.sweep import cases
+    from interfaces.link.profiles import delay_profile
+    from interfaces.teleop.architectures import ARCHITECTURES, Transport
+    from vrs.checks import one_of
+
+    architectures = [one_of("architecture", a, ARCHITECTURES) for a in architecture or ["III", "timeline"]]
+    transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]
+    delays, robots = delay or ["thu"], [one_of("robot", r, ROBOTS) for r in robot or ["ipr"]]
+    operators = operator or ["mixed"]
+    for profile in delays:
+        delay_profile(profile)
+    for who in operators:
+        make(who, seed, 0.1)
+    prepare(out)
+    chosen = cases(architectures, transports, delays, robots, operators, range(seed, seed + runs), length)
+    rows = _measured(chosen, workers)
+    settings = {
+        "architectures": architectures, "transports": [t.value for t in transports], "delays": delays,
+        "robots": robots, "operators": operators, "runs": runs, "seed": seed, "length_s": length,
+    }  # fmt: skip
+    write(rows, settings, pictures(chosen), out)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(summary(rows, settings), indent=2, ensure_ascii=False))
+        return
+    from rich.console import Console
+
+    Console().print(rich_table(rows))
+    typer.echo(f"Wrote {out / 'summary.json'}, runs.csv with {len(rows)} runs, and the figures")
+
+
+def _measured(chosen: list[Case], workers: int) -> list[Row]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from interfaces.lab.driving.sweep import sweep
+
+    columns = (TextColumn("runs"), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("runs", total=len(chosen))
+        return sweep(chosen, workers=workers, progress=lambda: bar.advance(task))

@@ -1,0 +1,146 @@
+"""What `vrs lab` writes: runs.csv, summary.json, pictures; and the table that it shows."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from interfaces.lab.driving.sweep import METRICS, Group, Row, grouped, paired
+from interfaces.lab.output import DIGITS
+from interfaces.lab.statistics import Estimate
+from vrs.errors import FormatError
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+    from interfaces.lab.claims import Figure
+
+SCHEMA = "vrs-lab/1"
+KEYS = ("architecture", "transport", "delay", "robot", "operator")
+COLUMNS = (*KEYS, "seed", *METRICS, "collisions", "limits_passed", "sent_bytes", "longest_delay")
+"""Of runs.csv; lengths in metres, times in seconds, speeds in m/s. An empty cell is undefined."""
+COMPARED = ("path_error_max", "path_error_mean", "time_difference_mean", "speed_error")
+
+
+def _cell(value: float | int | str | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
+
+
+def _row(row: Row) -> list[str]:
+    values: list[Any] = [*row.group, row.seed, *(getattr(row.metrics, name) for name in METRICS)]
+    return [
+        _cell(value) for value in (*values, row.collisions, row.limits_passed, row.sent_bytes, row.longest_delay)
+    ]
+
+
+def _estimate(found: Estimate | None) -> dict[str, float] | None:
+    if found is None:
+        return None
+    return {name: float(_cell(value)) for name, value in found._asdict().items()}
+
+
+def summary(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]:
+    """The groups and their paired tests, as JSON takes them; the same rows give the same."""
+    groups = grouped(rows)
+    return {
+        "schema": SCHEMA,
+        "settings": settings,
+        "groups": [_group(group) for group in groups],
+        "paired": [
+            {
+                "metric": found.metric,
+                "first": dict(zip(KEYS, found.first, strict=True)),
+                "second": dict(zip(KEYS, found.second, strict=True)),
+                "difference": _estimate(found.difference),
+                "verdict": found.verdict,
+            }
+            for first, second in combinations(groups, 2)
+            # The same network, robot and operator.
+            if first.key[2:] == second.key[2:]
+            for metric in COMPARED
+            if (found := paired(first, second, metric)) is not None
+        ],
+    }
+
+
+def _group(group: Group) -> dict[str, Any]:
+    return {
+        **dict(zip(KEYS, group.key, strict=True)),
+        "runs": len(group.rows),
+        "collisions": sum(row.collisions for row in group.rows),
+        "limits_passed": sum(row.limits_passed for row in group.rows),
+        "mean": {name: _estimate(group.mean(name)) for name in METRICS},
+        "median": {name: _estimate(group.median(name)) for name in METRICS},
+        "largest": {name: float(_cell(max(found))) if (found := group.values(name)) else None for name in METRICS},
+    }
+
+
+def write(rows: Sequence[Row], settings: dict[str, Any], figures: Sequence[Figure], out: Path) -> None:
+    """Write runs.csv, summary.json and the pictures into an existing directory.
+
+    Raises:
+        FormatError: If it can't hold them.
+    """
+    try:
+        with (out / "runs.csv").open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(COLUMNS)
+            table.writerows(_row(row) for row in rows)
+        text = json.dumps(summary(rows, settings), indent=2, ensure_ascii=False, allow_nan=False)
+        (out / "summary.json").write_text(text + "\n", encoding="utf-8")
+        for figure in figures:
+            (out / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
+    except OSError as error:
+        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
+
+
+def rich_table(rows: Sequence[Row]) -> RichTable:
+    """Medians of the groups with their 95 % intervals, and the worst path error."""
+    from rich.table import Table
+
+    groups = grouped(rows)
+    # What is the same in all rows is said once.
+    varying = [k for k in range(len(KEYS)) if len({group.key[k] for group in groups}) > 1 or k == 0]
+    same = ", ".join(groups[0].key[k] for k in range(len(KEYS)) if k not in varying)
+    title = f"{same}; " if same else ""
+    table = Table(
+        title=f"{title}medians of {len(groups[0].rows)} runs [95 % interval]".replace("[", r"\["),
+        title_justify="left",
+    )
+    for k in varying:
+        table.add_column(KEYS[k])
+    for name in (
+        "largest path error, cm",
+        "worst, cm",
+        "time difference, s",
+        "speed error, cm/s",
+        "progress, %",
+        "collisions",
+    ):
+        table.add_column(name, justify="right")
+    for group in groups:
+        path, late = group.median("path_error_max"), group.median("time_difference_mean")
+        speed, progress = group.median("speed_error"), group.median("progress")
+        table.add_row(
+            *(group.key[k] for k in varying),
+            _said(path, 100),
+            f"{100 * max(group.values('path_error_max')):.1f}",
+            _said(late, 1, 2),
+            _said(speed, 100),
+            "" if progress is None else f"{100 * progress.value:.1f}",
+            str(sum(row.collisions for row in group.rows)),
+        )
+    return table
+
+
+def _said(found: Estimate | None, scale: float, digits: int = 1) -> str:
+    if found is None:
+        return ""
+    value, low, high = (f"{scale * x:.{digits}f}" for x in found)
+    return f"{value} [{low}, {high}]".replace("[", r"\[")

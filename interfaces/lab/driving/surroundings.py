@@ -1,0 +1,108 @@
+"""The extended architecture's parts for a real robot in its room: map, sonar, supervisor, avoidance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from interfaces.teleop.architectures import Controller, Following, OperatorSurroundings, RobotSurroundings
+from robots.bullet.rooms import EMPTY
+from robots.ipr.floor_plan import FloorPlan
+from robots.ipr.parameters import CELL, CELLS
+from robots.ipr.robot import MobileRobot
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
+from robots.onboard.driving import Posture
+from robots.onboard.movers import MoversConfig, MoverTracker
+from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
+from robots.onboard.yielding import Yielding, YieldingConfig
+from vrs.mobile import Avoidance, Grid, MobileModel, VirtualEnvironment
+
+_ROUNDING = 1e-9
+MARGIN = 0.02
+"""Of the virtual robot's circle round the real one's outline [m]."""
+
+
+class BodySonar:
+    """A real robot's sonars."""
+
+    def __init__(self, body: MobileRobot) -> None:
+        """Take the robot."""
+        self._body = body
+
+    def scan(self) -> tuple[float, Sequence[float]] | None:
+        """See `interfaces.teleop.architectures.surroundings.Sonar`."""
+        scan = self._body.sonar
+        return None if scan is None else (scan.time, scan.ranges.tolist())
+
+
+def grid_of(body: MobileRobot, start: Posture) -> Grid:
+    """Cells of the robot's room; where there's none, the paper's number of them around the start."""
+    room = body.room
+    if room is EMPTY:
+        return Grid(CELLS, CELL, (start.x - CELLS[0] * CELL / 2, start.y - CELLS[1] * CELL / 2))
+    m, n = (math.ceil(size / CELL - _ROUNDING) for size in (room.length, room.width))
+    return Grid((m, n), CELL)
+
+
+def operator_surroundings(body: MobileRobot, start: Posture, model: MobileModel) -> OperatorSurroundings:
+    """The virtual environment with the room's known map, and what keeps the virtual robot out of it.
+
+    Args:
+        body: The real robot, for its room and its size.
+        start: Where both robots begin.
+        model: The virtual robot.
+    """
+    grid, chassis = grid_of(body, start), body.chassis
+    known = _known(body, grid, 0.0)
+    environment = VirtualEnvironment(grid.shape, cell=grid.cell, origin=grid.origin, walls=known)
+    outline = _outline(body)
+    radius = math.hypot(max(outline.front, outline.rear), chassis.width / 2) + MARGIN
+    return OperatorSurroundings(environment, Avoidance(model.limits, radius, period=model.period))
+
+
+def robot_surroundings(
+    body: MobileRobot, start: Posture, controller: Controller, period: float
+) -> RobotSurroundings:
+    """What the real robot has on board of it.
+
+    Args:
+        body: The real robot, with sonars.
+        start: Where it begins.
+        controller: What drives it.
+        period: Between two drives [s].
+    """
+    near, far = body.chassis.sonar_reach
+    mounts = tuple(
+        SonarMount(x, y, angle)
+        for (x, y), angle in zip(body.sonar_places.tolist(), body.sonar_angles.tolist(), strict=True)
+    )
+    sonar = body.senses.sonar
+    half_cone = 0.0 if sonar is None else sonar.half_angle
+    grid = grid_of(body, start)
+    seen = SupervisorConfig(mounts, half_cone=half_cone, range_min=near, range_max=far)
+    outline = _outline(body)
+    careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
+    avoidance = ObstacleAvoidance(careful)
+    return RobotSurroundings(
+        BodySonar(body),
+        EnvironmentSupervisor(grid, _known(body, grid, body.chassis.sonar_height), seen),
+        avoidance,
+        MoverTracker(MoversConfig(mounts)),
+        Yielding(YieldingConfig(outline), avoidance),
+        controller if isinstance(controller, Following) else None,
+    )
+
+
+def _outline(body: MobileRobot) -> Outline:
+    chassis = body.chassis
+    half = chassis.length / 2
+    return Outline(half + chassis.centre_x, half - chassis.centre_x, chassis.width / 2)
+
+
+def _known(body: MobileRobot, grid: Grid, height: float) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    """Cells of the known map's things that are at least so high [m]; none where there's no room."""
+    if body.room is EMPTY:
+        return np.zeros(grid.shape, bool)
+    return FloorPlan(body.room.known(), height).grid(grid.cell, grid.shape, 0.0)

@@ -1,0 +1,196 @@
+"""Many runs: a table of all, means and medians with intervals, and paired tests between architectures."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields
+from itertools import product
+
+import numpy as np
+
+from interfaces.lab.driving.run import Case, run
+from interfaces.lab.running import MOST_WORKERS
+from interfaces.lab.statistics import Estimate, bootstrap, median
+from interfaces.teleop.architectures import Transport
+from vrs.comparison import PathComparison
+from vrs.errors import InvalidValueError
+
+METRICS = tuple(item.name for item in fields(PathComparison))
+"""Names of the metrics, as in files."""
+LEAST_PROGRESS = 0.97
+"""Below it the means of a run aren't compared: what a robot never reached has no delay."""
+EQUAL = 0.10
+"""Figures nearer than this share are called equal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A run, in figures."""
+
+    architecture: str
+    transport: str
+    delay: str
+    robot: str
+    operator: str
+    seed: int
+    metrics: PathComparison
+    collisions: int
+    limits_passed: int
+    """Drives beyond a limit."""
+    sent_bytes: int
+    longest_delay: float
+    """Of a packet that was sent while the operator drove [s]."""
+
+    @property
+    def group(self) -> tuple[str, ...]:
+        """What it's one of several seeds of."""
+        return self.architecture, self.transport, self.delay, self.robot, self.operator
+
+
+def measure(case: Case) -> Row:
+    """Run a case and keep its figures."""
+    drive = run(case)
+    return Row(
+        case.architecture, case.transport.value, case.delay, case.robot, case.operator, case.seed,
+        drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,
+        float(drive.delays[:, 1].max(initial=0.0)),
+    )  # fmt: skip
+
+
+def cases(
+    architectures: Sequence[str],
+    transports: Sequence[Transport],
+    delays: Sequence[str],
+    robots: Sequence[str],
+    operators: Sequence[str],
+    seeds: Iterable[int],
+    length: float,
+) -> list[Case]:
+    """All combinations, the seeds of one group side by side."""
+    return [
+        Case(architecture, transport, delay, robot, who, seed, length)
+        for delay, robot, who, architecture, transport, seed in product(
+            delays, robots, operators, architectures, transports, seeds
+        )
+    ]
+
+
+def sweep(
+    chosen: Sequence[Case],
+    *,
+    workers: int = 1,
+    work: Callable[[Case], Row] = measure,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Row]:
+    """Run all cases, some at once; the rows are in the order of the cases, and don't depend on the workers.
+
+    Args:
+        chosen: What to run.
+        workers: Processes at once, 1 to 64.
+        work: What makes a row of a case; in other processes, a function of a module.
+        progress: Told when a run is done.
+
+    Raises:
+        InvalidValueError: If there are too few or too many workers.
+    """
+    if not 1 <= workers <= MOST_WORKERS:
+        raise InvalidValueError("workers", workers, f"1 to {MOST_WORKERS}")
+    rows = []
+    if workers == 1:
+        for case in chosen:
+            rows.append(work(case))
+            progress()
+        return rows
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        try:
+            for row in pool.map(work, chosen):
+                rows.append(row)
+                progress()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """All seeds of one combination."""
+
+    key: tuple[str, ...]
+    """Architecture, transport, delay, robot, operator."""
+    rows: tuple[Row, ...]
+
+    def values(self, metric: str) -> list[float]:
+        """A metric of each run that has it."""
+        found = (getattr(row.metrics, metric) for row in self.rows)
+        return [value for value in found if value is not None]
+
+    def mean(self, metric: str) -> Estimate | None:
+        """Its mean over runs with its interval; None if no run has it."""
+        values = self.values(metric)
+        return bootstrap(values, 0) if values else None
+
+    def median(self, metric: str) -> Estimate | None:
+        """Its median over runs with its interval; None if no run has it."""
+        values = self.values(metric)
+        return bootstrap(values, 0, median) if values else None
+
+
+def grouped(rows: Iterable[Row]) -> list[Group]:
+    """The rows by combination, in the order of the first of each."""
+    found: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.group, []).append(row)
+    return [Group(key, tuple(members)) for key, members in found.items()]
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """A metric of one combination beside another's, seed by seed."""
+
+    metric: str
+    first: tuple[str, ...]
+    second: tuple[str, ...]
+    difference: Estimate
+    """Mean of first − second, with its interval."""
+    verdict: str
+    """`below`, `above` (the interval doesn't touch zero), `equal` (within 10 %) or `unclear`."""
+
+
+def paired(first: Group, second: Group, metric: str) -> Paired | None:
+    """Compare two combinations in a metric; None if they have no seeds in common that have it.
+
+    Time differences and speeds of runs with a progress below 97 % are taken by their bound, or not at all.
+    """
+    one, other = ({row.seed: _comparable(row, metric) for row in group.rows} for group in (first, second))
+    pairs = [
+        (a, b) for seed, a in one.items() if a is not None and (b := other.get(seed)) is not None
+    ]  # fmt: skip
+    if not pairs:
+        return None
+    a, b = np.array(pairs).T
+    difference = bootstrap(a - b, 0)
+    if difference.high < 0:
+        verdict = "below"
+    elif difference.low > 0:
+        verdict = "above"
+    else:
+        verdict = "unclear"
+    if abs(a.mean() - b.mean()) <= EQUAL * max(abs(a.mean()), abs(b.mean())):
+        verdict = "equal"
+    return Paired(metric, first.key, second.key, difference, verdict)
+
+
+def _comparable(row: Row, metric: str) -> float | None:
+    whole = row.metrics.progress is not None and row.metrics.progress >= LEAST_PROGRESS
+    if metric == "time_difference_mean" and not whole:
+        metric = "time_difference_bound"
+    elif metric == "speed_error" and not whole:
+        return None
+    value: float | None = getattr(row.metrics, metric)
+    return value

@@ -1,0 +1,327 @@
+"""Section 4: path error and time difference of the architectures, in simulation and in experiment.
+
+The paper's simulation is a robot like the model; its experiment the micro-robot under an overhead camera. Both are
+run here, the 75 kg robot in PyBullet too, each under four of the measured networks. `III-capped` and `timeline` are
+ours, beside them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.driving.pictures import of_drives
+from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.statistics import Estimate, bootstrap, median
+from interfaces.teleop.architectures import Transport
+from robots.ipr.reality import MobileReality
+from vrs.comparison import PathComparison, summed_up
+from vrs.model import Array
+
+PROFILES: Final = ("domain", "mon", "wed", "thu")
+TAU: Final = "3.3"
+"""Correlation time of the delays [s]: 0.97 over a tenth of a second."""
+IDEAL: Final = "model"
+ROBOTS: Final = (IDEAL, "micro", "ipr")
+"""The robot that is like its model, and the two in PyBullet."""
+COMPOSITIONS: Final = (
+    ("I", Transport.STREAM),
+    ("II", Transport.STREAM),
+    ("III", Transport.STREAM),
+    ("III-capped", Transport.STREAM),
+    ("timeline", Transport.STREAM),
+    ("timeline", Transport.DATAGRAMS),
+)
+CASES: Final = tuple(f"{robot} {profile}" for robot in ROBOTS for profile in PROFILES)
+WHOLE: Final = 0.97
+"""Progress below which the bound of the time difference stands for it."""
+SECTION: Final = "Section 4"
+
+
+class Seen(NamedTuple):
+    """Figures of a run."""
+
+    path: PathComparison
+    growth_error: float
+    """Mean path error in the last third less that in the first [m]."""
+    growth_late: float
+    """Mean time difference in the last third of the path less that in the first [s]."""
+    collisions: int
+    limits_passed: int
+
+    @property
+    def late(self) -> float:
+        """Mean time difference, or its bound [s]."""
+        whole = (self.path.progress or 0.0) >= WHOLE
+        found = self.path.time_difference_mean if whole else self.path.time_difference_bound
+        return math.inf if found is None else found
+
+    @property
+    def worst(self) -> float:
+        """Largest path error [m]."""
+        return self.path.path_error_max or 0.0
+
+
+class Found(NamedTuple):
+    """Of one robot under one network."""
+
+    runs: dict[str, tuple[Seen, ...]]
+    """By composition, a run a seed."""
+    first: dict[str, Drive]
+    """The first seed's runs, for pictures; none but where one is drawn."""
+
+
+def name(architecture: str, transport: Transport) -> str:
+    """A composition in words."""
+    return (
+        architecture
+        if transport is Transport.STREAM and architecture != "timeline"
+        else f"{architecture}, {transport}"
+    )
+
+
+def case_of(robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float) -> Case:
+    """A run of the table."""
+    if robot == IDEAL:
+        reality = MobileReality.ideal(dt=1 / 60)
+        return Case(architecture, transport, f"{profile}@{TAU}", "bare", seed=seed, length=length, reality=reality)
+    return Case(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
+
+
+def seen(drive: Drive) -> Seen:
+    """Sum up a run."""
+    match = drive.match()
+    driven = match.distance[match.t <= drive.case.length]
+    late = match.time_difference[1]
+    return Seen(
+        summed_up(match), _growth(driven), _growth(late), drive.collisions, drive.limits_passed()
+    )  # fmt: skip
+
+
+def _growth(values: Array) -> float:
+    third = len(values) // 3
+    return float(values[-third:].mean() - values[:third].mean()) if third else 0.0
+
+
+DRAWN: Final = ("model thu", "micro thu")
+"""Cases whose first runs are drawn: like Figures 11, 12 and 15, 16."""
+
+
+def work(study: Study, case: str) -> Found:
+    """All compositions and seeds of a case."""
+    robot, profile = case.split()
+    runs: dict[str, tuple[Seen, ...]] = {}
+    first: dict[str, Drive] = {}
+    for architecture, transport in COMPOSITIONS:
+        found = []
+        for k in range(study.runs):
+            drive = run(case_of(robot, profile, architecture, transport, study.seed + k, study.length))
+            found.append(seen(drive))
+            if k == 0 and case in DRAWN:
+                first[name(architecture, transport)] = drive
+        runs[name(architecture, transport)] = tuple(found)
+    return Found(runs, first)
+
+
+def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
+    """The paper's claims, then ours."""
+    found: dict[str, Found] = dict(zip(CASES, results, strict=True))
+    figures = []
+    for case in DRAWN:
+        robot, profile = case.split()
+        drawn = of_drives(found[case].first, f"{robot}, {profile}, seed {study.seed}")
+        figures += [replace(picture, name=f"{robot}_{picture.name}") for picture in drawn]
+    claims = (*_papers(study, found), *_ours(study, found))
+    return Findings(claims, (_table(found),), tuple(figures))
+
+
+def _pooled(found: dict[str, Found], robots: Sequence[str], who: str, value: Callable[[Seen], float]) -> Array:
+    """A figure of every seed under every network."""
+    return np.array([value(one) for case in CASES if case.split()[0] in robots for one in found[case].runs[who]])
+
+
+def _above_zero(text: str, source: str, values: Array, seed: int) -> Claim:
+    estimate = bootstrap(values, seed)
+    return Claim(text, source, "over 0", estimate.value, estimate.low > 0, estimate.interval)
+
+
+def _papers(study: Study, found: dict[str, Found]) -> tuple[Claim, ...]:
+    def of(robots: Sequence[str], who: str, value: Callable[[Seen], float]) -> Array:
+        return _pooled(found, robots, who, value)
+
+    sim, real = (IDEAL,), ("micro", "ipr")
+    slow = [f"{IDEAL} {profile}" for profile in PROFILES if profile != "domain"]
+    grown = np.array([one.growth_late for case in slow for one in found[case].runs["II"]])
+    ii_sim = bootstrap(of(sim, "II", _largest), study.seed, median)
+    iii_real = bootstrap(of(real, "III", _largest), study.seed, median)
+    return (
+        _above_zero(
+            "I: the path error accumulates, last third less first third [cm]",
+            f"{SECTION}.1, Fig. 12(a)",
+            of(sim, "I", lambda one: 100 * one.growth_error),
+            study.seed,
+        ),
+        Claim(
+            "II keeps the path in simulation: median of the largest path error [cm]",
+            f"{SECTION}.1, Fig. 12(c)", "under 2", ii_sim.value, ii_sim.high < 2.0, ii_sim.interval,
+        ),
+        _above_zero(
+            "II: the time difference grows (mon, wed, thu), last third less first third [s]",
+            f"{SECTION}.1, Fig. 12(d)",
+            grown,
+            study.seed,
+        ),
+        _above_zero(
+            "III has a smaller path error than I in simulation: I − III, largest [cm]",
+            f"{SECTION}.1, Fig. 12(e)",
+            of(sim, "I", _largest) - of(sim, "III", _largest),
+            study.seed,
+        ),
+        _above_zero(
+            "III has a smaller time difference than II (mon, wed, thu): II − III, mean [s]",
+            f"{SECTION}.1, Fig. 12(f)",
+            np.array([a.late - b.late for case in slow for a, b in _pairs(found[case], "II", "III")]),
+            study.seed,
+        ),
+        _above_zero(
+            "II's path error is large in the experiment: experiment − simulation, largest [cm]",
+            f"{SECTION}.2, Fig. 16(c)",
+            of(("micro",), "II", _largest) - of(sim, "II", _largest),
+            study.seed,
+        ),
+        Claim(
+            "III's path error stays small in the experiment: median of the largest [cm]",
+            f"{SECTION}.2, Fig. 16(e)", "under 10", iii_real.value, iii_real.high < 10.0, iii_real.interval,
+        ),
+        _above_zero(
+            "III has a smaller path error than II in the experiment: II − III, largest [cm]",
+            f"{SECTION}.2, Fig. 16",
+            of(real, "II", _largest) - of(real, "III", _largest),
+            study.seed,
+        ),
+    )  # fmt: skip
+
+
+def _pairs(found: Found, first: str, second: str) -> list[tuple[Seen, Seen]]:
+    return list(zip(found.runs[first], found.runs[second], strict=True))
+
+
+STREAMED: Final = name("timeline", Transport.STREAM)
+REPEATED: Final = name("timeline", Transport.DATAGRAMS)
+SHARES: Final = {"mon": 0.75, "wed": 0.6, "thu": 0.6}
+"""Largest share of III's time difference that `timeline` on datagrams may have."""
+
+
+class _Asked:
+    """Claims about one robot under one network, as they are asked."""
+
+    def __init__(self, study: Study, profile: str, runs: dict[str, tuple[Seen, ...]]) -> None:
+        self.claims: list[Claim] = []
+        self.runs, self._seed, self._profile = runs, study.seed, profile
+
+    def most(self, text: str, bar: float, measured: float | Estimate) -> None:
+        """It must be no more than the bar."""
+        value = measured.value if isinstance(measured, Estimate) else measured
+        interval = measured.interval if isinstance(measured, Estimate) else None
+        asked = f"{bar:.4g} at most"
+        self.claims.append(Claim(f"{self._profile}: {text}", "timeline", asked, value, value <= bar, interval))
+
+    def more(self, text: str, first: str, second: str, value: Callable[[Seen], float]) -> None:
+        """A figure of the first must be above that of the second, seed by seed."""
+        pairs = zip(self.runs[first], self.runs[second], strict=True)
+        found = bootstrap([value(a) - value(b) for a, b in pairs], self._seed)
+        text = f"{self._profile}: {text}: {first} − {second}"
+        self.claims.append(Claim(text, "timeline", "over 0", found.value, found.low > 0, found.interval))
+
+    def mean(self, who: str, value: Callable[[Seen], float]) -> float:
+        """A figure's mean over seeds."""
+        return float(np.mean([value(one) for one in self.runs[who]]))
+
+    def median(self, who: str, value: Callable[[Seen], float]) -> Estimate:
+        """A figure's median over seeds."""
+        return bootstrap([value(one) for one in self.runs[who]], self._seed, median)
+
+
+def _largest(one: Seen) -> float:
+    return 100 * one.worst
+
+
+def _late(one: Seen) -> float:
+    return one.late
+
+
+def _speed(one: Seen) -> float:
+    return 100 * (one.path.speed_error or 0.0)
+
+
+def _ours(study: Study, found: dict[str, Found]) -> list[Claim]:
+    """What III and `timeline` must show on the 75 kg robot, network by network."""
+    claims: list[Claim] = []
+    for profile in PROFILES:
+        asked = _Asked(study, profile, found[f"ipr {profile}"].runs)
+        slow = profile != "domain"
+        asked.more("largest path error [cm]", "I", "III", _largest)
+        for other in ("I", "II") if slow else ():
+            asked.more("mean time difference [s]", other, "III", _late)
+        for who in (STREAMED, REPEATED):
+            _kept(asked, who, slow=slow, share=profile in ("wed", "thu"))
+        third = asked.mean("III", _late)
+        streamed, repeated = (asked.mean(who, _late) for who in (STREAMED, REPEATED))
+        asked.most(f"{STREAMED}: mean time difference as a share of III's", 1.1, streamed / third)
+        if slow:
+            asked.most(f"{REPEATED}: mean time difference as a share of III's", SHARES[profile], repeated / third)
+        else:
+            asked.most(f"{REPEATED}: mean time difference [s]", 0.5, repeated)
+        claims += asked.claims
+    return claims
+
+
+def _kept(asked: _Asked, who: str, *, slow: bool, share: bool) -> None:
+    """The path, the progress, the speeds and the limits that `timeline` keeps on a transport."""
+    middle, capped = (asked.median(name, _largest) for name in (who, "III-capped"))
+    asked.most(f"{who}: largest path error, median [cm]", 2.0, middle)
+    asked.most(f"{who}: largest path error, worst seed [cm]", 5.0, max(map(_largest, asked.runs[who])))
+    asked.most(f"{who}: its median less III-capped's [cm]", 0.2, middle.value - capped.value)
+    if share:
+        share_of = asked.mean(who, _largest) / asked.mean("III", _largest)
+        asked.most(f"{who}: largest path error, mean, as a share of III's", 0.2, share_of)
+    missed = max(1.0 - (one.path.progress or 0.0) for one in asked.runs[who])
+    asked.most(f"{who}: largest share of the path not reached", 1.0 - WHOLE, missed)
+    if slow:
+        asked.more("speed-profile error [cm/s]", "III", who, _speed)
+    broken = sum(one.collisions + one.limits_passed for one in asked.runs[who])
+    asked.most(f"{who}: collisions and limits passed", 0, broken)
+
+
+def _table(found: dict[str, Found]) -> Table:
+    rows = []
+    for case in CASES:
+        robot, profile = case.split()
+        for who, runs in found[case].runs.items():
+            largest = [100 * one.worst for one in runs]
+            rows.append((
+                robot, profile, who, float(np.median(largest)), max(largest),
+                float(np.mean([100 * (one.path.path_error_mean or 0.0) for one in runs])),
+                float(np.mean([one.late for one in runs])),
+                float(np.mean([100 * (one.path.speed_error or 0.0) for one in runs])),
+                float(min(one.path.progress or 0.0 for one in runs)),
+                sum(one.collisions for one in runs),
+            ))  # fmt: skip
+    columns = (
+        "robot",
+        "network",
+        "architecture",
+        "largest path error, median [cm]",
+        "worst [cm]",
+        "path error, mean [cm]",
+        "time difference [s]",
+        "speed error [cm/s]",
+        "least progress",
+        "collisions",
+    )
+    return Table("architectures", f"Architectures, correlation time {TAU} s", columns, tuple(rows))

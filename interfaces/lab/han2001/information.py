@@ -1,0 +1,124 @@
+"""Section 2.3, Fig. 3 and 4: what a delay does to a sine, and how many commands then come at once."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
+from interfaces.lab.drawing import REAL, VIRTUAL, draw, legend
+from interfaces.lab.statistics import bootstrap
+from interfaces.link import Channel, Conditions, Service, delay_profile
+from interfaces.link.delay import DelaySource
+from vrs.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+T: Final = 0.1
+"""Sampling time [s]."""
+LASTING: Final = 60.0
+"""Of the sine [s]: six periods."""
+DELAYS: Final = (0.05, 0.25, 0.53, 1.0, 2.35, 7.77)
+"""T_d of Fig. 4 [s]."""
+PROFILE: Final = "country"
+"""Of Fig. 3: the paper's long connection."""
+
+
+class OneLate:
+    """A delay profile for one command that is late, the others not."""
+
+    name = "one late"
+
+    def __init__(self, delay: float) -> None:
+        """Take how late it is [s]."""
+        self._delay = delay
+
+    def source(self, rng: np.random.Generator) -> DelaySource:  # noqa: ARG002
+        """Begin with the late one."""
+        return _OneLate(self._delay)
+
+    def quantile(self, share: float) -> float:  # noqa: ARG002
+        """Of all but the first."""
+        return 0.0
+
+
+class _OneLate:
+    def __init__(self, delay: float) -> None:
+        self._delay = delay
+
+    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+        delay, self._delay = self._delay, 0.0
+        return delay
+
+
+def commands_at_once(T_d: float) -> int:
+    """How many commands an ordered link holds back behind one that takes T_d [s]."""
+    way: Channel[int] = Channel(Conditions(delay=OneLate(T_d), service=Service.IN_ORDER), np.random.default_rng(0))
+    for k in range(math.ceil(T_d / T) + 10):
+        way.send(k, k * T)
+    arrivals = [found.arrived for found in way.receive(math.inf if T_d == math.inf else T_d + 100.0)]
+    # The late one itself isn't one of them.
+    return sum(abs(arrived - arrivals[0]) < 1e-9 for arrived in arrivals[1:])
+
+
+def received(seed: int) -> tuple[Array, Array, Array]:
+    """The sine as it's sent, and as the last command received says: times, sent, received, (k,) each."""
+    way: Channel[float] = Channel(
+        Conditions(delay=delay_profile(PROFILE), service=Service.IN_ORDER), np.random.default_rng([seed, 3])
+    )
+    t: Array = T * np.arange(round(LASTING / T), dtype=np.float64)
+    sent: Array = 5.0 * np.sin(0.2 * math.pi * t) + 5.0
+    there = np.empty_like(t)
+    value = 5.0
+    for k, now in enumerate(t.tolist()):
+        way.send(float(sent[k]), now)
+        for found in way.receive(now):
+            value = found.payload
+        there[k] = value
+    return t, sent, there
+
+
+def work(study: Study, case: str) -> Findings:  # noqa: ARG001
+    """Both figures."""
+    counts = [(T_d, math.floor(T_d / T + 1e-9), commands_at_once(T_d)) for T_d in DELAYS]
+    runs = [received(study.seed + k) for k in range(study.runs)]
+    lost = bootstrap([float(np.sqrt(np.mean((there - sent) ** 2))) for _, sent, there in runs], study.seed)
+    share = lost.value / (5.0 / math.sqrt(2.0))
+    columns = ("T_d [s]", "⌊T_d/T⌋", "counted")
+    wrong = sum(expected != found for _, expected, found in counts)
+    return Findings(
+        claims=(
+            Claim(
+                "N = ⌊T_d/T⌋ commands come at once with one that is T_d late: delays for which it isn't so",
+                "Section 2.3, Fig. 4",
+                0,
+                wrong,
+                wrong == 0,
+            ),
+            Claim(
+                f"a 0.1 Hz sine is distorted severely under {PROFILE}: rms error as a share of its own rms",
+                "Section 2.3, Fig. 3",
+                "over 0.5",
+                share,
+                lost.low / (5.0 / math.sqrt(2.0)) > 0.5,
+                (lost.low / (5.0 / math.sqrt(2.0)), lost.high / (5.0 / math.sqrt(2.0))),
+            ),
+        ),
+        tables=(Table("commands_at_once", "Commands at once, T = 0.1 s", columns, tuple(counts)),),
+        figures=(_figure(*runs[0]),),
+    )
+
+
+def _figure(t: Array, sent: Array, there: Array) -> Figure:
+    def paint(canvas: Canvas) -> None:
+        ax = canvas.subplots()
+        ax.plot(t, sent, color=VIRTUAL, label="sent")
+        ax.step(t, there, where="post", color=REAL, label="received")
+        ax.set_xlabel("time [s]")
+        ax.set_ylabel("y(t)")
+        legend(ax, columns=2, place="upper right")
+
+    return draw("fig3", f"A sine through the internet ({PROFILE}), Fig. 3", paint)

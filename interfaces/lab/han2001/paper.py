@@ -1,0 +1,21 @@
+"""The parts of the reproduction, in the paper's order."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from interfaces.lab.claims import Paper, Part
+from interfaces.lab.han2001 import architectures, filtering, information
+
+PAPER: Final = Paper(
+    "han2001",
+    "Han, Kim, Kim, Kim: Internet Control Architecture for Internet-Based Personal Robot, "
+    "Autonomous Robots 10, 2001",
+    (
+        Part.single("Information loss", information.work),
+        Part.single("Command filter", filtering.work),
+        Part("Architectures", architectures.work, architectures.conclude, architectures.CASES),
+    ),
+    length=120.0,
+)
+"""As `vrs reproduce han2001` runs it."""

@@ -1,0 +1,66 @@
+"""The architectures by name: which controller each is, with one set of constants for every network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from interfaces.teleop.architectures.controllers import (
+    Controller,
+    Filtered,
+    Following,
+    Immediate,
+    Player,
+    PlayerConfig,
+)
+from robots.onboard.driving import Posture
+from robots.onboard.path_following import FieldLaw, PathFollowingConfig
+from vrs.checks import number_in, one_of
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """Of all architectures; none is chosen by the network."""
+
+    period: float = 0.1
+    """T: between the operator's commands [s]."""
+    processing: float = 0.01
+    """T_p: to make a piece of the path of one command [s], shorter than T."""
+    following: PathFollowingConfig = field(default_factory=PathFollowingConfig)
+    """Of the uni-vector field, III."""
+    player: PlayerConfig = field(default_factory=PlayerConfig)
+    """Of the `timeline` architecture."""
+
+    def __post_init__(self) -> None:
+        number_in("period", self.period, 0.01, 1.0, unit=" s")
+        number_in("processing", self.processing, 1e-4, self.period, unit=" s")
+
+
+def _following(law: FieldLaw) -> Callable[[Constants, Posture], Controller]:
+    return lambda c, posture: Following(posture, law, c.following, period=c.period, processing=c.processing)
+
+
+ARCHITECTURES: Final[dict[str, Callable[[Constants, Posture], Controller]]] = {
+    "I": lambda _, __: Immediate(),
+    "II": lambda c, _: Filtered(c.period),
+    "III": _following(FieldLaw.LITERAL),
+    "III-capped": _following(FieldLaw.CAPPED),
+    "extended": _following(FieldLaw.CAPPED),
+    "timeline": lambda c, posture: Player(posture, now=0.0, config=c.player),
+}
+"""What makes each architecture's controller, for a robot that begins at a posture at time 0."""
+
+
+def controller(name: str, posture: Posture, constants: Constants) -> Controller:
+    """Make an architecture's controller.
+
+    Args:
+        name: One of `ARCHITECTURES`.
+        posture: Where both robots begin.
+        constants: Of all architectures.
+
+    Raises:
+        InvalidValueError: If there's none of that name.
+    """
+    return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES)](constants, posture)

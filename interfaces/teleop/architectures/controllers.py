@@ -1,0 +1,201 @@
+"""What each architecture does with the operator's commands on board: five controllers with one interface.
+
+Source: Han, Kim, Kim, Kim, 2001, section 3.1, for I, II and III; `Player` is ours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from interfaces.teleop.architectures.segments import Packet
+from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
+from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
+from robots.onboard.driving import STAND, Drive, Posture
+from robots.onboard.path import MovingPath
+from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
+from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
+from robots.onboard.trajectory_tracking import TrackingConfig, TrajectoryTracker
+from vrs.segment import ArcSegment
+
+STARVED = 0.5
+"""Architecture I holds a command until the next, but no longer than this [s]: the robot's watchdog."""
+_ROUNDING = 1e-9
+"""Times nearer than this [s] are one."""
+
+
+class Controller(Protocol):
+    """Drives the robot by what comes from the operator; it knows no clock and is called once a control period."""
+
+    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:
+        """Take in a packet.
+
+        Args:
+            arcs: The operator's arcs whose turn it is now, in order, each once.
+            packet: What they came in.
+            now: By the robot's clock [s].
+        """
+
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
+        """Say what to drive until the next call.
+
+        Args:
+            posture: Where the robot takes itself to be.
+            now: By the robot's clock [s].
+            v_before: Linear speed that it was told to drive last [m/s].
+        """
+
+    @property
+    def executed(self) -> int:
+        """Index j of eq. (9): how many of the operator's commands the robot has executed."""
+
+
+class Immediate:
+    """Architecture I: what comes is driven at once. Of commands that come together all but the last are lost."""
+
+    def __init__(self) -> None:
+        """Stand until the first command."""
+        self._drive, self._until = STAND, -math.inf
+        self.executed = 0
+
+    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:  # noqa: ARG002
+        """Take the newest command."""
+        if arcs:
+            self._drive, self._until = Drive(arcs[-1].v, arcs[-1].w), now + STARVED
+            self.executed += len(arcs)
+
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:  # noqa: ARG002
+        """Hold it until the next, for a while."""
+        return self._drive if now < self._until - _ROUNDING else STAND
+
+
+class Filtered:
+    """Architecture II: the command filter gives late commands back their spacing T, eq. (11)–(13)."""
+
+    def __init__(self, period: float) -> None:
+        """Take T [s]."""
+        self._filter: CommandFilter[ArcSegment] = CommandFilter(CommandFilterConfig(period))
+        self._drive, self._until = STAND, -math.inf
+        self.executed = 0
+
+    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:  # noqa: ARG002
+        """Queue the commands."""
+        for arc in arcs:
+            self._filter.receive(arc, now=now)
+
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:  # noqa: ARG002
+        """Drive what the filter gave out last, for as long as the operator did."""
+        for output in self._filter.advance(now=now + _ROUNDING):
+            arc = output.command
+            self._drive, self._until = Drive(arc.v, arc.w), output.t + arc.duration
+            self.executed += 1
+        return self._drive if now < self._until - _ROUNDING else STAND
+
+
+class Following:
+    """Architecture III: the filter at T_p feeds the path generator; the uni-vector field follows the path."""
+
+    def __init__(
+        self, posture: Posture, law: FieldLaw, config: PathFollowingConfig, *, period: float, processing: float
+    ) -> None:
+        """Begin a path.
+
+        Args:
+            posture: Where it begins.
+            law: Eq. (14)–(15) literally, or capped.
+            config: Of the field.
+            period: T, what a command lasts [s].
+            processing: T_p, what one takes to become a piece of the path [s].
+        """
+        self._filter: CommandFilter[ArcSegment] = CommandFilter(CommandFilterConfig(processing))
+        self._path = MovingPath(posture)
+        self._generator = PathGenerator(self._path, PathGeneratorConfig(period))
+        self._controller = PathFollowingController(self._path, config, law=law)
+        self._arrival = config.arrival
+        self._ends: deque[float] = deque()
+        """Where on the path each command ends [m], of those that aren't executed."""
+        self.executed = 0
+
+    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:  # noqa: ARG002
+        """Queue the commands."""
+        for arc in arcs:
+            self._filter.receive(arc, now=now)
+
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
+        """Lengthen the path, and follow it."""
+        for output in self._filter.advance(now=now + _ROUNDING):
+            arc = output.command
+            self._generator.receive(arc.v, arc.w, duration=arc.duration)
+            self._ends.append(self._path.length)
+        drive = self._controller.control(posture, v_before=v_before)
+        place = self._controller.projection
+        # The last piece is left where the controller takes it as driven.
+        while place is not None and self._ends and self._ends[0] <= place.s + self._arrival:
+            self._ends.popleft()
+            self.executed += 1
+        return drive
+
+    @property
+    def direction(self) -> float:
+        """Where the field pointed at the last call [rad]."""
+        return self._controller.direction
+
+    @property
+    def left(self) -> float:
+        """Way on the known path to where the robot is to stand [m], as at the last call."""
+        place = self._controller.projection
+        return 0.0 if place is None else place.to_stop
+
+    @property
+    def nearest(self) -> tuple[float, float] | None:
+        """Where on the path the robot should be [m], as at the last call; None before it."""
+        place = self._controller.projection
+        return None if place is None else (place.x, place.y)
+
+
+@dataclass(frozen=True, slots=True)
+class PlayerConfig:
+    """How the `timeline` architecture plays. One set serves every delay."""
+
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    offset: OffsetConfig = field(default_factory=lambda: OffsetConfig(share=0.6))
+    """Of D. What comes later than that share makes the robot slow down and catch up, but not leave the path: so D
+    needn't cover the longest delays."""
+
+
+class Player:
+    """Architecture `timeline`: plays the operator's path D behind him, D adaptive, and tracks it."""
+
+    def __init__(self, posture: Posture, *, now: float, config: PlayerConfig) -> None:
+        """Begin where the operator's path does, by the robot's clock at `now` [s]."""
+        self._config = config
+        self._tracker = TrajectoryTracker(posture, 0.0, now=now, config=config.tracking)
+        self._offset = AdaptiveOffset(config.offset)
+        self.D: float | None = None
+        """How far behind the robot's clock it plays, D ≤ 0 [s]; None before the first packet."""
+        self._ends: deque[float] = deque()
+        """When each command ends [s], of those that aren't executed."""
+        self.executed = 0
+
+    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:
+        """Lengthen the known path, and learn how late it is."""
+        self._offset.heard(self._tracker.complete_until, now=now)
+        self.D = self._offset.D
+        if arcs:
+            known = arcs[-1].end
+            tail = packet.tail if abs(known - packet.complete_until) < _ROUNDING else ()
+            self._tracker.receive((*arcs, *tail), complete_until=known)
+            self._ends.extend(arc.end for arc in arcs)
+
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
+        """Play on."""
+        if self.D is not None:
+            self._tracker.aim(self.D - self._tracker.reserve)
+        drive = self._tracker.advance(posture, now=now, v_before=v_before)
+        while self._ends and self._ends[0] <= self._tracker.reference.t_play + _ROUNDING:
+            self._ends.popleft()
+            self.executed += 1
+        return drive

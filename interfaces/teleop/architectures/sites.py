@@ -1,0 +1,180 @@
+"""The two ends of every architecture, the same for all of them: the operator's site and the robot's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from interfaces.teleop.architectures.controllers import Controller
+from interfaces.teleop.architectures.segments import Packet, Receiver, Sender, Transport
+from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSurroundings, RobotSurroundings
+from robots.onboard.driving import STAND, Drive, Posture, kept
+from vrs import DriveCommand, Engine, ManualClock
+from vrs.mobile import DriveLimits, MobileEngine, MobileModel, PostureEstimator
+from vrs.mobile.kinematics import advanced
+from vrs.mobile.limiting import braking, limited
+from vrs.segment import ArcSegment, known_arc
+
+
+class Position(Protocol):
+    """Whatever tells a robot where it is."""
+
+    def posture(self) -> Posture:
+        """(x, y, θ) [m, m, rad], now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What the robot sends back."""
+
+    number: int
+    """It rises from report to report."""
+    executed: int
+    """j: how many commands the robot has executed."""
+    posture: Posture
+    """Where it takes itself to be."""
+    received: int
+    """How many arcs it has."""
+    changes: CellChanges | None = None
+    """What its supervisor saw change, in the extended architecture."""
+
+    @property
+    def size(self) -> int:
+        """What it takes on the wire [byte]."""
+        return 48 + (0 if self.changes is None else self.changes.size)
+
+
+class OperatorSite:
+    """The virtual robot, which answers at once; the posture estimator; and what is sent."""
+
+    def __init__(
+        self,
+        model: MobileModel,
+        posture: Posture,
+        transport: Transport,
+        *,
+        gain: float = 0.5,
+        surroundings: OperatorSurroundings | None = None,
+    ) -> None:
+        """Begin at rest at time 0.
+
+        Args:
+            model: The virtual robot.
+            posture: Where both robots begin.
+            transport: How packets go.
+            gain: K_e of the posture estimator, in [0, 1].
+            surroundings: The virtual environment that the virtual robot avoids, in the extended architecture.
+        """
+        self._clock = ManualClock(0.0)
+        engine = Engine(model, posture=posture, clock=self._clock)
+        assert isinstance(engine, MobileEngine)
+        self.engine: MobileEngine = engine
+        """The virtual robot: what the operator's commands make, without corrections."""
+        self.estimator = PostureEstimator(posture, gain=gain, period=model.period)
+        """Where the real robot is thought to be after all commands."""
+        self._sender = Sender(transport)
+        self._end = posture
+        self._model = model
+        self.surroundings = surroundings
+        """What the virtual robot avoids, if anything."""
+        self.before = STAND
+        """What was driven last."""
+
+    @property
+    def posture(self) -> Posture:
+        """Where the virtual robot is after all commands."""
+        return self._end
+
+    def drive(self, v: float, w: float, *, now: float) -> Packet:
+        """Carry out a command of the operator, as far as the limits allow.
+
+        Args:
+            v: Linear speed that he wants [m/s].
+            w: Angular speed that he wants [rad/s].
+            now: When it begins [s]: where the one before it ended, or later.
+
+        Returns:
+            What goes to the robot.
+        """
+        period = self._model.period
+        if self.surroundings is not None:
+            v, w = self.surroundings.command(Drive(v, w), self.before, self._end, now=now)
+        v, w = self.before = Drive(*limited((v, w), self.before, period, self._model.limits))
+        self._clock.advance(now - self._clock.now())
+        start = max(self.engine.timeline.end, now)
+        receipt = self.engine.execute(DriveCommand(v, w, period, execute_at=start))
+        self.estimator.command(v, w)
+        arc = known_arc(start, period, self._end, v, w, receipt.command_id)
+        self._sender.add(arc)
+        self._end = Posture(*advanced(self._end, v, w, period))
+        return self._sender.packet(arc.end, self._tail(arc))
+
+    def repeat(self) -> Packet:
+        """What goes to the robot while the operator gives no command."""
+        return self._sender.packet(self.engine.timeline.end)
+
+    def receive(self, report: Report, *, now: float) -> None:
+        """Correct the estimate, repeat no more what has arrived, and learn what changed around the robot [s]."""
+        if self.surroundings is not None and report.changes is not None:
+            self.surroundings.receive(report.changes, now=now)
+        self._sender.acknowledge(report.received)
+        self.estimator.feedback(report.executed, report.posture, report.number)
+
+    def _tail(self, arc: ArcSegment) -> list[ArcSegment]:
+        """How the virtual robot brakes, unless the operator goes on."""
+        start, posture, T = arc.end, self._end, self._model.period
+        tail = []
+        for v, w in braking((arc.v, arc.w), T, self._model.limits):
+            tail.append(known_arc(start, T, posture, v, w))
+            start, posture = start + T, Posture(*advanced(posture, v, w, T))
+        return tail
+
+
+class RobotSite:
+    """Takes packets, knows where the robot is, lets the architecture's controller drive, and reports."""
+
+    def __init__(
+        self,
+        controller: Controller,
+        position: Position,
+        limits: DriveLimits,
+        *,
+        period: float,
+        surroundings: RobotSurroundings | None = None,
+    ) -> None:
+        """Begin at rest.
+
+        Args:
+            controller: The architecture.
+            position: What tells where the robot is.
+            limits: That every drive keeps, whatever the controller says.
+            period: Between two drives [s].
+            surroundings: Sonar, its supervisor and obstacle avoidance, in the extended architecture.
+        """
+        self.controller = controller
+        self._surroundings = surroundings
+        self._position, self._limits, self._period = position, limits, period
+        self._receiver = Receiver()
+        self._drive = Drive(0.0, 0.0)
+        self._reports = 0
+        self.posture = position.posture()
+        """Where the robot took itself to be at the last drive."""
+
+    def receive(self, packet: Packet, *, now: float) -> None:
+        """Take in a packet [s]."""
+        self.controller.receive(self._receiver.receive(packet), packet, now=now)
+
+    def drive(self, *, now: float) -> Drive:
+        """What to drive for the next period."""
+        self.posture = self._position.posture()
+        wanted = self.controller.control(self.posture, now=now, v_before=self._drive.v)
+        if self._surroundings is not None:
+            wanted = self._surroundings.drive(wanted, self.posture, now=now, v_before=self._drive.v)
+        self._drive = kept(wanted.v, wanted.w, self._drive.v, self._period, self._limits)
+        return self._drive
+
+    def report(self, *, now: float) -> Report:
+        """What goes back to the operator now [s]."""
+        self._reports += 1
+        changes = None if self._surroundings is None else self._surroundings.changes(now=now)
+        return Report(self._reports, self.controller.executed, self.posture, self._receiver.count, changes)

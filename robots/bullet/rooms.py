@@ -1,0 +1,366 @@
+"""Rooms: floor plans from small text files, with walls, boxes, columns and people who walk timed paths.
+
+The format is line by line, `docs/ipr.md` has all of it:
+
+    room 1
+    name Furnished room
+    size 6 4
+    start 1 1 90
+    wall 0 0  6 0  thickness=0.1 height=2.4
+    box 3 2  1.2 0.6  angle_deg=30 height=0.75 unknown from=5 until=60
+    column 5 3 0.2
+    person 0.25 repeat  0,1,1  4,3,1  8,1,1
+
+Lengths in metres, times in seconds, angles in degrees; `#` begins a comment. A thing is unknown if the operator's
+map doesn't have it; people always are.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from vrs.errors import FormatError
+
+VERSION = 1
+"""Of the format."""
+MOST_BYTES = 262_144
+MOST_THINGS = 1000
+MOST_POINTS = 1000
+_MARGIN = 1.0
+_WALL_HEIGHT, _BOX_HEIGHT, _PERSON_HEIGHT = 2.4, 0.8, 1.7
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A box that stands on the floor, a wall among others."""
+
+    name: str
+    x: float
+    """Of its middle [m]."""
+    y: float
+    length: float
+    """Along its own first axis [m]."""
+    width: float
+    angle: float
+    """Of its first axis [rad]."""
+    height: float
+    known: bool = True
+    """Whether the operator's map has it."""
+    start: float = -math.inf
+    """It stands there in [start, end) [s]."""
+    end: float = math.inf
+
+    def stands(self, t: float) -> bool:
+        """Whether it's there at t [s]."""
+        return self.start <= t < self.end
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """An upright cylinder."""
+
+    name: str
+    x: float
+    y: float
+    radius: float
+    height: float
+    known: bool = True
+    start: float = -math.inf
+    """It stands there in [start, end) [s]."""
+    end: float = math.inf
+
+    def stands(self, t: float) -> bool:
+        """Whether it's there at t [s]."""
+        return self.start <= t < self.end
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A cylinder that walks along straight lines between places, at the times that belong to them."""
+
+    name: str
+    radius: float
+    height: float
+    times: tuple[float, ...]
+    """Ascending [s]."""
+    places: tuple[tuple[float, float], ...]
+    """Where at each time [m]."""
+    repeat: bool = False
+    """Whether the path begins again when it ended; it then ends where it began."""
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Where the person is at t [s]; before the first time at the first place, after the last at the last."""
+        times, places = self.times, self.places
+        if self.repeat and t > times[-1]:
+            t = times[0] + math.fmod(t - times[0], times[-1] - times[0])
+        k = bisect_right(times, t)
+        if k == 0:
+            return places[0]
+        if k == len(times):
+            return places[-1]
+        share = (t - times[k - 1]) / (times[k] - times[k - 1])
+        (x0, y0), (x1, y1) = places[k - 1], places[k]
+        return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+
+    @property
+    def speed(self) -> float:
+        """Fastest that the person walks [m/s]."""
+        steps = zip(self.times, self.places, self.times[1:], self.places[1:], strict=False)
+        return max((math.dist(p, q) / (b - a) for a, p, b, q in steps), default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """What stands and walks on a rectangular floor, 0 ≤ x ≤ length, 0 ≤ y ≤ width."""
+
+    name: str
+    length: float
+    """Along x [m]."""
+    width: float
+    """Along y [m]."""
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where a robot begins: x, y [m], heading [rad]."""
+    blocks: tuple[Block, ...] = ()
+    columns: tuple[Column, ...] = ()
+    people: tuple[Person, ...] = ()
+
+    @property
+    def things(self) -> tuple[Block | Column, ...]:
+        """Blocks, then columns."""
+        return *self.blocks, *self.columns
+
+    def known(self) -> Room:
+        """Return what the operator's map has: without unknown things and people."""
+        return Room(
+            self.name,
+            self.length,
+            self.width,
+            self.start,
+            tuple(block for block in self.blocks if block.known),
+            tuple(column for column in self.columns if column.known),
+        )
+
+
+EMPTY = Room("nothing", 200.0, 200.0)
+"""A floor and nothing on it, for a robot anywhere."""
+
+
+def read_room(text: str, where: str = "room") -> Room:
+    """Read a floor plan.
+
+    Args:
+        text: The plan.
+        where: What it's called in errors.
+
+    Raises:
+        FormatError: If it isn't one; the message names the line.
+    """
+    return _Reader(where).read(text)
+
+
+def load_room(path: Path | str) -> Room:
+    """Read a floor plan from a file; raises as `read_room`, and OSError if there's no such file."""
+    path = Path(path)
+    with path.open("rb") as file:
+        data = file.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise FormatError(path.name, f"longer than {MOST_BYTES} bytes")
+    try:
+        return read_room(data.decode("utf-8"), path.name)
+    except UnicodeDecodeError as error:
+        raise FormatError(path.name, f"no UTF-8 at byte {error.start}") from None
+
+
+_Options = dict[str, tuple[float, float, float]]
+"""Low, high and default of each option."""
+
+
+class _Reader:
+    """Reads one plan, line by line."""
+
+    def __init__(self, where: str) -> None:
+        self._where, self._line = where, 0
+        self._name, self._size, self._start = "", (0.0, 0.0), (0.0, 0.0, 0.0)
+        self._blocks: list[Block] = []
+        self._columns: list[Column] = []
+        self._people: list[Person] = []
+        self._seen: set[str] = set()
+        self._kinds: dict[str, Callable[[list[str]], None]] = {
+            "name": self._read_name,
+            "size": self._read_size,
+            "start": self._read_start,
+            "wall": self._read_wall,
+            "box": self._read_box,
+            "column": self._read_column,
+            "person": self._read_person,
+        }
+
+    def read(self, text: str) -> Room:
+        if len(text) > MOST_BYTES:
+            raise FormatError(self._where, f"longer than {MOST_BYTES} characters")
+        first = True
+        for self._line, raw in enumerate(text.splitlines(), 1):
+            words = raw.split("#", 1)[0].split()
+            if not words:
+                continue
+            kind, rest = words[0], words[1:]
+            if first:
+                if kind != "room" or rest != [str(VERSION)]:
+                    self._fail(f"a floor plan begins with 'room {VERSION}'")
+                first = False
+                continue
+            if kind not in self._kinds:
+                self._fail(f"unknown word {kind!r}; there are {', '.join(self._kinds)}")
+            if kind in {"name", "size", "start"}:
+                if kind in self._seen:
+                    self._fail(f"a second {kind}")
+                self._seen.add(kind)
+            elif "size" not in self._seen:
+                self._fail("the size comes before what stands in the room")
+            elif len(self._blocks) + len(self._columns) + len(self._people) >= MOST_THINGS:
+                self._fail(f"more than {MOST_THINGS} things")
+            self._kinds[kind](rest)
+        if first:
+            self._fail(f"a floor plan begins with 'room {VERSION}'")
+        if "size" not in self._seen:
+            self._fail("no size")
+        return Room(
+            self._name or self._where,
+            *self._size,
+            self._start,
+            tuple(self._blocks),
+            tuple(self._columns),
+            tuple(self._people),
+        )
+
+    def _fail(self, problem: str) -> None:
+        raise FormatError(f"{self._where}, line {self._line}", problem)
+
+    def _number(self, name: str, word: str, low: float, high: float) -> float:
+        try:
+            value = float(word)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            self._fail(f"{name} must be a number in [{low:g}, {high:g}]; given: {word[:40]!r}")
+        return value
+
+    def _place(self, words: list[str]) -> tuple[float, float]:
+        length, width = self._size
+        x = self._number("x", words[0], -_MARGIN, length + _MARGIN)
+        return x, self._number("y", words[1], -_MARGIN, width + _MARGIN)
+
+    def _split(
+        self, words: list[str], count: int, what: str, options: _Options, flags: set[str]
+    ) -> tuple[list[str], dict[str, float], set[str]]:
+        """Tell positions from options `name=value` (low, high, default) and flags."""
+        positions = [word for word in words if "=" not in word and word not in flags]
+        if len(positions) != count:
+            self._fail(f"needs {what}; given: {len(positions)} values")
+        found = {name: default for name, (_, _, default) in options.items()}
+        given: set[str] = set()
+        for word in words:
+            name, equals, value = word.partition("=")
+            if not equals and name not in flags:
+                continue
+            if name in given:
+                self._fail(f"{name} twice")
+            given.add(name)
+            if equals:
+                if name not in options:
+                    self._fail(f"unknown {name[:40]!r}; there are {', '.join([*options, *sorted(flags)])}")
+                low, high, _ = options[name]
+                found[name] = self._number(name, value, low, high)
+        return positions, found, given & flags
+
+    def _read_name(self, words: list[str]) -> None:
+        self._name = " ".join(words)
+        if not 1 <= len(self._name) <= 80:
+            self._fail("a name has 1 to 80 characters")
+
+    def _read_size(self, words: list[str]) -> None:
+        (length, width), _, _ = self._split(words, 2, "length and width [m]", {}, set())
+        self._size = self._number("length", length, 0.1, 200.0), self._number("width", width, 0.1, 200.0)
+
+    def _read_start(self, words: list[str]) -> None:
+        if "size" not in self._seen:
+            self._fail("the size comes before the start")
+        (x, y, angle), _, _ = self._split(words, 3, "x, y [m] and a heading [deg]", {}, set())
+        self._start = *self._place([x, y]), math.radians(self._number("heading", angle, -360.0, 360.0))
+
+    def _read_wall(self, words: list[str]) -> None:
+        options = {"thickness": (0.01, 1.0, 0.1), "height": (0.01, 5.0, _WALL_HEIGHT), **_TIMES}
+        at, option, flags = self._split(words, 4, "x, y of both ends [m]", options, {"unknown"})
+        (x0, y0), (x1, y1) = self._place(at[:2]), self._place(at[2:])
+        length = math.hypot(x1 - x0, y1 - y0)
+        if length < 0.01:
+            self._fail("a wall is at least 0.01 m long")
+        thick = option["thickness"]
+        middle, angle = ((x0 + x1) / 2, (y0 + y1) / 2), math.atan2(y1 - y0, x1 - x0)
+        self._add_block("wall", middle, (length + thick, thick), angle, option, flags)
+
+    def _read_box(self, words: list[str]) -> None:
+        options = {"angle_deg": (-360.0, 360.0, 0.0), "height": (0.01, 5.0, _BOX_HEIGHT), **_TIMES}
+        at, option, flags = self._split(words, 4, "x, y of the middle, length and width [m]", options, {"unknown"})
+        sides = self._number("length", at[2], 0.01, 50.0), self._number("width", at[3], 0.01, 50.0)
+        self._add_block("box", self._place(at), sides, math.radians(option["angle_deg"]), option, flags)
+
+    def _add_block(
+        self,
+        kind: str,
+        middle: tuple[float, float],
+        sides: tuple[float, float],
+        angle: float,
+        option: dict[str, float],
+        flags: set[str],
+    ) -> None:
+        start, end = self._times(option)
+        name, known = f"{kind} in line {self._line}", "unknown" not in flags
+        self._blocks.append(Block(name, *middle, *sides, angle, option["height"], known, start, end))
+
+    def _read_column(self, words: list[str]) -> None:
+        options = {"height": (0.01, 5.0, _BOX_HEIGHT), **_TIMES}
+        at, option, flags = self._split(words, 3, "x, y and a radius [m]", options, {"unknown"})
+        x, y = self._place(at)
+        radius = self._number("radius", at[2], 0.01, 5.0)
+        start, end = self._times(option)
+        name = f"column in line {self._line}"
+        self._columns.append(Column(name, x, y, radius, option["height"], "unknown" not in flags, start, end))
+
+    def _read_person(self, words: list[str]) -> None:
+        points = [word for word in words if "," in word]
+        others = [word for word in words if "," not in word]
+        options = {"height": (0.5, 2.5, _PERSON_HEIGHT)}
+        (radius,), option, flags = self._split(others, 1, "a radius [m], then points t,x,y", options, {"repeat"})
+        if not 1 <= len(points) <= MOST_POINTS:
+            self._fail(f"a person has 1 to {MOST_POINTS} points t,x,y")
+        times: list[float] = []
+        places: list[tuple[float, float]] = []
+        for point in points:
+            parts = point.split(",")
+            if len(parts) != 3:
+                self._fail(f"a point is t,x,y without spaces; given: {point[:40]!r}")
+            t, place = self._number("t", parts[0], 0.0, 1e6), self._place(parts[1:])
+            if times and t <= times[-1]:
+                self._fail(f"times must ascend; {t:g} comes after {times[-1]:g}")
+            if times and math.dist(place, places[-1]) > 3.0 * (t - times[-1]):
+                self._fail(f"nobody walks faster than 3 m/s; to {point!r} it would be faster")
+            times.append(t)
+            places.append(place)
+        repeat = "repeat" in flags
+        if repeat and (len(times) < 2 or places[0] != places[-1]):
+            self._fail("a path that repeats ends where it began")
+        name, size = f"person in line {self._line}", self._number("radius", radius, 0.05, 1.0)
+        self._people.append(Person(name, size, option["height"], tuple(times), tuple(places), repeat))
+
+    def _times(self, option: dict[str, float]) -> tuple[float, float]:
+        if not option["from"] < option["until"]:
+            self._fail("from must be before until")
+        return option["from"], option["until"]
+
+
+_TIMES: _Options = {"from": (0.0, 1e6, -math.inf), "until": (0.0, 1e6, math.inf)}

@@ -1,0 +1,268 @@
+"""Sizes, masses and drives of the two robots of Han, Kim, Kim, Kim 2001: the IPR and the micro-robot.
+
+The robot's frame stands on the floor in the middle of the driving axle, x forward, y left, z up. The paper gives
+outer sizes, masses, motors and the number of sonars; the rest is chosen here and says so.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from robots.ipr import parameters as p
+from robots.ipr.model import Kind
+from vrs.checks import number_in, one_of
+from vrs.mobile import DriveLimits
+from vrs.model import Array, frozen_array
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Lump:
+    """A homogeneous box, one of those that make up a chassis."""
+
+    name: str
+    size: Point
+    """Lengths along x, y, z [m]."""
+    centre: Point
+    """In the robot's frame [m]."""
+    mass: float
+    """[kg]."""
+
+    def inertia(self) -> Array:
+        """Inertia about the lump's own centre [kg m²], (3, 3)."""
+        x, y, z = (s * s for s in self.size)
+        return np.diag((y + z, x + z, x + y)) * self.mass / 12
+
+
+@dataclass(frozen=True, slots=True)
+class Chassis:
+    """One robot's body; lengths [m], masses [kg]."""
+
+    kind: str
+    """`ipr` or `micro`, or what somebody calls a chassis of his own."""
+    length: float
+    """Along x."""
+    width: float
+    """Along y."""
+    height: float
+    centre_x: float
+    """Where the middle of the outer box is before the driving axle."""
+    ground_clearance: float
+    lumps: tuple[Lump, ...]
+    """All but wheels and casters."""
+    wheel_radius: float
+    wheel_base: float
+    """L, between the middles of the driven wheels."""
+    wheel_width: float
+    wheel_mass: float
+    casters: tuple[tuple[float, float], ...]
+    """Where the casters' swivel axes meet the floor, (x, y)."""
+    caster_radius: float
+    caster_trail: float
+    """How far the wheel's middle is behind the swivel axis; 0 is a ball that turns any way."""
+    caster_mass: float
+    """Of wheel and fork together."""
+    caster_lift: float
+    """How far casters end above the floor that the driven wheels stand on."""
+    caster_rolling: float
+    """Torque that a rolling or swivelling caster takes [N m]."""
+    torque: float
+    """Largest torque of one drive at the wheel [N m]."""
+    gear: float
+    """Motor turns a wheel turn."""
+    rotor: float
+    """Inertia of one motor's rotor, at the motor [kg m²]; at the wheel it counts gear² times."""
+    encoder_counts: int
+    """Counts a motor turn, four edges a line."""
+    servo_time: float
+    """Time constant of the closed speed loop [s]."""
+    sonars: int
+    """How many, evenly around the body."""
+    sonar_height: float
+    sonar_reach: tuple[float, float] = (0.1, 3.0)
+    """Nearest and farthest distance that a sonar tells [m]."""
+
+    @property
+    def mass(self) -> float:
+        """All of it [kg]."""
+        moving = 2 * self.wheel_mass + len(self.casters) * self.caster_mass
+        return sum(lump.mass for lump in self.lumps) + moving
+
+    @property
+    def reach(self) -> float:
+        """Radius of the circle about the box's middle that the body stays within [m]."""
+        return math.hypot(self.length, self.width) / 2
+
+    @property
+    def limits(self) -> DriveLimits:
+        """How fast the body lets itself be driven."""
+        return p.drive_limits(self.wheel_base)
+
+    def rigid(self) -> tuple[float, Array, Array]:
+        """Return mass [kg], centre (3,) [m] and inertia about it (3, 3) [kg m²] of all lumps together."""
+        mass = sum(lump.mass for lump in self.lumps)
+        centre = sum((lump.mass * np.array(lump.centre) for lump in self.lumps), np.zeros(3)) / mass
+        inertia = np.zeros((3, 3))
+        for lump in self.lumps:
+            arm = np.array(lump.centre) - centre
+            inertia += lump.inertia() + lump.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        return mass, frozen_array(centre), frozen_array(inertia)
+
+
+IPR: Final = Chassis(
+    kind=Kind.IPR,
+    length=p.IPR_LENGTH,
+    width=p.IPR_WIDTH,
+    height=p.IPR_HEIGHT,
+    centre_x=-p.IPR_AXLE_OFFSET,
+    ground_clearance=0.05,
+    lumps=(
+        Lump("battery, 12 V 100 Ah", (0.30, 0.20, 0.20), (-0.12, 0.0, 0.18), 28.0),
+        Lump("computer", (0.35, 0.30, 0.15), (-0.09, 0.0, 0.42), 10.0),
+        Lump("right servo and gear", (0.12, 0.14, 0.10), (0.0, -0.09, 0.12), 4.5),
+        Lump("left servo and gear", (0.12, 0.14, 0.10), (0.0, 0.09, 0.12), 4.5),
+        Lump("base plate", (0.50, 0.43, 0.02), (-0.06, 0.0, 0.09), 8.0),
+        Lump("housing", (0.46, 0.38, 0.50), (-0.06, 0.0, 0.40), 8.0),
+        Lump("head with two cameras", (0.12, 0.22, 0.08), (0.04, 0.0, 0.70), 3.5),
+        Lump("display", (0.04, 0.30, 0.24), (0.11, 0.0, 0.55), 3.1),
+    ),
+    wheel_radius=p.IPR_WHEEL_RADIUS,
+    wheel_base=p.IPR_WHEEL_BASE,
+    wheel_width=0.05,
+    wheel_mass=1.8,
+    casters=((-0.25, 0.15), (-0.25, -0.15)),
+    caster_radius=0.04,
+    caster_trail=0.035,
+    caster_mass=0.9,
+    caster_lift=0.0,
+    caster_rolling=0.06,
+    # 200 W at 3000/min is 0.64 N m; through 40 : 1 with 0.8 of it left.
+    torque=20.0,
+    gear=40.0,
+    rotor=1.8e-5,
+    encoder_counts=8000,
+    servo_time=0.03,
+    sonars=16,
+    sonar_height=0.45,
+)
+"""The robot of section 2.1: 45 × 52 × 75 cm, 75 kg, two AC servos of 200 W, 16 sonars.
+
+Two driven wheels in front, two trailing casters behind: four contacts at one height on two lines, so that each
+line bears its share and the robot can't rock.
+"""
+
+MICRO: Final = Chassis(
+    kind=Kind.MICRO,
+    length=p.MICRO_SIDE,
+    width=p.MICRO_SIDE,
+    height=p.MICRO_SIDE,
+    centre_x=-p.MICRO_AXLE_OFFSET,
+    ground_clearance=0.004,
+    lumps=(
+        Lump("battery", (0.030, 0.050, 0.015), (-0.016, 0.0, 0.018), 0.120),
+        Lump("right motor", (0.020, 0.026, 0.020), (0.0, -0.014, 0.020), 0.060),
+        Lump("left motor", (0.020, 0.026, 0.020), (0.0, 0.014, 0.020), 0.060),
+        Lump("boards", (0.060, 0.060, 0.016), (0.0, 0.0, 0.052), 0.060),
+        Lump("shell", (0.070, 0.056, 0.066), (0.0, 0.0, 0.038), 0.080),
+    ),
+    wheel_radius=p.MICRO_WHEEL_RADIUS,
+    wheel_base=p.MICRO_WHEEL_BASE,
+    wheel_width=0.007,
+    wheel_mass=0.020,
+    casters=((0.028, 0.0), (-0.028, 0.0)),
+    caster_radius=0.005,
+    caster_trail=0.0,
+    caster_mass=0.005,
+    caster_lift=0.0003,
+    caster_rolling=0.0,
+    torque=0.05,
+    gear=8.0,
+    rotor=2.7e-7,
+    encoder_counts=2048,
+    servo_time=0.02,
+    sonars=16,
+    sonar_height=0.06,
+)
+"""The robot of section 4.2: 7.5 cm, 430 g, LM629 speed control, two centred casters, before and behind.
+
+The casters end 0.3 mm above the floor and the battery sits behind the axle, so that the driven wheels bear most of
+the weight and the robot leans on its rear caster. The paper's micro-robot has no sonars; those here see a room
+from where its overhead camera's software would.
+"""
+
+CHASSES: Final = {made.kind: made for made in (IPR, MICRO)}
+
+
+def chassis(kind: str) -> Chassis:
+    """Return a chassis by its name, `ipr` or `micro`.
+
+    Raises:
+        InvalidValueError: If there's none of that name.
+    """
+    return CHASSES[one_of("kind", kind, CHASSES)]
+
+
+@dataclass(frozen=True, slots=True)
+class SonarModel:
+    """How the sonars see. A Polaroid sensor's cone, thinned to a few rays."""
+
+    rate: float = 10.0
+    """Scans a second [Hz], in [0.1, 100]."""
+    rays: int = 5
+    """Rays a cone, in [1, 31]."""
+    half_angle: float = math.radians(12.5)
+    """Half the cone's opening [rad], in [0, 0.8]."""
+    noise: float = 0.005
+    """Standard deviation of every range [m], in [0, 1]."""
+    noise_share: float = 0.005
+    """Standard deviation that grows with the range, as a share of it, in [0, 0.2]."""
+    misses: float = 0.01
+    """Probability that an echo is lost, in [0, 1]."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("rate", 0.1, 100.0), ("half_angle", 0.0, 0.8), ("noise", 0.0, 1.0), ("noise_share", 0.0, 0.2),
+            ("misses", 0.0, 1.0),
+        ):  # fmt: skip
+            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
+        object.__setattr__(self, "rays", int(number_in("rays", self.rays, 1, 31)))
+
+
+@dataclass(frozen=True, slots=True)
+class CameraModel:
+    """The overhead camera of section 4.2. Source: NTSC frames; noise and latency chosen."""
+
+    rate: float = 30.0
+    """Frames a second [Hz], in [0.1, 240]."""
+    latency: float = 0.08
+    """From the picture to the posture [s], in [0, 2]."""
+    noise: float = 0.003
+    """Standard deviation of x and of y [m], in [0, 1]."""
+    noise_angle: float = math.radians(0.5)
+    """Standard deviation of the heading [rad], in [0, 1]."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("rate", 0.1, 240.0), ("latency", 0.0, 2.0), ("noise", 0.0, 1.0), ("noise_angle", 0.0, 1.0),
+        ):  # fmt: skip
+            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """All that a body senses with."""
+
+    sonar: SonarModel | None = field(default_factory=SonarModel)
+    """None switches the sonars off."""
+    camera: CameraModel | None = field(default_factory=CameraModel)
+    """None switches the camera off."""
+    encoder_rate: float = 20.0
+    """How often encoders are read [Hz], in [1, 240]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "encoder_rate", number_in("encoder_rate", self.encoder_rate, 1.0, 240.0))

@@ -1,0 +1,92 @@
+"""Where a mobile robot takes itself to be: odometry, corrected by the overhead camera's late postures.
+
+Dead reckoning is smooth and drifts; a camera doesn't drift, but is noisy and late. So the map's frame is kept as a
+transform of the odometry's: a picture is compared with where the odometry says that the robot was *when it was
+taken*, and the transform takes a share of the difference. Nothing is replayed, and nothing jumps by more than that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from robots.ipr.robot import MobileRobot
+from robots.onboard.driving import Posture
+from vrs.checks import number_in
+from vrs.mobile import wrapped
+
+_KEPT = 2.0
+"""How much odometry is kept [s]: older pictures don't count."""
+
+
+@dataclass(frozen=True, slots=True)
+class FusionConfig:
+    """How much a picture counts."""
+
+    share: float = 0.1
+    """Share of a difference in position that one picture takes away, in [0, 1]."""
+    turn_share: float = 0.05
+    """The same of the heading, whose noise moves what is ahead, in [0, 1]."""
+
+    def __post_init__(self) -> None:
+        for name in ("share", "turn_share"):
+            number_in(name, getattr(self, name), 0.0, 1.0)
+
+
+class FusedPosition:
+    """Follows a robot's odometry and camera; call it once a control period."""
+
+    def __init__(self, robot: MobileRobot, config: FusionConfig | None = None) -> None:
+        """Take the robot; its odometry starts where it really is."""
+        self._robot = robot
+        self._config = FusionConfig() if config is None else config
+        self._x = self._y = self._turn = 0.0
+        self._past: deque[tuple[float, float, float, float]] = deque()
+        self._seen = -math.inf
+
+    def posture(self) -> Posture:
+        """Where the robot takes itself to be now, (x, y, θ) [m, m, rad]."""
+        robot, past = self._robot, self._past
+        now = robot.time
+        x, y, theta = robot.reckoned
+        past.append((now, x, y, theta))
+        while past[0][0] < now - _KEPT:
+            past.popleft()
+        fix = robot.camera
+        if fix is not None and fix.time > self._seen:
+            self._seen = fix.time
+            self._correct(fix.time, fix.posture.tolist())
+        return self._placed(x, y, theta)
+
+    def _placed(self, x: float, y: float, theta: float) -> Posture:
+        cos, sin = math.cos(self._turn), math.sin(self._turn)
+        return Posture(self._x + cos * x - sin * y, self._y + sin * x + cos * y, theta + self._turn)
+
+    def _correct(self, t: float, seen: list[float]) -> None:
+        then = self._then(t)
+        if then is None:
+            return
+        x, y, theta = then
+        was = self._placed(x, y, theta)
+        share, turn_share = self._config.share, self._config.turn_share
+        self._turn += turn_share * wrapped(seen[2] - was.theta)
+        # About where the robot was: turning the map's frame doesn't move that.
+        cos, sin = math.cos(self._turn), math.sin(self._turn)
+        self._x = was.x + share * (seen[0] - was.x) - (cos * x - sin * y)
+        self._y = was.y + share * (seen[1] - was.y) - (sin * x + cos * y)
+
+    def _then(self, t: float) -> tuple[float, float, float] | None:
+        """The odometry at a time [s], linear in between; None if that's not kept."""
+        past = self._past
+        after = past[-1]
+        if t > after[0]:
+            return None
+        for k in range(len(past) - 2, -1, -1):
+            before = past[k]
+            if before[0] <= t:
+                share = (t - before[0]) / (after[0] - before[0])
+                x, y, theta = (before[i] + share * (after[i] - before[i]) for i in (1, 2, 3))
+                return x, y, theta
+            after = before
+        return (after[1], after[2], after[3]) if t == after[0] else None

@@ -1,0 +1,277 @@
+"""What the simulated and the bare mobile robot share: commands, steps, senses, collisions."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import ClassVar, Final, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from robots.bullet.rooms import EMPTY, Room, load_room
+from robots.ipr import parameters
+from robots.ipr.chassis import Chassis, Senses, chassis
+from robots.ipr.drive_train import DriveTrain, Odometry, as_posture
+from robots.ipr.floor_plan import FloorPlan
+from robots.ipr.reality import MobileReality
+from robots.ipr.sensing import Fix, OverheadCamera, SonarRing, SonarScan
+from vrs.checks import finite, one_of
+from vrs.errors import InvalidValueError
+from vrs.mobile import DriveLimits
+from vrs.model import Array, frozen_array
+
+MOST_COLLISIONS = 1000
+"""Collisions that are kept."""
+_ROOMS: Final = Path(__file__).parent / "rooms"
+PLACES: Final = ("berths", "corridor", "empty", "fig13", "fig13_person", "furnished", "lane", "slalom")
+"""Rooms that come with the package."""
+
+
+def place(name: str) -> Room:
+    """Return a room that comes with the package.
+
+    Raises:
+        InvalidValueError: If there's none of that name.
+    """
+    return load_room(_ROOMS / f"{one_of('room', name, PLACES)}.room")
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """The body began to touch something."""
+
+    time: float
+    """[s]."""
+    thing: str
+    """What, by its name in the room."""
+
+
+class MobileRobot(ABC):
+    """A real mobile robot: told (v, ω), it goes on by steps of `reality.dt` and senses on the way."""
+
+    _STEP: ClassVar[float]
+    """Step of a reality that isn't given [s]."""
+
+    def __init__(
+        self,
+        kind: str | Chassis = "ipr",
+        posture: ArrayLike | None = None,
+        *,
+        room: Room | str | None = None,
+        reality: MobileReality | None = None,
+        rng: np.random.Generator | int = 0,
+        limits: DriveLimits | None = None,
+        senses: Senses | None = None,
+        period: float = parameters.PERIOD,
+    ) -> None:
+        """Put a robot into a room, at rest.
+
+        Args:
+            kind: `ipr`, `micro`, or a chassis.
+            posture: Middle of the driving axle [m] and heading [rad], (x, y, θ); where the room says, unless given.
+            room: A room, or the name of one that comes with the package; only a floor, unless given.
+            reality: How real it is; everything, unless given, in steps of 1/240 s, of the bare robot 1/60 s.
+            rng: What slips and noise are drawn from, or a seed.
+            limits: What commands must keep to; 0.5 m/s, 45 deg/s and 0.52 m/s², unless given.
+            senses: What it senses with; everything, unless given.
+            period: What `follow` goes on by [s], a multiple of the step.
+
+        Raises:
+            InvalidValueError: If a value is out of range, or the robot would stand in something.
+        """
+        self.chassis = chassis(kind) if isinstance(kind, str) else kind
+        self.room = room = EMPTY if room is None else place(room) if isinstance(room, str) else room
+        self.reality = reality = MobileReality(dt=self._STEP) if reality is None else reality
+        self.limits = limits = self.chassis.limits if limits is None else limits
+        self.senses = senses = Senses() if senses is None else senses
+        start = as_posture("posture", room.start if posture is None else posture)
+        rng = np.random.default_rng(rng) if isinstance(rng, int) else rng
+        drive_rng, sonar_rng, camera_rng = rng.spawn(3)
+        self._train = DriveTrain(self.chassis, reality, limits, drive_rng)
+        self._odometry = Odometry(self._train, start)
+        self._plan = FloorPlan(room)
+        self._steps = 0
+        self._truth = start
+        self._reading = self._train.read((0.0, 0.0))
+        self._sonar: SonarRing | None = None
+        self._camera: OverheadCamera | None = None
+        self._scan: SonarScan | None = None
+        self._every_encoder = self._every(senses.encoder_rate)
+        self._every_sonar = self._every_frame = 0
+        if senses.sonar is not None:
+            self._sonar = SonarRing(self.chassis, senses.sonar, sonar_rng)
+            self._every_sonar = self._every(senses.sonar.rate)
+        if senses.camera is not None:
+            self._camera = OverheadCamera(senses.camera, camera_rng)
+            self._every_frame = self._every(senses.camera.rate)
+        self._ticks = [n for n in (self._every_encoder, self._every_sonar, self._every_frame) if n]
+        self._period_steps = round(finite("period", period) / reality.dt)
+        if self._period_steps < 1 or abs(self._period_steps * reality.dt - period) > 1e-9:
+            raise InvalidValueError("period", period, f"a multiple of the step, {reality.dt:g} s")
+        self._collisions: list[Collision] = []
+        self._touches = ""
+        thing = self._overlap(start)
+        if thing:
+            raise InvalidValueError("posture", start, f"one where the robot stands free, not in the {thing}")
+        self._begin()
+
+    @property
+    def time(self) -> float:
+        """Time since the robot was made [s]; the room's times count from then, too."""
+        return self._steps * self.reality.dt
+
+    @property
+    def posture(self) -> Array:
+        """True posture, (3,): middle of the driving axle [m] and heading [rad], not wrapped."""
+        return frozen_array(self._truth)
+
+    @property
+    def truth(self) -> tuple[float, float, float]:
+        """True posture as plain numbers: as `posture`, in a tenth of the time."""
+        return self._truth
+
+    @property
+    def reckoned(self) -> tuple[float, float, float]:
+        """Posture by dead reckoning as plain numbers: as `odometry`."""
+        return self._odometry.posture
+
+    @property
+    @abstractmethod
+    def motion(self) -> tuple[float, float]:
+        """True speed v of the middle of the axle, forward [m/s], and ω [rad/s]."""
+
+    @property
+    def encoders(self) -> tuple[float, float]:
+        """Last readings of the right and the left encoder: counts, or [rad] if they read exactly."""
+        return self._reading
+
+    @property
+    def odometry(self) -> Array:
+        """Posture by dead reckoning from the encoders, (3,)."""
+        return frozen_array(self._odometry.posture)
+
+    @property
+    def camera(self) -> Fix | None:
+        """Newest posture that the overhead camera has told; None before the first, or without a camera."""
+        return None if self._camera is None else self._camera.newest(self.time)
+
+    @property
+    def sonar(self) -> SonarScan | None:
+        """Newest scan; None without sonars."""
+        return self._scan
+
+    @property
+    def sonar_angles(self) -> Array:
+        """Where each sonar looks [rad], (16,), in the robot's frame; empty without sonars."""
+        return frozen_array([]) if self._sonar is None else self._sonar.angles
+
+    @property
+    def sonar_places(self) -> Array:
+        """Where each sonar sits [m], (16, 2), in the robot's frame; (0, 2) without sonars."""
+        return frozen_array(np.zeros((0, 2))) if self._sonar is None else self._sonar.places
+
+    @property
+    def touching(self) -> str:
+        """What the body touches now, by its name in the room; empty if nothing."""
+        return self._touches
+
+    @property
+    def collisions(self) -> tuple[Collision, ...]:
+        """What the body has run into, or who into it; the first thousand."""
+        return tuple(self._collisions)
+
+    def drive(self, v: float, w: float, steps: int = 1) -> None:
+        """Go on by steps with a command.
+
+        Calls with the same command one after the other do what one call with all their steps does, to the last bit.
+
+        Args:
+            v: Linear speed [m/s].
+            w: Angular speed [rad/s].
+            steps: How many steps of `reality.dt`, in [0, 1,000,000].
+
+        Raises:
+            InvalidValueError: If the command passes a limit or isn't finite, or the steps aren't such a number; the
+                robot hasn't moved then.
+            WorldClosedError: If it's a closed PyBullet robot.
+        """
+        if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps <= 1_000_000:
+            raise InvalidValueError("steps", steps, "an integer in [0, 1000000]")
+        self._ready()
+        self._train.command(v, w)
+        if self._steps == 0:
+            self._sense()
+        last = self._steps + steps
+        while self._steps < last:
+            n = min(last - self._steps, *(every - self._steps % every for every in self._ticks))
+            self._advance(n)
+            self._sense()
+
+    def follow(self, v: float, w: float) -> None:
+        """Go on by one control period; arguments and errors as of `drive`."""
+        self.drive(v, w, self._period_steps)
+
+    def close(self) -> None:
+        """Give back what the robot holds; a second call does nothing."""
+        return
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Make what the robot needs to go on, from `_truth`."""
+
+    @abstractmethod
+    def _advance(self, n: int) -> None:
+        """Go n steps on, no sense being due before their end; counts them in `_steps`, sets `_truth`."""
+
+    @abstractmethod
+    def _shafts(self) -> tuple[float, float]:
+        """Angles that the motors' shafts have turned by, at the wheel's side of the gear [rad]."""
+
+    @abstractmethod
+    def _distances(self, origins: Array, directions: Array, reach: float) -> Array:
+        """How far rays go now [m], inf where nothing is within reach."""
+
+    def _ready(self) -> None:
+        """Raise if the robot can't be used any more."""
+        return
+
+    def _every(self, rate: float) -> int:
+        return max(1, round(1.0 / (rate * self.reality.dt)))
+
+    def _sense(self) -> None:
+        """Read what is due at this step."""
+        if self._steps % self._every_encoder == 0:
+            self._reading = self._train.read(self._shafts())
+            self._odometry.update(self._reading)
+            if self._steps:
+                self._train.wander(self._every_encoder * self.reality.dt)
+        if self._camera is not None and self._steps % self._every_frame == 0:
+            self._camera.look(self._truth, self.time)
+        if self._sonar is not None and self._steps % self._every_sonar == 0:
+            origins, directions = self._sonar.rays(self._truth)
+            self._scan = self._sonar.scan(self._distances(origins, directions, self._sonar.reach), self.time)
+
+    def _overlap(self, posture: tuple[float, float, float]) -> str:
+        """What the body's outline overlaps at a posture."""
+        x, y, theta = posture
+        body = self.chassis
+        middle_x, middle_y = x + body.centre_x * math.cos(theta), y + body.centre_x * math.sin(theta)
+        return self._plan.touched(middle_x, middle_y, theta, (body.length / 2, body.width / 2), self.time)
+
+    def _touch(self, thing: str) -> None:
+        """Note what the body touches; a touch that goes on is one collision."""
+        if thing and thing != self._touches and len(self._collisions) < MOST_COLLISIONS:
+            self._collisions.append(Collision(self.time, thing))
+        self._touches = thing

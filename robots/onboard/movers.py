@@ -1,0 +1,190 @@
+"""What moves by itself around a robot, from sonar echoes: where it is and how it moves.
+
+A sonar knows ranges well and bearings badly, so each thing is followed by a Kalman filter of constant velocity
+whose measurements are sharp along the line of sight and wide across it; neighbours' echoes at nearly one range are
+one. A thing moves if it does so by more than the filter's own doubt.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.onboard.avoidance import SonarMount
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
+from vrs.model import Array
+
+
+@dataclass(frozen=True, slots=True)
+class MoversConfig:
+    """How things are followed."""
+
+    mounts: tuple[SonarMount, ...]
+    """As many as there are readings, 1 to 64, in order around the robot."""
+    radius: float = 0.25
+    """Of whatever moves [m], in [0, 1]: a person's."""
+    together: float = 0.2
+    """Echoes of neighbours that differ by less are of one thing [m], in [0, 2]."""
+    range_noise: float = 0.06
+    """Standard deviation along the line of sight [m], in [1e-3, 1]: shapes, more than the sonar."""
+    bearing_noise: float = 0.12
+    """Across it [rad], in [1e-3, 1]: half a cone."""
+    agility: float = 0.3
+    """Standard deviation of a thing's acceleration [m/s²], in [0, 10]."""
+    start_speed: float = 0.5
+    """And of its speed when it's first seen [m/s], in [0, 10]."""
+    gate: float = 0.7
+    """An echo further from where a thing is expected is another's [m], in [0.01, 5]."""
+    memory: float = 1.0
+    """What wasn't seen for so long is given up [s], in [0.05, 10]."""
+    slowest: float = 0.12
+    """What is slower stands [m/s], in [0, 10]."""
+    doubt: float = 2.5
+    """It moves if its speed is so many deviations, in [0, 10]."""
+    least: float = 0.3
+    """Nothing is said of what was first seen a shorter time ago [s], in [0, 10]."""
+    most: int = 16
+    """Most things that are followed, 1 to 1000."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("radius", 0.0, 1.0), ("together", 0.0, 2.0), ("range_noise", 1e-3, 1.0), ("bearing_noise", 1e-3, 1.0),
+            ("agility", 0.0, 10.0), ("start_speed", 0.0, 10.0), ("gate", 0.01, 5.0), ("memory", 0.05, 10.0),
+            ("slowest", 0.0, 10.0), ("doubt", 0.0, 10.0),
+            ("least", 0.0, 10.0),
+        ):  # fmt: skip
+            number_in(name, getattr(self, name), low, high)
+        for name, count, high in (("mounts", len(self.mounts), 64), ("most", self.most, 1000)):
+            if not 1 <= count <= high:
+                raise InvalidValueError(name, count, f"1 to {high}")
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """Something that moves by itself."""
+
+    x: float
+    """Of its middle [m]."""
+    y: float
+    vx: float
+    """[m/s]."""
+    vy: float
+    across: float = 0.0
+    """Standard deviation of its speed across its way [m/s]."""
+
+
+@dataclass(slots=True)
+class _Thing:
+    state: Array
+    """x, y, vx, vy."""
+    doubt: Array
+    """Covariance, (4, 4)."""
+    t: float
+    seen: float
+    begun: float
+
+
+class MoverTracker:
+    """Follows things from scan to scan; it knows no clock."""
+
+    def __init__(self, config: MoversConfig) -> None:
+        """Follow nothing yet."""
+        self._config = config
+        self._mounts = np.array([(m.x, m.y, m.angle) for m in config.mounts], float)
+        self._things: list[_Thing] = []
+
+    def hear(
+        self, ranges: Sequence[float], new: Sequence[bool], posture: tuple[float, float, float], *, now: float
+    ) -> None:
+        """Take in a scan.
+
+        Args:
+            ranges: A distance for each sonar, in the order of the mounts [m].
+            new: Which of them are of something that the known map doesn't have.
+            posture: Where the robot was, (x, y, θ) [m, m, rad].
+            now: When it was taken [s], not before an earlier one.
+        """
+        config = self._config
+        self._things = [thing for thing in self._things if now - thing.seen <= config.memory]
+        for thing in self._things:
+            self._expect(thing, now)
+        free = list(self._things)
+        for r, bearing, origin in self._groups(ranges, new, posture):
+            reach, c, s = r + config.radius, math.cos(bearing), math.sin(bearing)
+            z = origin + reach * np.array([c, s])
+            turn = np.array([[c, -s], [s, c]])
+            noise = turn @ np.diag([config.range_noise**2, (config.bearing_noise * reach) ** 2]) @ turn.T
+            off = [math.hypot(*(z - thing.state[:2]).tolist()) for thing in free]
+            best = int(np.argmin(off)) if off else -1
+            if off and off[best] < config.gate:
+                self._correct(free.pop(best), z, noise, now)
+            elif len(self._things) < config.most:
+                doubt = np.zeros((4, 4))
+                doubt[:2, :2] = noise
+                doubt[2:, 2:] = config.start_speed**2 * np.eye(2)
+                self._things.append(_Thing(np.array([*z, 0.0, 0.0]), doubt, now, now, now))
+
+    def movers(self, *, now: float) -> tuple[Mover, ...]:
+        """What moves, and where it is now [s]."""
+        config, found = self._config, []
+        for thing in self._things:
+            x, y, vx, vy = thing.state.tolist()
+            speed = math.hypot(vx, vy)
+            if now - thing.begun < config.least or speed < config.slowest:
+                continue
+            way = np.array([vx, vy]) / speed
+            if speed > config.doubt * math.sqrt(float(way @ thing.doubt[2:, 2:] @ way)):
+                dt = now - thing.t
+                beside = np.array([-way[1], way[0]])
+                across = math.sqrt(max(float(beside @ thing.doubt[2:, 2:] @ beside), 0.0))
+                found.append(Mover(x + vx * dt, y + vy * dt, vx, vy, across))
+        return tuple(found)
+
+    def _groups(
+        self, ranges: Sequence[float], new: Sequence[bool], posture: tuple[float, float, float]
+    ) -> list[tuple[float, float, Array]]:
+        """Range [m], bearing [rad] and origin [m] of each thing that was heard."""
+        groups: list[list[int]] = []
+        for k in (k for k, one in enumerate(new) if one):
+            if groups and k == groups[-1][-1] + 1 and abs(ranges[k] - ranges[k - 1]) < self._config.together:
+                groups[-1].append(k)
+            else:
+                groups.append([k])
+        last = len(self._mounts) - 1
+        closes = len(groups) > 1 and groups[0][0] == 0 and groups[-1][-1] == last
+        if closes and abs(ranges[0] - ranges[last]) < self._config.together:
+            groups = [groups[-1] + groups[0], *groups[1:-1]]
+        x, y, theta = posture
+        cos, sin = math.cos(theta), math.sin(theta)
+        found = []
+        for group in groups:
+            nearest = min(ranges[k] for k in group)
+            places = self._mounts[[k for k in group if ranges[k] < nearest + self._config.radius]]
+            angle = theta + math.atan2(float(np.sin(places[:, 2]).sum()), float(np.cos(places[:, 2]).sum()))
+            mx, my = places[:, :2].mean(axis=0).tolist()
+            found.append((nearest, angle, np.array([x + cos * mx - sin * my, y + sin * mx + cos * my])))
+        return found
+
+    def _expect(self, thing: _Thing, now: float) -> None:
+        dt = now - thing.t
+        move = np.eye(4)
+        move[0, 2] = move[1, 3] = dt
+        q = self._config.agility**2
+        grow = np.zeros((4, 4))
+        for i in (0, 1):
+            grow[i, i], grow[i + 2, i + 2] = q * dt**4 / 4, q * dt * dt
+            grow[i, i + 2] = grow[i + 2, i] = q * dt**3 / 2
+        thing.state = move @ thing.state
+        thing.doubt = move @ thing.doubt @ move.T + grow
+        thing.t = now
+
+    @staticmethod
+    def _correct(thing: _Thing, z: Array, noise: Array, now: float) -> None:
+        gain = thing.doubt[:, :2] @ np.linalg.inv(thing.doubt[:2, :2] + noise)
+        thing.state = thing.state + gain @ (z - thing.state[:2])
+        thing.doubt = thing.doubt - gain @ thing.doubt[:2]
+        thing.seen = now

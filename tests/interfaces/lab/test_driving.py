@@ -1,0 +1,184 @@
+"""The laboratory of the mobile robot: operators, runs, tables."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from interfaces.cli.main import app
+from interfaces.lab.driving.operators import STYLES, operator
+from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
+from interfaces.teleop.architectures import Transport
+from robots.ipr.bare import BareBody
+from robots.ipr.reality import MobileReality
+from robots.ipr.robot import place
+from robots.onboard.driving import STAND, Drive, Posture
+from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile import advanced
+
+IDEAL = MobileReality.ideal(dt=1 / 60)
+
+
+@pytest.mark.parametrize("style", list(STYLES))
+@pytest.mark.parametrize("seed", range(3))
+def test_styles_keep_headroom_and_touch_nothing(style: str, seed: int) -> None:
+    who = operator(style, seed, 0.1)
+    # What a map doesn't have is for the extended architecture.
+    room = place(who.room).known() if who.room else None
+    body = BareBody("ipr", who.start, room=room, reality=IDEAL, rng=0)
+    posture, before, way = who.start, STAND, 0.0
+    for k in range(1200):
+        drive = who.drive(0.1 * k, posture, before)
+        assert abs(drive.v) <= 0.35
+        assert abs(drive.w) <= np.radians(30) + 1e-9
+        assert abs(drive.v - before.v) <= 0.36 * 0.1 + 1e-9
+        posture, before = Posture(*advanced(posture, drive.v, drive.w, 0.1)), drive
+        body.follow(drive.v, drive.w)
+        way += 0.1 * abs(drive.v)
+    assert body.collisions == ()
+    assert way > 12.0
+
+
+def test_a_seed_drives_the_same_and_another_otherwise() -> None:
+    def driven(seed: int) -> list[Drive]:
+        who = operator("mixed", seed, 0.1)
+        drives, posture = [STAND], who.start
+        for k in range(100):
+            drives.append(who.drive(0.1 * k, posture, drives[-1]))
+            posture = Posture(*advanced(posture, drives[-1].v, drives[-1].w, 0.1))
+        return drives
+
+    assert driven(4) == driven(4)
+    assert driven(4) != driven(8)
+
+
+def test_recorded_inputs_are_driven_as_they_were(tmp_path: Path) -> None:
+    file = tmp_path / "inputs.csv"
+    file.write_text("t,v,w\n0,0,0\n0.5,0.05,0\n1.5,0,0.2\n2,0,0\n", encoding="utf-8")
+    drive = run(Case(delay="none", robot="bare", operator=f"inputs:{file}", length=6.0, reality=IDEAL))
+    x, y, theta = drive.virtual[-1]
+    assert (x, y, theta) == pytest.approx((0.05, 0.0, 0.1), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1"),
+        ("t,v\n0,1\n", "line 1"),
+        ("t,v,w\n0,0\n", "line 2"),
+        ("t,v,w\n0,0,nan\n1,0,0\n", "line 2"),
+        ("t,v,w\n0.5,0,0\n1,0,0\n", "line 2"),
+        ("t,v,w\n0,0,0\n0,0,0\n", "line 3"),
+        ("t,v,w\n0,0,0\n", "two rows"),
+        ("t,v,w\n0,0,1e9\n1,0,0\n", "line 2"),
+    ],
+)
+def test_inputs_that_are_none_are_refused_with_the_line(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "bad.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(FormatError, match=said):
+        operator(f"inputs:{file}", 0, 0.1)
+
+
+def test_a_run_is_the_same_to_the_last_bit() -> None:
+    case = Case("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 20.0)
+    one, other = run(case), run(case)
+    for name in ("t", "real", "measured", "drives", "offset", "estimated"):
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+    assert one.compare() == other.compare()
+
+
+def test_without_delay_and_with_the_model_itself_the_twins_agree() -> None:
+    for architecture in ("I", "II", "III-capped", "timeline"):
+        drive = run(Case(architecture, Transport.STREAM, "none", "bare", "figure-eight", 0, 30.0, reality=IDEAL))
+        found = drive.compare()
+        assert found.progress is not None
+        assert found.progress > 0.99
+        assert found.path_error_max is not None
+        assert found.path_error_max < 0.03
+        assert drive.limits_passed() == 0
+
+
+def test_a_run_goes_on_for_the_largest_delay_and_five_seconds() -> None:
+    drive = run(Case("timeline", Transport.DATAGRAMS, "constant:3", "bare", "figure-eight", 0, 10.0))
+    assert drive.t[-1] == pytest.approx(18.0, abs=0.1)
+
+
+def test_lost_packets_are_repeated_and_the_path_is_kept(tmp_path: Path) -> None:
+    trace = tmp_path / "trace.csv"
+    rng = np.random.default_rng(0)
+    rows = ['""' if rng.random() < 0.3 else f"{rng.uniform(0.02, 0.6):.3f}" for _ in range(3000)]
+    trace.write_text("delay_s\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    drive = run(Case("timeline", Transport.DATAGRAMS, f"trace:{trace}", "bare", "docking", 1, 60.0))
+    found = drive.compare()
+    assert found.path_error_max is not None
+    assert found.path_error_max < 0.03
+    assert found.progress is not None
+    assert found.progress > 0.97
+
+
+def test_the_table_doesn_t_depend_on_the_workers() -> None:
+    chosen = cases(["II", "timeline"], [Transport.STREAM], ["thu@3.3"], ["bare"], ["mixed"], range(2), 10.0)
+    assert sweep(chosen, workers=1) == sweep(chosen, workers=2)
+
+
+def test_a_paired_difference_has_a_verdict() -> None:
+    row = measure(Case("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
+
+    def group(name: str, worst: list[float]) -> object:
+        rows = [
+            replace(row, architecture=name, seed=k, metrics=replace(row.metrics, path_error_max=x))
+            for k, x in enumerate(worst)
+        ]
+        return grouped(rows)[0]
+
+    def verdict(first: list[float], second: list[float]) -> str:
+        found = paired(group("a", first), group("b", second), "path_error_max")  # type: ignore[arg-type]
+        assert found is not None
+        return found.verdict
+
+    low, high = [0.01, 0.012, 0.011, 0.013], [0.03, 0.05, 0.04, 0.06]
+    assert verdict(low, high) == "below"
+    assert verdict(high, low) == "above"
+    assert verdict(low, [x * 1.01 for x in low]) == "equal"
+    assert verdict([0.01, 0.05], [0.04, 0.01]) == "unclear"
+
+
+def test_the_command_writes_its_table(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    asked = [
+        "lab", "--out", str(out), "--architecture", "III", "--architecture", "timeline", "--delay", "domain",
+        "--robot", "bare", "--runs", "2", "--length", "8", "--workers", "1",
+    ]  # fmt: skip
+    done = CliRunner().invoke(app, asked)
+    assert done.exit_code == 0, done.output
+    found = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert [group["architecture"] for group in found["groups"]] == ["III", "timeline"]
+    assert len((out / "runs.csv").read_text(encoding="utf-8").splitlines()) == 5
+    assert (out / "paths.svg").read_text(encoding="utf-8").startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ["--architecture", "IV"],
+        ["--transport", "pigeon"],
+        ["--delay", "x"],
+        ["--robot", "r2"],
+        ["--operator", "me"],
+    ],
+)
+def test_a_wrong_name_is_one_error(tmp_path: Path, wrong: list[str]) -> None:
+    done = CliRunner().invoke(app, ["lab", "--out", str(tmp_path), *wrong])
+    assert isinstance(done.exception, (InvalidValueError, SystemExit))
+
+
+def test_the_start_is_where_both_robots_begin() -> None:
+    drive = run(Case(robot="bare", operator="docking", delay="none", length=2.0))
+    assert Posture(*drive.virtual[0]) == Posture(*drive.real[0]) == operator("docking", 0, 0.1).start

@@ -1,0 +1,40 @@
+"""The virtual mobile robot: exact arcs on the timeline, posture estimator, virtual environment.
+
+Source: Han, Kim, Kim, Kim, "Internet Control Architecture for Internet-Based Personal Robot", 2001.
+"""
+
+from __future__ import annotations
+
+from vrs.mobile.avoidance import Avoidance
+from vrs.mobile.engine import MobileEngine
+from vrs.mobile.environment import VirtualEnvironment
+from vrs.mobile.estimator import Feedback, PostureEstimator
+from vrs.mobile.kinematics import advanced, increment, rotation, speeds, wheel_speeds, wrapped
+from vrs.mobile.limiting import braking, clipped, limited
+from vrs.mobile.model import DriveLimits, MobileModel, Wheels
+from vrs.mobile.rays import Grid, cast
+from vrs.mobile.timeline import ArcTimeline, Drive
+
+__all__ = [
+    "ArcTimeline",
+    "Avoidance",
+    "Drive",
+    "DriveLimits",
+    "Feedback",
+    "Grid",
+    "MobileEngine",
+    "MobileModel",
+    "PostureEstimator",
+    "VirtualEnvironment",
+    "Wheels",
+    "advanced",
+    "braking",
+    "cast",
+    "clipped",
+    "increment",
+    "limited",
+    "rotation",
+    "speeds",
+    "wheel_speeds",
+    "wrapped",
+]

@@ -1,0 +1,103 @@
+"""The driver: f, eq. (1) of Doulgeri et al., for a mobile robot. It's given the time and reads no clock."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vrs.agenda import Agenda, before_issue, passed
+from vrs.chunk import HOLD
+from vrs.commands import DriveCommand, Insertion, Lateness, Stop
+from vrs.errors import PlanningError
+from vrs.insertion import Edit, tail_at
+from vrs.ledger import Ledger
+from vrs.mobile.limiting import braking
+from vrs.mobile.model import DriveLimits, MobileModel
+from vrs.mobile.timeline import ArcTimeline, Drive
+from vrs.receipt import Receipt, Status
+
+_NOWHERE = np.empty(0)
+"""A drive command has no target."""
+
+
+class Driver(Agenda[ArcTimeline]):
+    """What an engine has planned for a mobile robot."""
+
+    def __init__(
+        self, model: MobileModel, timeline: ArcTimeline, ledger: Ledger[ArcTimeline], lateness: Lateness
+    ) -> None:
+        super().__init__(timeline, ledger, lateness)
+        self.limits: DriveLimits = model.limits
+        self._period = model.period
+
+    def drive(self, command: DriveCommand, now: float | None) -> Receipt:
+        """Carry out a drive command.
+
+        Args:
+            command: Its form is sound.
+            now: Present time [s]; None offline.
+        """
+        issued = command.issued_at if command.issued_at is not None else now
+        asked, end = command.execute_at, self.timeline.end
+        status, reason = Status.ACCEPTED, ""
+        refusal = self.limits.refusal(command.v, command.w)
+        if refusal:
+            return self.reject(issued, asked, refusal)
+        t = end if asked is None else asked
+        if now is not None:
+            issued = now if issued is None else issued
+            t = max(t, now, issued) if asked is None else t
+            if t < issued:
+                return self.reject(issued, asked, before_issue(t, issued))
+            if t < now:
+                reason = passed(t, now)
+                if self.lateness is Lateness.REJECT:
+                    return self.reject(issued, asked, reason)
+                t = self.end_of_active(now)
+                status, reason = Status.POSTPONED, f"{reason}: postponed to {t:.9g} s"
+        command_id = self.ledger.newest + 1
+        edit = self._spliced(t, Drive(command.duration, command.v, command.w, command_id))
+        appended = t >= end
+        shifted, dropped = ((), ()) if appended else self.touched(edit, t)
+        receipt = Receipt(
+            command_id, status, issued, asked, t, edit.arrival, None, reason, edit.timeline.version, edit.shift,
+            shifted_names=shifted, superseded_names=dropped,
+        )  # fmt: skip
+        return self.accept(receipt, None, edit, t, appended=appended)
+
+    def _spliced(self, t: float, drive: Drive) -> Edit[ArcTimeline]:
+        """The past, the new arc, standing while there's slack, and the tail from where the robot then is."""
+        timeline = self.timeline
+        tail, dropped = tail_at(timeline, t, Insertion.SPLICE)
+        arrival = t + drive.duration
+        if tail is None:
+            return Edit(timeline.edited(t, [drive]), t, arrival, _NOWHERE, dropped=dropped)
+        scheduled = timeline.start_of(tail)
+        slack = scheduled - arrival
+        drives = [drive, Drive(slack, 0.0, 0.0, HOLD)] if slack > 0 else [drive]
+        after = timeline.edited(t, drives, tail, max(scheduled, arrival))
+        return Edit(after, t, arrival, _NOWHERE, max(-slack, 0.0), tail, dropped)
+
+    def stop(self, command: Stop, now: float | None) -> Receipt:
+        """Brake along the present arc and drop what is scheduled."""
+        issued = command.issued_at if command.issued_at is not None else now
+        try:
+            moment = self.moment(command, now, self.timeline.end)
+        except PlanningError as error:
+            return self.reject(issued, command.execute_at, str(error))
+        command_id = self.ledger.newest + 1
+        t = moment.t
+        after, reason = self.brake(t, command_id)
+        edit = Edit(after, t, max(after.end, t), _NOWHERE, dropped=None)
+        if moment.reason:
+            reason = f"{moment.reason}; {reason}"
+        receipt = Receipt(
+            command_id, moment.status, moment.issued, moment.asked, t, edit.arrival, None, reason, after.version,
+            superseded_names=self.touched(edit, t)[1],
+        )  # fmt: skip
+        return self.accept(receipt, None, edit, t)
+
+    def brake(self, t: float, command_id: int) -> tuple[ArcTimeline, str]:
+        """What is scheduled, with the robot braking along its arc from t [s] on, a command every period."""
+        steps = braking(self.timeline.speeds_before(t), self._period, self.limits)
+        drives = [Drive(self._period, v, w, command_id) for v, w in steps]
+        return self.timeline.edited(t, drives), "stopped on its arc" if drives else "stood"
