@@ -7,6 +7,7 @@ A bare PyBullet step of the same world, beside the PyBullet robot, tells what is
 from __future__ import annotations
 
 import math
+import os
 import statistics
 import time
 from collections.abc import Callable
@@ -77,11 +78,50 @@ def measure(blocks: int = 40) -> dict[str, float]:
     return result
 
 
+def whole_runs(length: float = 60.0, rounds: int = 3) -> dict[str, float]:
+    """Times real time of laboratory runs with links and metrics, by architecture, medians of rounds in turns.
+
+    Of the time of the whole run: it goes on after the operator stopped.
+    """
+    from interfaces.lab.driving.run import Case, run
+    from interfaces.teleop.architectures import ARCHITECTURES, Transport
+
+    found: dict[str, list[float]] = {}
+    for _ in range(rounds):
+        for name in ARCHITECTURES:
+            transport = Transport.DATAGRAMS if name == "timeline" else Transport.STREAM
+            case = Case(name, transport, "mon@3.3", "bare", "figure-eight", 1, length)
+            start = time.process_time()
+            drive = run(case)
+            drive.compare()
+            found.setdefault(name, []).append((time.process_time() - start) / float(drive.t[-1]))
+    return {name: 1 / statistics.median(costs) for name, costs in found.items()} | {
+        f"{name}_best": 1 / min(costs) for name, costs in found.items()
+    }
+
+
+def many_runs(count: int, length: float = 120.0) -> float:
+    """Seconds by the clock that laboratory runs take on two workers, with metrics."""
+    from interfaces.lab.driving.sweep import cases, measure, sweep
+    from interfaces.teleop.architectures import Transport
+
+    chosen = cases(["timeline"], [Transport.DATAGRAMS], ["mon@3.3"], ["bare"], ["mixed"], range(count), length)
+    start = time.perf_counter()
+    sweep(chosen, measure, workers=2)
+    return time.perf_counter() - start
+
+
+RUNS = int(os.environ.get("VRS_LAB_RUNS", "40"))
+"""How many runs are timed on two workers; the bar is for 1,000."""
+
+
 def part() -> Part:
     """Measure."""
     from benchmarks.results import Bar, Cost, Part, Result
+    from interfaces.teleop.architectures import ARCHITECTURES
 
-    found = measure()
+    found = measure() | whole_runs()
+    seconds = many_runs(RUNS)
 
     def row(what: str, name: str, asked: float | None, note: str = "") -> Result:
         bar = Bar(median=None if asked is None else 1e6 / asked)
@@ -99,5 +139,12 @@ def part() -> Part:
             row("micro-robot in PyBullet, sonars and camera", "micro", 20.0),
             row("bare robot", "bare", 500.0),
             row("bare robot with sonars", "bare_sonar", None),
+            *(row(f"a run by {name}, bare, with link and metrics", name, 250.0) for name in ARCHITECTURES),
+            Result(
+                f"a run of 120 s, of {RUNS} on two workers",
+                Cost(1e6 * seconds / RUNS),
+                bar=Bar(median=0.24e6),
+                note=f"{seconds * 1000 / RUNS:.0f} s for 1,000",
+            ),
         ),
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -11,7 +12,8 @@ from interfaces.cli.demo import prepare
 
 if TYPE_CHECKING:
     from interfaces.lab.driving.run import Case
-    from interfaces.lab.driving.sweep import Row
+
+Made = TypeVar("Made")
 
 
 def lab(
@@ -47,14 +49,19 @@ def lab(
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
     ] = 2,
+    attribution: Annotated[
+        bool,
+        typer.Option("--attribution", help="Say how much is due to delay, model, localization and environment."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Write the summary on standard output too.")] = False,
 ) -> None:
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
+    from interfaces.lab.driving.attribution import attributed
     from interfaces.lab.driving.operators import operator as make
-    from interfaces.lab.driving.output import rich_table, summary, write
+    from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
     from interfaces.lab.driving.pictures import pictures
     from interfaces.lab.driving.run import ROBOTS
-    from interfaces.lab.driving.sweep import cases
+    from interfaces.lab.driving.sweep import cases, measure
     from interfaces.link.profiles import delay_profile
     from interfaces.teleop.architectures import ARCHITECTURES, Transport
     from vrs.checks import one_of
@@ -69,30 +76,34 @@ def lab(
         make(who, seed, 0.1)
     prepare(out)
     chosen = cases(architectures, transports, delays, robots, operators, range(seed, seed + runs), length)
-    rows = _measured(chosen, workers)
+    rows = _worked(chosen, measure, "runs", workers)
+    causes = attributions(chosen, _worked(chosen, attributed, "causes", workers)) if attribution else []
     settings = {
         "architectures": architectures, "transports": [t.value for t in transports], "delays": delays,
         "robots": robots, "operators": operators, "runs": runs, "seed": seed, "length_s": length,
     }  # fmt: skip
-    write(rows, settings, pictures(chosen), out)
+    found = summary(rows, settings, causes)
+    write(rows, found, pictures(chosen), out)
     if as_json:
         import json
 
-        typer.echo(json.dumps(summary(rows, settings), indent=2, ensure_ascii=False))
+        typer.echo(json.dumps(found, indent=2, ensure_ascii=False))
         return
     from rich.console import Console
 
     Console().print(rich_table(rows))
+    if causes:
+        Console().print(causes_table(causes))
     typer.echo(f"Wrote {out / 'summary.json'}, runs.csv with {len(rows)} runs, and the figures")
 
 
-def _measured(chosen: list[Case], workers: int) -> list[Row]:
+def _worked(chosen: list[Case], work: Callable[[Case], Made], what: str, workers: int) -> list[Made]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from interfaces.lab.driving.sweep import sweep
 
-    columns = (TextColumn("runs"), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
+    columns = (TextColumn(what), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("runs", total=len(chosen))
-        return sweep(chosen, workers=workers, progress=lambda: bar.advance(task))
+        task = bar.add_task(what, total=len(chosen))
+        return sweep(chosen, work, workers=workers, progress=lambda: bar.advance(task))

@@ -34,6 +34,30 @@ class FusionConfig:
             number_in(name, getattr(self, name), 0.0, 1.0)
 
 
+class TruePosition:
+    """Knows where a robot really is: for comparison."""
+
+    def __init__(self, robot: MobileRobot) -> None:
+        """Take the robot."""
+        self._robot = robot
+
+    def posture(self) -> Posture:
+        """Where the robot is now, (x, y, θ) [m, m, rad]."""
+        return Posture(*self._robot.truth)
+
+
+class OdometryPosition:
+    """Takes a robot to be where its odometry says: smooth, and further off the longer it drives."""
+
+    def __init__(self, robot: MobileRobot) -> None:
+        """Take the robot; its odometry starts where it really is."""
+        self._robot = robot
+
+    def posture(self) -> Posture:
+        """Where the robot takes itself to be now, (x, y, θ) [m, m, rad]."""
+        return Posture(*self._robot.reckoned)
+
+
 class FusedPosition:
     """Follows a robot's odometry and camera; call it once a control period."""
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from interfaces.lab.driving.attribution import CAUSES, Attribution
+from interfaces.lab.driving.run import Case
 from interfaces.lab.driving.sweep import METRICS, Group, Row, grouped, paired
 from interfaces.lab.output import DIGITS
 from interfaces.lab.statistics import Estimate
@@ -45,13 +48,57 @@ def _estimate(found: Estimate | None) -> dict[str, float] | None:
     return {name: float(_cell(value)) for name, value in found._asdict().items()}
 
 
-def summary(rows: Sequence[Row], settings: dict[str, Any]) -> dict[str, Any]:
+def attributions(chosen: Sequence[Case], found: Sequence[tuple[Attribution, ...]]) -> list[dict[str, Any]]:
+    """What each cause does, means over seeds, an entry a combination and figure, as JSON takes them."""
+    groups: dict[tuple[tuple[str, ...], str], list[Attribution]] = {}
+    for case, parts in zip(chosen, found, strict=True):
+        key = case.architecture, case.transport.value, case.delay, case.robot, case.operator
+        for one in parts:
+            groups.setdefault((key, one.figure), []).append(one)
+    return [
+        {
+            **dict(zip(KEYS, key, strict=True)),
+            "figure": figure,
+            "total": _mean([one.total for one in members]),
+            "parts": {cause: _mean([one.parts[k] for one in members]) for k, cause in enumerate(CAUSES)},
+            "residual": _mean([one.residual for one in members]),
+        }
+        for (key, figure), members in groups.items()
+    ]
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(_cell(math.fsum(values) / len(values)))
+
+
+def causes_table(causes: Sequence[dict[str, Any]]) -> RichTable:
+    """What each cause does, as a table."""
+    from rich.table import Table
+
+    table = Table(title="what it is due to, switched off from left to right", title_justify="left")
+    for name in ("architecture", "delay", "figure", "total", *(f"{cause}" for cause in CAUSES), "residual"):
+        table.add_column(name, justify="left" if name in {"architecture", "delay", "figure"} else "right")
+    for one in causes:
+        path = one["figure"].startswith("path")
+        scale, unit = (100, "cm") if path else (1, "s")
+        values = (one["total"], *one["parts"].values(), one["residual"])
+        named = (
+            f"{one['architecture']}, {one['transport']}",
+            one["delay"],
+            f"{one['figure'][:-5].replace('_', ' ')}, {unit}",
+        )
+        table.add_row(*named, *(f"{scale * value:.2f}" for value in values))
+    return table
+
+
+def summary(rows: Sequence[Row], settings: dict[str, Any], causes: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
     """The groups and their paired tests, as JSON takes them; the same rows give the same."""
     groups = grouped(rows)
     return {
         "schema": SCHEMA,
         "settings": settings,
         "groups": [_group(group) for group in groups],
+        "attribution": list(causes),
         "paired": [
             {
                 "metric": found.metric,
@@ -81,7 +128,7 @@ def _group(group: Group) -> dict[str, Any]:
     }
 
 
-def write(rows: Sequence[Row], settings: dict[str, Any], figures: Sequence[Figure], out: Path) -> None:
+def write(rows: Sequence[Row], found: dict[str, Any], figures: Sequence[Figure], out: Path) -> None:
     """Write runs.csv, summary.json and the pictures into an existing directory.
 
     Raises:
@@ -92,7 +139,7 @@ def write(rows: Sequence[Row], settings: dict[str, Any], figures: Sequence[Figur
             table = csv.writer(file, lineterminator="\n")
             table.writerow(COLUMNS)
             table.writerows(_row(row) for row in rows)
-        text = json.dumps(summary(rows, settings), indent=2, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False)
         (out / "summary.json").write_text(text + "\n", encoding="utf-8")
         for figure in figures:
             (out / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")

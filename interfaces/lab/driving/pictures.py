@@ -77,5 +77,5 @@ def _errors(canvas: Canvas, matches: dict[str, PathMatch]) -> None:
         right.set_ylabel("time diff. [s]")
         for ax in (left, right):
             ax.set_ylim(bottom=0)
-    for ax in grid[-1]:
-        ax.set_xlabel("time of the virtual robot [s]")
+    grid[-1][0].set_xlabel("time [s]")
+    grid[-1][1].set_xlabel("time of the virtual robot [s]")

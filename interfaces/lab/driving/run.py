@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from interfaces.teleop.architectures import (
     OperatorSite,
     Packet,
     Player,
+    Position,
     Report,
     RobotSite,
     Transport,
@@ -27,7 +30,7 @@ from robots.bullet.rooms import Room
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
-from robots.ipr.position import FusedPosition
+from robots.ipr.position import FusedPosition, OdometryPosition, TruePosition
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import STAND, Posture
@@ -50,6 +53,12 @@ SENSING = ("extended",)
 """Architectures whose robot has sonars, and whose operator has the map of the room."""
 ROBOTS = ("ipr", "micro", "bare")
 """Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""
+POSITIONS: Final[dict[str, Callable[[MobileRobot], Position]]] = {
+    "fused": FusedPosition,
+    "odometry": OdometryPosition,
+    "truth": TruePosition,
+}
+"""What can tell a robot where it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +80,13 @@ class Case:
     """Of the real robot; all of it unless given."""
     room: str | Room = ""
     """Where it drives, a room or a name of `robots.ipr.robot.PLACES`; the operator's own unless given."""
+    position: str = "fused"
+    """Where the real robot takes itself to be: `fused` (odometry and camera), `odometry`, or the `truth`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
         one_of("robot", self.robot, ROBOTS)
+        one_of("position", self.position, POSITIONS)
         if isinstance(self.room, str):
             one_of("room", self.room, ("", *PLACES))
         number_in("length", self.length, 1.0, 3600.0, unit=" s")
@@ -175,7 +187,8 @@ class _Run:
         there = operator_surroundings(body, driver.start, model) if senses else None
         here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
         self._site = OperatorSite(model, driver.start, case.transport, surroundings=there)
-        self._robot = RobotSite(made, FusedPosition(body), IPR_LIMITS, period=CONTROL, surroundings=here)
+        position = POSITIONS[case.position](body)
+        self._robot = RobotSite(made, position, IPR_LIMITS, period=CONTROL, surroundings=here)
         self._offset = made if isinstance(made, Player) else None
         self._waiting = 0
         """Packets on their way that were sent while the operator drove."""

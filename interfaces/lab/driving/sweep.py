@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields
 from itertools import product
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 from vrs.errors import InvalidValueError
 
+Made = TypeVar("Made")
+"""What is made of a case."""
 METRICS = tuple(item.name for item in fields(PathComparison))
 """Names of the metrics, as in files."""
 LEAST_PROGRESS = 0.97
@@ -79,25 +82,25 @@ def cases(
 
 def sweep(
     chosen: Sequence[Case],
+    work: Callable[[Case], Made],
     *,
     workers: int = 1,
-    work: Callable[[Case], Row] = measure,
     progress: Callable[[], None] = lambda: None,
-) -> list[Row]:
-    """Run all cases, some at once; the rows are in the order of the cases, and don't depend on the workers.
+) -> list[Made]:
+    """Work on all cases, some at once; what's made is in the order of the cases, and doesn't depend on the workers.
 
     Args:
         chosen: What to run.
+        work: What is done with a case, as `measure`; a function of a module, for other processes.
         workers: Processes at once, 1 to 64.
-        work: What makes a row of a case; in other processes, a function of a module.
-        progress: Told when a run is done.
+        progress: Told when a case is done.
 
     Raises:
         InvalidValueError: If there are too few or too many workers.
     """
     if not 1 <= workers <= MOST_WORKERS:
         raise InvalidValueError("workers", workers, f"1 to {MOST_WORKERS}")
-    rows = []
+    rows: list[Made] = []
     if workers == 1:
         for case in chosen:
             rows.append(work(case))

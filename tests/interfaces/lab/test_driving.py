@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from interfaces.cli.main import app
+from interfaces.lab.driving.attribution import attributed
 from interfaces.lab.driving.operators import STYLES, operator
 from interfaces.lab.driving.run import Case, run
 from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
@@ -125,7 +126,7 @@ def test_lost_packets_are_repeated_and_the_path_is_kept(tmp_path: Path) -> None:
 
 def test_the_table_doesn_t_depend_on_the_workers() -> None:
     chosen = cases(["II", "timeline"], [Transport.STREAM], ["thu@3.3"], ["bare"], ["mixed"], range(2), 10.0)
-    assert sweep(chosen, workers=1) == sweep(chosen, workers=2)
+    assert sweep(chosen, measure, workers=1) == sweep(chosen, measure, workers=2)
 
 
 def test_a_paired_difference_has_a_verdict() -> None:
@@ -154,12 +155,15 @@ def test_the_command_writes_its_table(tmp_path: Path) -> None:
     out = tmp_path / "out"
     asked = [
         "lab", "--out", str(out), "--architecture", "III", "--architecture", "timeline", "--delay", "domain",
-        "--robot", "bare", "--runs", "2", "--length", "8", "--workers", "1",
+        "--robot", "bare", "--runs", "2", "--length", "8", "--workers", "1", "--attribution",
     ]  # fmt: skip
     done = CliRunner().invoke(app, asked)
     assert done.exit_code == 0, done.output
     found = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert [group["architecture"] for group in found["groups"]] == ["III", "timeline"]
+    assert [found["figure"] for found in found["attribution"]] == ["path_error_mean", "time_difference_mean"] * 2
+    for one in found["attribution"]:
+        assert sum(one["parts"].values()) + one["residual"] == pytest.approx(one["total"], abs=1e-5)
     assert len((out / "runs.csv").read_text(encoding="utf-8").splitlines()) == 5
     assert (out / "paths.svg").read_text(encoding="utf-8").startswith("<?xml")
 
@@ -182,3 +186,25 @@ def test_a_wrong_name_is_one_error(tmp_path: Path, wrong: list[str]) -> None:
 def test_the_start_is_where_both_robots_begin() -> None:
     drive = run(Case(robot="bare", operator="docking", delay="none", length=2.0))
     assert Posture(*drive.virtual[0]) == Posture(*drive.real[0]) == operator("docking", 0, 0.1).start
+
+
+@pytest.mark.parametrize("architecture", ["II", "timeline"])
+def test_causes_add_up_and_are_those_that_were_made(architecture: str) -> None:
+    case = Case(architecture, Transport.STREAM, "constant:1.5", "bare", "corridor", 0, 40.0)
+    path, late = attributed(case)
+    for found in (path, late):
+        assert sum(found.parts) + found.residual == pytest.approx(found.total, rel=1e-9)
+    assert late.parts[0] == pytest.approx(1.5, abs=0.3)
+    assert abs(late.parts[1]) + abs(late.parts[2]) < 0.3
+    if architecture == "II":
+        # Nobody corrects what slip and wrong wheels do.
+        assert path.parts[1] > 0.5 * path.total
+        assert path.parts[2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_odometry_alone_drifts() -> None:
+    case = Case("timeline", Transport.DATAGRAMS, "none", "bare", "figure-eight", 0, 60.0)
+    fused, alone = (run(replace(case, position=position)).compare() for position in ("fused", "odometry"))
+    assert fused.path_error_max is not None
+    assert alone.path_error_max is not None
+    assert alone.path_error_max > 5 * fused.path_error_max
