@@ -26,6 +26,7 @@ SCHEMA = "vrs-lab/1"
 KEYS = ("architecture", "transport", "delay", "robot", "operator")
 COLUMNS = (*KEYS, "seed", *METRICS, "collisions", "limits_passed", "sent_bytes", "longest_delay")
 """Of runs.csv; lengths in metres, times in seconds, speeds in m/s. An empty cell is undefined."""
+HEADS = {"localization": "locali-\nzation", "environment": "environ-\nment"}
 COMPARED = ("path_error_max", "path_error_mean", "time_difference_mean", "speed_error")
 
 
@@ -76,18 +77,17 @@ def causes_table(causes: Sequence[dict[str, Any]]) -> RichTable:
     from rich.table import Table
 
     table = Table(title="what it is due to, switched off from left to right", title_justify="left")
-    for name in ("architecture", "delay", "figure", "total", *(f"{cause}" for cause in CAUSES), "residual"):
-        table.add_column(name, justify="left" if name in {"architecture", "delay", "figure"} else "right")
+    for name in ("architecture", "network", "of"):
+        table.add_column(name, no_wrap=True)
+    for name in ("all", *(HEADS.get(cause, cause) for cause in CAUSES), "rest"):
+        table.add_column(name, justify="right", no_wrap=True)
     for one in causes:
         path = one["figure"].startswith("path")
-        scale, unit = (100, "cm") if path else (1, "s")
+        scale, what = (100, "path, cm") if path else (1, "time, s")
         values = (one["total"], *one["parts"].values(), one["residual"])
-        named = (
-            f"{one['architecture']}, {one['transport']}",
-            one["delay"],
-            f"{one['figure'][:-5].replace('_', ' ')}, {unit}",
-        )
-        table.add_row(*named, *(f"{scale * value:.2f}" for value in values))
+        who = f"{one['architecture']}, {one['transport']}"
+        # Without a minus before nothing.
+        table.add_row(who, one["delay"], what, *(f"{round(scale * value, 2) + 0.0:.2f}" for value in values))
     return table
 
 
@@ -161,16 +161,16 @@ def rich_table(rows: Sequence[Row]) -> RichTable:
         title_justify="left",
     )
     for k in varying:
-        table.add_column(KEYS[k])
+        table.add_column(KEYS[k], no_wrap=True)
     for name in (
-        "largest path error, cm",
-        "worst, cm",
-        "time difference, s",
-        "speed error, cm/s",
-        "progress, %",
-        "collisions",
+        "path error,\nlargest [cm]",
+        "worst\n[cm]",
+        "time diff.\n[s]",
+        "speed err.\n[cm/s]",
+        "done\n[%]",
+        "hits",
     ):
-        table.add_column(name, justify="right")
+        table.add_column(name.replace("[", r"\["), justify="right")
     for group in groups:
         path, late = group.median("path_error_max"), group.median("time_difference_mean")
         speed, progress = group.median("speed_error"), group.median("progress")
