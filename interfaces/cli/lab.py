@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from interfaces.cli.demo import prepare
 
 if TYPE_CHECKING:
-    from interfaces.lab.driving.run import Case
-
-Made = TypeVar("Made")
+    from interfaces.lab.driving.run import Drive
+    from interfaces.lab.driving.sweep import Row
+    from interfaces.lab.pool import Calls, Made
 
 
 def lab(
@@ -59,9 +58,9 @@ def lab(
     from interfaces.lab.driving.attribution import attributed
     from interfaces.lab.driving.operators import operator as make
     from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
-    from interfaces.lab.driving.pictures import pictures
+    from interfaces.lab.driving.pictures import drawn, pictures
     from interfaces.lab.driving.run import ROBOTS
-    from interfaces.lab.driving.sweep import cases, measure
+    from interfaces.lab.driving.sweep import cases, measure_kept
     from interfaces.link.profiles import delay_profile
     from interfaces.teleop.architectures import ARCHITECTURES, Transport
     from vrs.checks import one_of
@@ -76,14 +75,19 @@ def lab(
         make(who, seed, 0.1)
     prepare(out)
     chosen = cases(architectures, transports, delays, robots, operators, range(seed, seed + runs), length)
-    rows = _worked(chosen, measure, "runs", workers)
-    causes = attributions(chosen, _worked(chosen, attributed, "causes", workers)) if attribution else []
+    calls = [(measure_kept, given) for given in zip(chosen, drawn(chosen), strict=True)]
+    measured: list[tuple[Row, Drive | None]] = _worked(calls, "runs", workers)
+    rows = [row for row, _ in measured]
+    causes = []
+    if attribution:
+        taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
+        causes = attributions(chosen, _worked(taken, "causes", workers))
     settings = {
         "architectures": architectures, "transports": [t.value for t in transports], "delays": delays,
         "robots": robots, "operators": operators, "runs": runs, "seed": seed, "length_s": length,
     }  # fmt: skip
     found = summary(rows, settings, causes)
-    write(rows, found, pictures(chosen), out)
+    write(rows, found, pictures([drive for _, drive in measured if drive is not None]), out)
     if as_json:
         import json
 
@@ -97,13 +101,13 @@ def lab(
     typer.echo(f"Wrote {out / 'summary.json'}, runs.csv with {len(rows)} runs, and the figures")
 
 
-def _worked(chosen: list[Case], work: Callable[[Case], Made], what: str, workers: int) -> list[Made]:
+def _worked(calls: Calls[Made], what: str, workers: int) -> list[Made]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from interfaces.lab.driving.sweep import sweep
+    from interfaces.lab.pool import pooled
 
     columns = (TextColumn(what), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(what, total=len(chosen))
-        return sweep(chosen, work, workers=workers, progress=lambda: bar.advance(task))
+        task = bar.add_task(what, total=len(calls))
+        return pooled(calls, workers=workers, progress=lambda _: bar.advance(task))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from interfaces.lab.claims import Cell, Claim, Reproduction
+from interfaces.lab.claims import Cell, Claim, Figure, Reproduction
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -76,14 +77,23 @@ def write(reproduction: Reproduction, out: Path) -> Path:
     Raises:
         FormatError: If the directory can't hold them.
     """
-    path = out / f"{reproduction.paper.name}.json"
+    name = f"{reproduction.paper.name}.json"
+    write_files(out, reproduction.findings.figures, {name: to_json(reproduction)})
+    return out / name
+
+
+def write_files(out: Path, figures: Iterable[Figure], texts: Mapping[str, str]) -> None:
+    """Write pictures, and texts by the names of their files, into an existing directory.
+
+    Raises:
+        FormatError: If it can't hold them.
+    """
+    files = {f"{figure.name}.svg": figure.svg for figure in figures} | dict(texts)
     try:
-        for figure in reproduction.findings.figures:
-            (out / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
-        path.write_text(to_json(reproduction), encoding="utf-8")
+        for name, text in files.items():
+            (out / name).write_text(text, encoding="utf-8")
     except OSError as error:
         raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
-    return path
 
 
 def rich_tables(reproduction: Reproduction) -> list[RichTable]:

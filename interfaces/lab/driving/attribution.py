@@ -15,6 +15,7 @@ from interfaces.lab.driving.operators import operator
 from interfaces.lab.driving.run import SENSING, Case, run
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import place
+from vrs.comparison import PathComparison
 
 CAUSES: Final = ("delay", "model", "localization", "environment")
 """In the order in which they're switched off."""
@@ -35,16 +36,20 @@ class Attribution:
     """With all causes off."""
 
 
-def attributed(case: Case) -> tuple[Attribution, ...]:
+def attributed(case: Case, whole: PathComparison | None = None) -> tuple[Attribution, ...]:
     """Run a case with ever fewer causes of error.
 
     Args:
         case: With its own reality, position and network.
+        whole: Its figures with all causes on, where they're known.
 
     Raises:
         InvalidValueError: If a name or a value isn't allowed.
     """
-    found = [run(variant).compare() for variant in _variants(case)]
+    found = [run(case).compare() if whole is None else whole]
+    for before, variant in pairwise(_variants(case)):
+        # A cause that there isn't is nothing to be switched off.
+        found.append(found[-1] if variant == before else run(variant).compare())
     made = []
     for figure in FIGURES:
         values: Sequence[float] = [getattr(one, figure) or 0.0 for one in found]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Sequence
@@ -13,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 from interfaces.lab.driving.attribution import CAUSES, Attribution
 from interfaces.lab.driving.run import Case
 from interfaces.lab.driving.sweep import METRICS, Group, Row, grouped, paired
-from interfaces.lab.output import DIGITS
+from interfaces.lab.output import DIGITS, write_files
 from interfaces.lab.statistics import Estimate
-from vrs.errors import FormatError
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -53,9 +53,8 @@ def attributions(chosen: Sequence[Case], found: Sequence[tuple[Attribution, ...]
     """What each cause does, means over seeds, an entry a combination and figure, as JSON takes them."""
     groups: dict[tuple[tuple[str, ...], str], list[Attribution]] = {}
     for case, parts in zip(chosen, found, strict=True):
-        key = case.architecture, case.transport.value, case.delay, case.robot, case.operator
         for one in parts:
-            groups.setdefault((key, one.figure), []).append(one)
+            groups.setdefault((case.group, one.figure), []).append(one)
     return [
         {
             **dict(zip(KEYS, key, strict=True)),
@@ -134,17 +133,12 @@ def write(rows: Sequence[Row], found: dict[str, Any], figures: Sequence[Figure],
     Raises:
         FormatError: If it can't hold them.
     """
-    try:
-        with (out / "runs.csv").open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(COLUMNS)
-            table.writerows(_row(row) for row in rows)
-        text = json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False)
-        (out / "summary.json").write_text(text + "\n", encoding="utf-8")
-        for figure in figures:
-            (out / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
-    except OSError as error:
-        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
+    lines = io.StringIO()
+    table = csv.writer(lines, lineterminator="\n")
+    table.writerow(COLUMNS)
+    table.writerows(_row(row) for row in rows)
+    text = json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False)
+    write_files(out, figures, {"runs.csv": lines.getvalue(), "summary.json": text + "\n"})
 
 
 def rich_table(rows: Sequence[Row]) -> RichTable:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, REAL, VIRTUAL, draw, legend
-from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.run import Case, Drive
 from vrs.path_matching import PathMatch
 
 if TYPE_CHECKING:
@@ -19,19 +19,22 @@ MOST = 8
 ACROSS = 3
 
 
-def pictures(chosen: Sequence[Case]) -> list[Figure]:
-    """Pictures of the first run of each composition under the first network.
+def drawn(chosen: Sequence[Case]) -> list[bool]:
+    """Which cases are drawn: the first run of each composition under the first network.
 
     Args:
-        chosen: Cases as they were swept; at least one.
+        chosen: Cases as they are swept.
     """
-    first = chosen[0]
-    drives: dict[str, Drive] = {}
-    for case in chosen:
-        alike = (case.delay, case.robot, case.operator, case.seed)
-        if alike == (first.delay, first.robot, first.operator, first.seed) and len(drives) < MOST:
-            drives[f"{case.architecture}, {case.transport}"] = run(case)
-    return of_drives(drives, f"{first.robot}, {first.operator}, {first.delay}, seed {first.seed}")
+    alike = [(case.group[2:], case.seed) for case in chosen]
+    places = [k for k, one in enumerate(alike) if one == alike[0]][:MOST]
+    return [k in places for k in range(len(chosen))]
+
+
+def pictures(drives: Sequence[Drive]) -> list[Figure]:
+    """Pictures of the runs of cases that are `drawn`; at least one."""
+    first = drives[0].case
+    named = {f"{drive.case.architecture}, {drive.case.transport}": drive for drive in drives}
+    return of_drives(named, f"{first.robot}, {first.operator}, {first.delay}, seed {first.seed}")
 
 
 def of_drives(drives: dict[str, Drive], what: str) -> list[Figure]:
@@ -42,17 +45,21 @@ def of_drives(drives: dict[str, Drive], what: str) -> list[Figure]:
         what: Is the same in all of them.
     """
     matches = {name: drive.match() for name, drive in drives.items()}
-    rows = math.ceil(len(drives) / min(len(drives), ACROSS))
     titles = f"Paths of both robots: {what}", f"Path error and time difference: {what}"
     return [
-        draw("paths", titles[0], lambda canvas: _paths(canvas, drives), height=2.5 * rows),
+        draw("paths", titles[0], lambda canvas: _paths(canvas, drives), height=2.5 * _shape(drives)[0]),
         draw("errors", titles[1], lambda canvas: _errors(canvas, matches), height=1.5 * len(drives) + 0.4),
     ]
 
 
-def _paths(canvas: Canvas, drives: dict[str, Drive]) -> None:
+def _shape(drives: dict[str, Drive]) -> tuple[int, int]:
+    """Rows and columns of the picture of their paths."""
     across = min(len(drives), ACROSS)
-    grid = canvas.subplots(math.ceil(len(drives) / across), across, squeeze=False)
+    return math.ceil(len(drives) / across), across
+
+
+def _paths(canvas: Canvas, drives: dict[str, Drive]) -> None:
+    grid = canvas.subplots(*_shape(drives), squeeze=False)
     for ax in grid.flat[len(drives) :]:
         ax.set_visible(False)
     for ax, (name, drive) in zip(grid.flat, drives.items(), strict=False):

@@ -83,6 +83,11 @@ class Case:
     position: str = "fused"
     """Where the real robot takes itself to be: `fused` (odometry and camera), `odometry`, or the `truth`."""
 
+    @property
+    def group(self) -> tuple[str, str, str, str, str]:
+        """Architecture, transport, delay, robot and operator: what it's one of several seeds of."""
+        return self.architecture, self.transport.value, self.delay, self.robot, self.operator
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
         one_of("robot", self.robot, ROBOTS)

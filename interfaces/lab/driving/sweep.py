@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields
 from itertools import product
-from typing import TypeVar
 
 import numpy as np
 
-from interfaces.lab.driving.run import Case, run
-from interfaces.lab.running import MOST_WORKERS
+from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.pool import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
-from vrs.errors import InvalidValueError
 
-Made = TypeVar("Made")
-"""What is made of a case."""
 METRICS = tuple(item.name for item in fields(PathComparison))
 """Names of the metrics, as in files."""
 LEAST_PROGRESS = 0.97
@@ -54,10 +48,19 @@ class Row:
 
 def measure(case: Case) -> Row:
     """Run a case and keep its figures."""
+    return _row(run(case))
+
+
+def measure_kept(case: Case, keep: bool) -> tuple[Row, Drive | None]:
+    """Run a case and keep its figures, and the whole run if that's to be drawn."""
     drive = run(case)
+    return _row(drive), drive if keep else None
+
+
+def _row(drive: Drive) -> Row:
+    case = drive.case
     return Row(
-        case.architecture, case.transport.value, case.delay, case.robot, case.operator, case.seed,
-        drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,
+        *case.group, case.seed, drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,
         float(drive.delays[:, 1].max(initial=0.0)),
     )  # fmt: skip
 
@@ -85,7 +88,6 @@ def sweep(
     work: Callable[[Case], Made],
     *,
     workers: int = 1,
-    progress: Callable[[], None] = lambda: None,
 ) -> list[Made]:
     """Work on all cases, some at once; what's made is in the order of the cases, and doesn't depend on the workers.
 
@@ -93,31 +95,11 @@ def sweep(
         chosen: What to run.
         work: What is done with a case, as `measure`; a function of a module, for other processes.
         workers: Processes at once, 1 to 64.
-        progress: Told when a case is done.
 
     Raises:
         InvalidValueError: If there are too few or too many workers.
     """
-    if not 1 <= workers <= MOST_WORKERS:
-        raise InvalidValueError("workers", workers, f"1 to {MOST_WORKERS}")
-    rows: list[Made] = []
-    if workers == 1:
-        for case in chosen:
-            rows.append(work(case))
-            progress()
-        return rows
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        try:
-            for row in pool.map(work, chosen):
-                rows.append(row)
-                progress()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
-                child.terminate()
-            raise
-    return rows
+    return pooled([(work, (case,)) for case in chosen], workers=workers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +152,7 @@ def paired(first: Group, second: Group, metric: str) -> Paired | None:
 
     Time differences and speeds of runs with a progress below 97 % are taken by their bound, or not at all.
     """
-    one, other = ({row.seed: _comparable(row, metric) for row in group.rows} for group in (first, second))
+    one, other = ({row.seed: comparable(row.metrics, metric) for row in group.rows} for group in (first, second))
     pairs = [
         (a, b) for seed, a in one.items() if a is not None and (b := other.get(seed)) is not None
     ]  # fmt: skip
@@ -189,11 +171,12 @@ def paired(first: Group, second: Group, metric: str) -> Paired | None:
     return Paired(metric, first.key, second.key, difference, verdict)
 
 
-def _comparable(row: Row, metric: str) -> float | None:
-    whole = row.metrics.progress is not None and row.metrics.progress >= LEAST_PROGRESS
+def comparable(metrics: PathComparison, metric: str) -> float | None:
+    """A metric as it may be compared: below 97 % progress the bound of the time difference, and no speed error."""
+    whole = metrics.progress is not None and metrics.progress >= LEAST_PROGRESS
     if metric == "time_difference_mean" and not whole:
         metric = "time_difference_bound"
     elif metric == "speed_error" and not whole:
         return None
-    value: float | None = getattr(row.metrics, metric)
+    value: float | None = getattr(metrics, metric)
     return value

@@ -17,6 +17,7 @@ import numpy as np
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.driving.pictures import of_drives
 from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.teleop.architectures import Transport
 from robots.ipr.reality import MobileReality
@@ -38,8 +39,6 @@ COMPOSITIONS: Final = (
     ("timeline", Transport.DATAGRAMS),
 )
 CASES: Final = tuple(f"{robot} {profile}" for robot in ROBOTS for profile in PROFILES)
-WHOLE: Final = 0.97
-"""Progress below which the bound of the time difference stands for it."""
 SECTION: Final = "Section 4"
 
 
@@ -57,8 +56,7 @@ class Seen(NamedTuple):
     @property
     def late(self) -> float:
         """Mean time difference, or its bound [s]."""
-        whole = (self.path.progress or 0.0) >= WHOLE
-        found = self.path.time_difference_mean if whole else self.path.time_difference_bound
+        found = comparable(self.path, "time_difference_mean")
         return math.inf if found is None else found
 
     @property
@@ -291,7 +289,7 @@ def _kept(asked: _Asked, who: str, *, slow: bool, share: bool) -> None:
         share_of = asked.mean(who, _largest) / asked.mean("III", _largest)
         asked.most(f"{who}: largest path error, mean, as a share of III's", 0.2, share_of)
     missed = max(1.0 - (one.path.progress or 0.0) for one in asked.runs[who])
-    asked.most(f"{who}: largest share of the path not reached", 1.0 - WHOLE, missed)
+    asked.most(f"{who}: largest share of the path not reached", 1.0 - LEAST_PROGRESS, missed)
     if slow:
         asked.more("speed-profile error [cm/s]", "III", who, _speed)
     broken = sum(one.collisions + one.limits_passed for one in asked.runs[who])

@@ -1,0 +1,60 @@
+"""Work in some processes at once, in an order that doesn't show."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import Any, TypeAlias, TypeVar
+
+from vrs.errors import InvalidValueError
+
+MOST_WORKERS = 64
+"""Processes at once, at most."""
+Made = TypeVar("Made")
+"""What is made of a call."""
+Calls: TypeAlias = Sequence[tuple[Callable[..., Made], tuple[Any, ...]]]
+"""Functions, and the arguments of each."""
+
+
+def pooled(
+    calls: Calls[Made],
+    *,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda _: None,
+) -> list[Made]:
+    """Make calls, some at once.
+
+    Args:
+        calls: Functions of modules, and their arguments.
+        workers: Processes at once, 1 to 64; with one, this one.
+        progress: Told the place of each call that is done.
+
+    Returns:
+        What they return, in the order of the calls.
+
+    Raises:
+        InvalidValueError: If there are too few or too many workers.
+    """
+    if not 1 <= workers <= MOST_WORKERS:
+        raise InvalidValueError("workers", workers, f"1 to {MOST_WORKERS}")
+    made: dict[int, Made] = {}
+    if workers == 1:
+        for k, (work, given) in enumerate(calls):
+            made[k] = work(*given)
+            progress(k)
+        return list(made.values())
+    # A fork would copy the threads of whoever shows the progress.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        try:
+            waiting = {pool.submit(work, *given): k for k, (work, given) in enumerate(calls)}
+            for future in as_completed(waiting):
+                made[waiting[future]] = future.result()
+                progress(waiting[future])
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
+    return [made[k] for k in range(len(calls))]
