@@ -225,7 +225,7 @@ async def _serve(
             server=software(), recording=recording,
         )  # fmt: skip
         operator = LiveOperator(config, access)
-        station = Station(model, operator.scene.tool, access)
+        station = Station(model, operator.scene.tool)
         shown = f"[{host}]" if ":" in host else host
         near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())

@@ -7,51 +7,29 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Final
+from collections.abc import AsyncIterator, Iterable
+from typing import Final
 
 from fastapi import FastAPI
 from nicegui import Client, core, ui
 from nicegui.element import Element
-from nicegui.events import GenericEventArguments
 from starlette.routing import BaseRoute, Mount
 
 from interfaces.station.bounds import Bounds
 from interfaces.station.chain import described
 from interfaces.station.files import route
 from interfaces.station.panels import PANELS, Panel, Place
-from interfaces.stream.access import LONGEST_TOKEN, Access
-from interfaces.stream.control import Role
 from vrs.model import Array, RobotModel
 
 TITLE: Final = "VRS teleop"
 KEEP: Final = 30.0
 """How long the server keeps a page whose connection was lost [s]."""
-_RANKS: Final = (Role.ADMIN, Role.OPERATOR, Role.VIEWER)
 _HEAD: Final = """
 <link rel="stylesheet" href="/station/station.css">
 <script defer src="/view/meshcat.js"></script>
 <script defer src="/view/scene.js"></script>
 <script type="module" src="/station/station.js"></script>
 """
-
-
-@dataclass(eq=False, slots=True)
-class Visit:
-    """One open page, as the server knows it."""
-
-    client: Client
-    services: Mapping[str, Any]
-    """What panels with a server's part need, by name: see `Station`."""
-    role: Role | None = None
-    """What the visitor has shown a token for; None before."""
-    boxes: dict[str, Element] = field(default_factory=dict)
-    """Elements of panels that wait for a role."""
-
-    def may(self, role: Role) -> bool:
-        """Whether the visitor has a role, or a higher one."""
-        return self.role is not None and _RANKS.index(self.role) <= _RANKS.index(role)
 
 
 class Station:
@@ -61,25 +39,18 @@ class Station:
         self,
         model: RobotModel,
         tool: Array,
-        access: Access,
         *,
         panels: Iterable[Panel] = PANELS,
-        services: Mapping[str, Any] | None = None,
     ) -> None:
         """Make the page; nobody sees it yet.
 
         Args:
             model: The robot.
             tool: The tool's point in the last link's frame [m], (3,).
-            access: Who may do what.
             panels: What the page has.
-            services: What panels with a server's part are given, by name.
         """
-        self._access, self._panels, self._services = access, tuple(panels), dict(services or {})
-        listed = [
-            {"name": p.name, "title": p.title, "place": p.place, "script": p.script, "icon": p.icon}
-            for p in self._panels
-        ]
+        self._panels = tuple(panels)
+        listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in self._panels]
         self._config = json.dumps({"robot": described(model, tool), "panels": listed})
         self._app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         core.sio.eio.transports = ["websocket"]
@@ -102,12 +73,7 @@ class Station:
         async with self._app.router.lifespan_context(self._app):
             yield self
 
-    def entitled(self, token: str | None) -> Role | None:
-        """The highest role that a token opens; None for none."""
-        return next((role for role in _RANKS if not self._access.refusal(role, token)), None)
-
     def _build(self) -> None:
-        visit = Visit(ui.context.client, self._services)
         ui.add_head_html(_HEAD)
         root = _element("div", "station", "station")
         root.props["data-config"] = self._config
@@ -128,23 +94,6 @@ class Station:
             for panel in self._panels:
                 with places[panel.place], _element("div", f"card-{panel.name}", "card"):
                     _element("div", f"panel-{panel.name}", f"panel panel-{panel.name}")
-                    if panel.build is not None:
-                        visit.boxes[panel.name] = _element("div", f"served-{panel.name}", "served")
-        ui.on("door", self._door(visit))
-
-    def _door(self, visit: Visit) -> Callable[[GenericEventArguments], None]:
-        def entered(event: GenericEventArguments) -> None:
-            """A page has shown its token; once is enough."""
-            token = event.args
-            if visit.role is not None or not (token is None or isinstance(token, str)):
-                return
-            visit.role = self.entitled(None if token is None else token[: LONGEST_TOKEN + 1])
-            for panel in self._panels:
-                if panel.build is not None and visit.may(panel.role):
-                    with visit.boxes[panel.name]:
-                        panel.build(visit)
-
-        return entered
 
 
 def _element(tag: str, name: str, classes: str) -> Element:

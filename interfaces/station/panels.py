@@ -1,17 +1,12 @@
-"""The panels of the station, in one list. Each is a place in the page that a script fills, or Python, or both."""
+"""The panels of the station, in one list. Each is a place in the page that a script fills."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from interfaces.stream.control import Role
 from vrs.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from interfaces.station.page import Visit
 
 
 class Place(enum.StrEnum):
@@ -33,8 +28,8 @@ class Place(enum.StrEnum):
 class Panel:
     """A part of the page.
 
-    Its script is a module of `static/` that exports `mount(station, box)`, called with the panel's own element,
-    which nobody else fills. Python that serves people runs once the door has let the visitor in as `role`.
+    Its script is `static/NAME.js`, a module that exports `mount(station, box)`, called with the panel's own
+    element, which nobody else fills.
     """
 
     name: str
@@ -42,14 +37,8 @@ class Panel:
     title: str
     """On its tab."""
     place: Place
-    script: bool = True
-    """Whether `static/NAME.js` belongs to it."""
     icon: str = ""
     """Of its tab, as Material Icons name it."""
-    build: Callable[[Visit], None] | None = None
-    """Fills the panel's element on the server, with NiceGUI."""
-    role: Role = Role.VIEWER
-    """Least role for which `build` is called; a tab without a script shows for it alone."""
 
     def __post_init__(self) -> None:
         if not self.name.isascii() or not self.name.islower() or not self.name.isalpha():

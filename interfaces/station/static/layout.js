@@ -17,7 +17,7 @@ export class Layout {
     this.split(document.getElementById("splitter"));
   }
 
-  /** Give a panel its tab; one that the server fills has it from when that's done. */
+  /** Give a panel its tab. */
   add(panel) {
     const card = document.getElementById("card-" + panel.name);
     const tab = h(
@@ -31,21 +31,8 @@ export class Layout {
     card.hidden = true;
     tab.addEventListener("click", () => this.show(panel.name));
     this.tabs.set(panel.name, { tab, card });
-    const served = document.getElementById("served-" + panel.name);
-    const put = () => {
-      const place = [...this.tabs.keys()].indexOf(panel.name);
-      const before = [...this.tabs.values()].slice(place + 1).find((other) => other.tab.isConnected);
-      this.list.insertBefore(tab, before ? before.tab : null);
-      if (!this.shown) this.show(panel.name);
-    };
-    if (panel.script) put();
-    else if (served) {
-      const watch = new MutationObserver(() => {
-        watch.disconnect();
-        put();
-      });
-      watch.observe(served, { childList: true });
-    }
+    this.list.append(tab);
+    if (!this.shown) this.show(panel.name);
   }
 
   /** Show a panel of the side. */

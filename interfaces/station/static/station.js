@@ -56,23 +56,12 @@ function present(id) {
   });
 }
 
-/** Show the server's part who this is, once its own connection is there. */
-function knock(session) {
-  const say = () => {
-    if (window.did_handshake) window.emitEvent("door", session.token ?? null);
-    else setTimeout(say, 50);
-  };
-  say();
-}
-
 const root = await present("strip-box").then(() => document.getElementById("station"));
 const config = JSON.parse(root.dataset.config);
 const station = new Station(root, config);
 window.station = station;
-const scripted = config.panels.filter((panel) => panel.script);
-const modules = await Promise.all(scripted.map((panel) => import(`./${panel.name}.js`)));
-scripted.forEach((panel, k) => modules[k].mount(station, document.getElementById(`panel-${panel.name}`)));
-station.on("welcome", () => knock(station.session));
-if (station.session.welcome) knock(station.session);
+const { panels } = config;
+const modules = await Promise.all(panels.map((panel) => import(`./${panel.name}.js`)));
+panels.forEach((panel, k) => modules[k].mount(station, document.getElementById(`panel-${panel.name}`)));
 root.dataset.ready = "";
 station.dispatchEvent(new Event("ready"));
