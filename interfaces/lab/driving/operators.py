@@ -193,7 +193,7 @@ def _corridor(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]]:
 
 
 def _slalom(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]]:
-    """Between five columns 1.6 m apart, round the last, and back."""
+    """Between six columns 1.6 m apart, round the last, and back."""
     wide = float(rng.uniform(0.72, 0.82))
 
     def legs() -> Iterator[Leg]:
