@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import shutil
+import sys
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +18,7 @@ from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 from prompt_toolkit.formatted_text import FormattedText, StyleAndTextTuples
 from prompt_toolkit.history import FileHistory, History, InMemoryHistory
+from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 
 from interfaces.timer import Turning
@@ -31,6 +34,18 @@ if TYPE_CHECKING:
 
 _ROWS: Final = 8
 """Lines that are kept free for the menu."""
+
+
+class Keyboard(Vt100Input):
+    """A terminal's keys, none of which is lost.
+
+    While something is written, prompt_toolkit gives the terminal its line mode back. A Ctrl-D that falls into that
+    moment comes out of it as a null character, and a Ctrl-C as a signal.
+    """
+
+    def cooked_mode(self) -> AbstractContextManager[None]:
+        """Stay in raw mode."""
+        return self.raw_mode()
 
 
 class _Completer(Completer):
@@ -89,7 +104,7 @@ class Terminal:
             history=_history(history),
             key_bindings=self._keys(),
             reserve_space_for_menu=_ROWS,
-            input=source,
+            input=Keyboard(sys.stdin) if source is None else source,
             output=sink,
         )
 

@@ -8,6 +8,7 @@ import fcntl
 import os
 import pty
 import re
+import select
 import signal
 import struct
 import subprocess
@@ -26,7 +27,7 @@ from interfaces.val2.monitor.completion import hint, suggestions
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import Monitor
 from interfaces.val2.monitor.switchboard import Free, Switchboard
-from interfaces.val2.monitor.terminal import Terminal
+from interfaces.val2.monitor.terminal import Keyboard, Terminal
 from interfaces.val2.motion import arm_for
 from robots import puma560
 from vrs.clock import ManualClock, WallClock
@@ -223,6 +224,18 @@ def test_ctrl_c_clears_a_line_and_tab_completes_one(tmp_path):
         assert "*Invalid" not in keys.shown
 
     with_keys(tmp_path, scenario)
+
+
+def test_a_key_pressed_while_something_is_written_is_not_lost():
+    master, slave = pty.openpty()
+    with os.fdopen(master, "wb", buffering=0) as keys, os.fdopen(slave) as terminal:
+        keyboard = Keyboard(terminal)
+        with keyboard.raw_mode():
+            with keyboard.cooked_mode():
+                keys.write(b"\x04")
+                assert select.select([terminal], [], [], WAIT)[0]
+            os.set_blocking(slave, False)
+            assert os.read(slave, 10) == b"\x04"
 
 
 # Processes.
