@@ -78,7 +78,7 @@ class TestStop:
         r = engine.stop()
         assert r.end - now < 0.75
         t = np.linspace(now, r.end, 200)
-        way = old.sample(np.linspace(now, old.end, 200001))
+        way = old.sample(np.linspace(now, r.end, 30_001))
         if "stopped on its way" in r.reason:
             for q in engine.joints(t):
                 assert np.abs(way - q).max(1).min() < 1e-4
