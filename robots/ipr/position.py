@@ -110,7 +110,7 @@ class FusedPosition:
             before = past[k]
             if before[0] <= t:
                 share = (t - before[0]) / (after[0] - before[0])
-                x, y, theta = (before[i] + share * (after[i] - before[i]) for i in (1, 2, 3))
-                return x, y, theta
+                _, x, y, theta = before
+                return x + share * (after[1] - x), y + share * (after[2] - y), theta + share * (after[3] - theta)
             after = before
         return (after[1], after[2], after[3]) if t == after[0] else None

@@ -149,19 +149,24 @@ class ObstacleAvoidance:
             raise InvalidValueError("ranges", r.shape, f"{len(self._mounts)} distances")
         now = finite("now", now, "finite seconds")
         heard = np.isfinite(r) & (r < config.range_max)
+        kept = np.searchsorted(self._seen, now - config.memory)
+        points, seen = self._points[kept:], self._seen[kept:]
+        if not heard.any():
+            self._points, self._seen = points, seen
+            return
         x, y, theta = posture
         cos, sin = math.cos(theta), math.sin(theta)
         origins = self._mounts[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
         angles = self._mounts[:, 2] + theta
-        fresh = np.flatnonzero(now - self._seen <= config.memory)
-        if len(fresh):
-            fresh = fresh[self._stands(self._points[fresh], origins[heard], angles[heard], r[heard])]
+        if len(points):
+            stands = self._stands(points, origins[heard], angles[heard], r[heard])
+            points, seen = points[stands], seen[stands]
         distance = np.maximum(r[heard], config.range_min)[:, None]
         bearing = angles[heard][:, None] + self._bearings
         spread = np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], -1) + origins[heard][:, None]
         added = spread.reshape(-1, 2)
-        self._points = np.concatenate([self._points[fresh], added])
-        self._seen = np.concatenate([self._seen[fresh], np.full(len(added), now)])
+        self._points = np.concatenate([points, added])
+        self._seen = np.concatenate([seen, np.full(len(added), now)])
 
     def drive(
         self,
@@ -246,18 +251,25 @@ class ObstacleAvoidance:
     def _stands(self, points: Array, origins: Array, angles: Array, ranges: Array) -> NDArray[np.bool_]:
         """Whether no reading sees further than to a point, well inside its cone, (m,)."""
         config = self._config
-        d = points[:, None] - origins
-        distance = np.hypot(d[..., 0], d[..., 1])
-        beside = np.abs(np.remainder(np.arctan2(d[..., 1], d[..., 0]) - angles + math.pi, math.tau) - math.pi)
-        through = ((beside <= _SEEN * config.half_cone) & (distance < ranges - config.noise)).any(axis=1)
+        dx = points[:, :1] - origins[:, 0]
+        dy = points[:, 1:] - origins[:, 1]
+        distance = np.sqrt(dx * dx + dy * dy)
+        along = dx * np.cos(angles) + dy * np.sin(angles)
+        inside = along >= math.cos(_SEEN * config.half_cone) * distance
+        through = (inside & (distance < ranges - config.noise)).any(axis=1)
         return np.asarray(~through)
 
     def _near(self, posture: tuple[float, float, float], now: float) -> Array:
         """The points that count, in the robot's frame, as far as they matter, (m, 2)."""
         config, outline = self._config, self._config.outline
-        d = self._points[now - self._seen <= config.memory] - posture[:2]
         size = math.hypot(max(outline.front, outline.rear), outline.half_width) + config.clearance
-        d = d[np.hypot(d[:, 0], d[:, 1]) < size + config.lookahead + 0.5]
+        # In the order in which they were seen.
+        d = self._points[np.searchsorted(self._seen, now - config.memory) :]
+        if not len(d):
+            return d
+        d = d - posture[:2]
+        x, y = d.T
+        d = d[x * x + y * y < (size + config.lookahead + 0.5) ** 2]
         cos, sin = math.cos(posture[2]), math.sin(posture[2])
         local: Array = d @ np.array([[cos, -sin], [sin, cos]])
         return local
@@ -283,22 +295,22 @@ class ObstacleAvoidance:
         inner = np.abs(centre) - half - clearance - _ROUNDING
         outer = np.hypot(max(front, rear) + clearance, np.abs(centre) + half + clearance) + _ROUNDING
         curve, point = np.nonzero((radius >= inner) & (radius <= outer))
+        ways = np.full(len(curvatures), np.inf)
+        if not len(curve):
+            return ways
         k, centre, radius = k[curve], centre[curve, 0], radius[curve, point]
         x, y, margin = x[point], y[point], margin[point]
-        phase = np.arctan2(y - centre, x)
-        best = np.full(len(k), np.inf)
-        edges = ((front + margin, True), (-rear - margin, True), (half + margin, False), (-half - margin, False))
+        # Front and rear are met at ± an angle, the sides at an angle and what it lacks to π.
+        ends = np.stack([front + margin, -rear - margin])
+        sides = np.stack([half + margin, -half - margin])
         with np.errstate(invalid="ignore", divide="ignore"):
-            for place, across in edges:
-                turned = np.arccos(place / radius) if across else np.arcsin((place - centre) / radius)
-                for solution in (turned, -turned if across else math.pi - turned):
-                    other = centre + radius * np.sin(solution) if across else radius * np.cos(solution)
-                    low, high = (-half - margin, half + margin) if across else (-rear - margin, front + margin)
-                    inside = (other >= low - 1e-9) & (other <= high + 1e-9)
-                    way = np.remainder((phase - solution) * np.sign(k), math.tau) / np.abs(k)
-                    best = np.where(inside & (way < best), way, best)
-        ways = np.full(len(curvatures), np.inf)
-        np.minimum.at(ways, curve, best)
+            across, beside = np.arccos(ends / radius), np.arcsin((sides - centre) / radius)
+        solution = np.concatenate([across, -across, beside, math.pi - beside])
+        met = np.concatenate([centre + radius * np.sin(solution[:4]), radius * np.cos(solution[4:])])
+        low, high = np.repeat([sides[1], ends[1]], 4, axis=0), np.repeat([sides[0], ends[0]], 4, axis=0)
+        inside = (met >= low - 1e-9) & (met <= high + 1e-9)
+        turned = np.remainder((np.arctan2(y - centre, x) - solution) * np.sign(k), math.tau)
+        np.minimum.at(ways, curve, np.where(inside, turned / np.abs(k), np.inf).min(axis=0))
         return ways
 
     def _straight_ways(self, points: Array, turns: Array) -> Array:

@@ -157,17 +157,19 @@ class EnvironmentSupervisor:
         if r.shape != (len(self._mounts),):
             raise InvalidValueError("ranges", r.shape, f"{len(self._mounts)} distances")
         now = finite("now", now, "finite seconds")
+        heard: NDArray[np.bool_] = np.isfinite(r) & (r < config.range_max)
+        self._silent = np.where(heard, 0, self._silent + 1)
+        self._drop(now)
+        if not self._cells and not heard.any():
+            return heard
         x, y, theta = posture
         cos, sin = math.cos(theta), math.sin(theta)
         origins = self._mounts[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
         angles = self._mounts[:, 2] + theta
-        heard = np.isfinite(r) & (r < config.range_max)
-        self._silent = np.where(heard, 0, self._silent + 1)
         r = np.where(heard, np.maximum(r, config.range_min), config.range_max)
-        self._drop(now)
         sees = heard | (self._silent >= config.silence)
         self._look_through(origins[sees], angles[sees], r[sees], now)
-        new: NDArray[np.bool_] = heard.copy()
+        new = heard.copy()
         new[heard] = ~self._is_known(origins[heard], angles[heard], r[heard])
         if new.any():
             self._occupy(origins[new], angles[new], r[new], (origins[sees], angles[sees], r[sees]), now)
@@ -203,20 +205,22 @@ class EnvironmentSupervisor:
         middle = origins.mean(axis=0)
         spread = float(np.abs(origins - middle).max()) * 2
         near = np.abs(self._walls - middle).max(axis=1) < float((r + self._tolerance(r)).max()) + half + spread
-        distance, beside = _seen_from(origins, angles, self._walls[near])
-        slack = half + self._tolerance(r)
-        wide = (
-            config.half_cone + config.heading_error + np.arcsin(np.minimum(half / np.maximum(distance, half), 1.0))
-        )
-        return np.asarray(((np.abs(distance - r) <= slack) & (beside <= wide)).any(axis=0))
+        distance, along = _seen_from(origins, angles, self._walls[near])
+        # As an angle, the cell reaches half its diagonal beyond the cone: cos(a + b), of a cone and of a cell.
+        cone = config.half_cone + config.heading_error
+        cell = np.minimum(half / np.maximum(distance, half), 1.0)
+        edge = math.cos(cone) * np.sqrt(1 - cell * cell) - math.sin(cone) * cell
+        there = np.abs(distance - r) <= half + self._tolerance(r)
+        return np.asarray((there & (along >= edge * distance)).any(axis=0))
 
     def _is_clear(self, points: Array, origins: Array, angles: Array, r: Array) -> NDArray[np.bool_]:
         """Which cells, by their middles (k, 2), a sonar looks clearly through, (k,)."""
         config, half = self._config, self._grid.cell * math.sqrt(0.5)
         if not len(points) or not len(r):
             return np.zeros(len(points), bool)
-        distance, beside = _seen_from(origins, angles, points)
-        clear = (beside <= config.clear_cone * config.half_cone) & (distance + half < r - self._tolerance(r))
+        distance, along = _seen_from(origins, angles, points)
+        inside = along >= math.cos(config.clear_cone * config.half_cone) * distance
+        clear = inside & (distance + half < r - self._tolerance(r))
         return np.asarray(clear.any(axis=1))
 
     def _look_through(self, origins: Array, angles: Array, r: Array, now: float) -> None:
@@ -259,8 +263,7 @@ class EnvironmentSupervisor:
 
 
 def _seen_from(origins: Array, angles: Array, points: Array) -> tuple[Array, Array]:
-    """Distances of points (p, 2) from sonars (k, 2), and how far aside of where they look, (p, k) each."""
-    d = points[:, None] - origins
-    distance = np.hypot(d[..., 0], d[..., 1])
-    beside = np.abs(np.remainder(np.arctan2(d[..., 1], d[..., 0]) - angles + math.pi, math.tau) - math.pi)
-    return distance, beside
+    """Distances of points (p, 2) from sonars (k, 2), and how far along where they look, (p, k) each."""
+    dx = points[:, :1] - origins[:, 0]
+    dy = points[:, 1:] - origins[:, 1]
+    return np.sqrt(dx * dx + dy * dy), dx * np.cos(angles) + dy * np.sin(angles)

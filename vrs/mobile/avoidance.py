@@ -88,6 +88,8 @@ class Avoidance:
             v and ω, within the limits and their rates from `before` on; where it isn't safe otherwise, the first of
             the commands that brake along the present arc.
         """
+        if not len(self._within(self.radius + max(self.notice, self._way()) + grid.cell, posture, grid, occupied)):
+            return limited(asked, before, self.period, self.limits)
         wanted = [asked]
         steered = self._steered(asked, posture, grid, occupied)
         if steered != asked:
@@ -130,13 +132,20 @@ class Avoidance:
 
     def _near(self, posture: _Posture, grid: Grid, occupied: NDArray[np.bool_]) -> Array:
         """Corners of the occupied cells that the robot could touch before it stands, (k, 2)."""
-        way = self.limits.braking_distance(self.limits.v_max, 2 * self.period)
-        reach = self.radius + way + grid.cell
-        span = grid.index([[posture[0] - reach, posture[1] - reach], [posture[0] + reach, posture[1] + reach]])
-        low, high = np.clip(span, 0, grid.shape)
-        high = np.minimum(high + 1, grid.shape)
-        cells = np.argwhere(occupied[low[0] : high[0], low[1] : high[1]]) + low
+        cells = self._within(self.radius + self._way() + grid.cell, posture, grid, occupied)
         return grid.corners(cells)
+
+    def _way(self) -> float:
+        """How far the robot goes at most before it stands [m]."""
+        return self.limits.braking_distance(self.limits.v_max, 2 * self.period)
+
+    def _within(
+        self, reach: float, posture: _Posture, grid: Grid, occupied: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """The occupied cells in a square round the robot of twice a reach [m], (k, 2)."""
+        span = grid.index([[posture[0] - reach, posture[1] - reach], [posture[0] + reach, posture[1] + reach]])
+        (m, n), (m_end, n_end) = np.clip(np.add(span, ((0, 0), (1, 1))), 0, grid.shape).tolist()
+        return np.add(np.argwhere(occupied[m:m_end, n:n_end]), (m, n))
 
     def _steered(self, asked: _Speeds, posture: _Posture, grid: Grid, occupied: NDArray[np.bool_]) -> _Speeds:
         """What is asked for, or where its direction is blocked, towards the nearest that is free."""
