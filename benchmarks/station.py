@@ -262,10 +262,11 @@ def memory() -> None:
                 "{:6.0f} s  heap {:.2f} MiB, {:.0f} nodes; server and robot {:.1f} MiB".format(*looks[-1]),
                 flush=True,
             )
-    settled = np.array([look for look in looks if look[0] > 60.0 * MINUTES / 3])
+    # Before that the page fills its quarter of an hour of measurements.
+    settled = np.array([look for look in looks if look[0] > 60.0 * MINUTES * 2 / 3])
     heap, nodes, rss = np.polyfit(settled[:, 0] / 60.0, settled[:, 1:], 1)[0]
     print(
-        f"after the first third: heap {heap:+.3f} MiB a minute, nodes {nodes:+.1f}, server and robot {rss:+.2f} MiB"
+        f"in the last third: heap {heap:+.3f} MiB a minute, nodes {nodes:+.1f}, server and robot {rss:+.2f} MiB"
     )
 
 

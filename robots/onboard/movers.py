@@ -16,6 +16,7 @@ import numpy as np
 from robots.onboard.avoidance import SonarMount
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
+from vrs.mobile import wrapped
 from vrs.model import Array
 
 
@@ -25,6 +26,8 @@ class MoversConfig:
 
     mounts: tuple[SonarMount, ...]
     """As many as there are readings, 1 to 64, in order around the robot."""
+    half_cone: float = math.radians(12.5)
+    """Half the sonar's cone [rad], in [0, 0.8]."""
     radius: float = 0.25
     """Of whatever moves [m], in [0, 1]: a person's."""
     together: float = 0.2
@@ -39,6 +42,8 @@ class MoversConfig:
     """And of its speed when it's first seen [m/s], in [0, 10]."""
     gate: float = 0.7
     """An echo further from where a thing is expected is another's [m], in [0.01, 5]."""
+    surprise: float = 3.0
+    """So is one that's off by more of the filter's own deviations, in [0.5, 100]."""
     memory: float = 1.0
     """What wasn't seen for so long is given up [s], in [0.05, 10]."""
     slowest: float = 0.12
@@ -52,9 +57,9 @@ class MoversConfig:
 
     def __post_init__(self) -> None:
         for name, low, high in (
-            ("radius", 0.0, 1.0), ("together", 0.0, 2.0), ("range_noise", 1e-3, 1.0), ("bearing_noise", 1e-3, 1.0),
-            ("agility", 0.0, 10.0), ("start_speed", 0.0, 10.0), ("gate", 0.01, 5.0), ("memory", 0.05, 10.0),
-            ("slowest", 0.0, 10.0), ("doubt", 0.0, 10.0),
+            ("half_cone", 0.0, 0.8), ("radius", 0.0, 1.0), ("together", 0.0, 2.0), ("range_noise", 1e-3, 1.0),
+            ("bearing_noise", 1e-3, 1.0), ("agility", 0.0, 10.0), ("start_speed", 0.0, 10.0), ("gate", 0.01, 5.0),
+            ("surprise", 0.5, 100.0), ("memory", 0.05, 10.0), ("slowest", 0.0, 10.0), ("doubt", 0.0, 10.0),
             ("least", 0.0, 10.0),
         ):  # fmt: skip
             number_in(name, getattr(self, name), low, high)
@@ -118,9 +123,9 @@ class MoverTracker:
             z = origin + reach * np.array([c, s])
             turn = np.array([[c, -s], [s, c]])
             noise = turn @ np.diag([config.range_noise**2, (config.bearing_noise * reach) ** 2]) @ turn.T
-            off = [math.hypot(*(z - thing.state[:2]).tolist()) for thing in free]
+            off = [self._off(thing, z, noise) for thing in free]
             best = int(np.argmin(off)) if off else -1
-            if off and off[best] < config.gate:
+            if off and off[best] < math.inf:
                 self._correct(free.pop(best), z, noise, now)
             elif len(self._things) < config.most:
                 doubt = np.zeros((4, 4))
@@ -161,13 +166,40 @@ class MoverTracker:
         x, y, theta = posture
         cos, sin = math.cos(theta), math.sin(theta)
         found = []
-        for group in groups:
+        for group in (part for together in groups for part in self._parts(together, ranges)):
             nearest = min(ranges[k] for k in group)
             places = self._mounts[[k for k in group if ranges[k] < nearest + self._config.radius]]
             angle = theta + math.atan2(float(np.sin(places[:, 2]).sum()), float(np.cos(places[:, 2]).sum()))
             mx, my = places[:, :2].mean(axis=0).tolist()
             found.append((nearest, angle, np.array([x + cos * mx - sin * my, y + sin * mx + cos * my])))
         return found
+
+    def _parts(self, group: Sequence[int], ranges: Sequence[float]) -> list[Sequence[int]]:
+        """Echoes side by side, told apart where they're too many for one thing: somebody before a wall."""
+        config, parts, rest = self._config, list[Sequence[int]](), [group]
+        while rest:
+            here = rest.pop()
+            middle = min(range(len(here)), key=lambda i: ranges[here[i]])
+            r = ranges[here[middle]]
+            # The nearest echo's own direction is known by half a cone.
+            wide = math.asin(config.radius / max(r + config.radius, 1e-9)) + 2 * config.half_cone
+            near = [abs(wrapped(self._angle(k) - self._angle(here[middle]))) <= wide for k in here]
+            low, high = near.index(True), len(near) - near[::-1].index(True)
+            parts.append(here[low:high])
+            rest += [part for part in (here[:low], here[high:]) if part]
+        return parts
+
+    def _angle(self, k: int) -> float:
+        return float(self._mounts[k, 2])
+
+    def _off(self, thing: _Thing, z: Array, noise: Array) -> float:
+        """How far an echo is from where a thing is expected [m]; infinity if it's too far for that thing's."""
+        apart = z - thing.state[:2]
+        far = math.hypot(*apart.tolist())
+        if far >= self._config.gate:
+            return math.inf
+        deviations = float(apart @ np.linalg.solve(thing.doubt[:2, :2] + noise, apart))
+        return far if deviations < self._config.surprise**2 else math.inf
 
     def _expect(self, thing: _Thing, now: float) -> None:
         dt = now - thing.t

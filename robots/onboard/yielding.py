@@ -40,7 +40,7 @@ class YieldingConfig:
     outline: Outline
     radius: float = 0.25
     """Of whatever moves [m], in [0, 1]."""
-    space: float = 0.45
+    space: float = 0.7
     """Distance that it keeps from it [m], in [0, 2]."""
     doubt: float = 1.5
     """So many deviations to either side of its way it may go, in [0, 10]."""
@@ -128,10 +128,11 @@ class Yielding:
         v_before: float,
     ) -> Array:
         """Least distance between outline and movers that each drive leads to [m], (n,)."""
-        config, t = self._config, self._times
+        config, steps = self._config, len(self._times)
         v, w = np.array(drives).T
         ways = self._avoidance.free_ways(posture, v, w, now=now)
         # The speed follows along its ramp; where there's no more room it stands, and doesn't turn.
+        t = self._times
         ramp = np.abs(v - v_before) / config.limits.a_max
         grown = np.minimum(t, ramp[:, None])
         s = v[:, None] * t + (v_before - v)[:, None] * (grown - 0.5 * grown**2 / np.maximum(ramp, 1e-9)[:, None])
@@ -143,6 +144,10 @@ class Yielding:
         chord = s * np.sinc(half / math.pi)
         x, y, theta = posture
         px, py, heading = x + chord * np.cos(theta + half), y + chord * np.sin(theta + half), theta + turned
+        # Then it stands: who runs away along the way of somebody quicker is only met later.
+        last = np.minimum(np.arange(2 * steps), steps - 1)
+        px, py, heading = px[:, last], py[:, last], heading[:, last]
+        t = config.step * np.arange(1, 2 * steps + 1)
         cos, sin = np.cos(heading), np.sin(heading)
         outline = config.outline
         least = np.full(len(v), np.inf)

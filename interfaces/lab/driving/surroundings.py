@@ -89,7 +89,7 @@ def robot_surroundings(
         BodySonar(body),
         EnvironmentSupervisor(grid, _known(body, grid, body.chassis.sonar_height), seen),
         avoidance,
-        MoverTracker(MoversConfig(mounts)),
+        MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
         controller if isinstance(controller, Following) else None,
     )

@@ -66,6 +66,24 @@ def test_two_are_two() -> None:
     assert max(len(movers) for movers in found) == 2
 
 
+@pytest.mark.parametrize("bearing", np.radians(range(0, 360, 30)).tolist())
+def test_somebody_who_comes_past_a_box_is_followed_as_himself(bearing: float) -> None:
+    """Also where the echoes of both are side by side and equally far."""
+
+    def path(t: float) -> tuple[float, float]:
+        return (3.0 - 0.67 * t) * math.cos(bearing), (3.0 - 0.67 * t) * math.sin(bearing)
+
+    aside = bearing + math.radians(40)
+    thing = box(1.55 * math.cos(aside), 1.55 * math.sin(aside), 0.8, 0.8, aside)
+    found = followed([path], 3.4, things=thing)
+    for k in range(20, 34):
+        place = path(0.1 * k)
+        best = min(found[k], key=lambda m: math.dist((m.x, m.y), place))
+        assert math.dist((best.x, best.y), place) < 0.3
+        towards = -(best.vx * math.cos(bearing) + best.vy * math.sin(bearing))
+        assert towards == pytest.approx(0.67, abs=0.08)
+
+
 def test_what_is_followed_is_bounded() -> None:
     tracker, rng = MoverTracker(MoversConfig(MOUNTS, most=3)), np.random.default_rng(1)
     for k in range(50):
