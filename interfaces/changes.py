@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from itertools import groupby
+from typing import Any
 
 from interfaces.messages import Change, History
 from vrs.chunk import HOLD, Piece
 from vrs.errors import InvalidValueError
 from vrs.timeline import Timeline
+from vrs.track import Track
 from vrs.tree import Leaf
 
 PART = 64
@@ -56,7 +58,7 @@ def difference(base: Timeline, new: Timeline, since: float, *, edit: int, comman
     """
     if new.start != base.start:
         return None
-    first = _first_unlike(base, new, max(min(base.index_at(since), new.index_at(since)) - 1, 0))
+    first = first_unlike(base, new, max(min(base.index_at(since), new.index_at(since)) - 1, 0))
     kept = _kept_tail(base, new, min(len(base), len(new)) - first)
     tail = len(base) - kept if kept else None
     last = len(new) - kept
@@ -73,7 +75,7 @@ def difference(base: Timeline, new: Timeline, since: float, *, edit: int, comman
     )
 
 
-def _first_unlike(base: Timeline, new: Timeline, index: int) -> int:
+def first_unlike(base: Track[Any], new: Track[Any], index: int) -> int:
     """The first segment from an index on in which two timelines differ: what they share is passed over at once."""
     most = min(len(base), len(new))
     while index < most:

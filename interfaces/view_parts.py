@@ -7,11 +7,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from numpy.typing import ArrayLike
+
+from robots.ipr.model import Ipr
 from vrs.errors import FormatError
-from vrs.model import RobotModel
+from vrs.mobile import MobileModel
+from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
-    from robots.puma560.shapes import LinkShape
+    from robots.solids import LinkShape
 
 
 @lru_cache(maxsize=1)
@@ -33,10 +37,28 @@ def viewer_bundle() -> tuple[str, str]:
     return bundle.read_text(encoding="utf-8"), licences
 
 
-def link_shapes(model: RobotModel) -> tuple[LinkShape, ...]:
-    """Shapes of the model's links; none for a robot that has no shapes, which then shows as its traces."""
+def link_shapes(model: RobotModel | MobileModel) -> tuple[LinkShape, ...]:
+    """Shapes of the model's links, of a mobile robot those of its body, wheels and casters.
+
+    None for a robot that has no shapes; an arm then shows as its traces.
+    """
     if model.name == "puma560":
         from robots.puma560.shapes import shapes
 
         return shapes()
+    if isinstance(model, Ipr):
+        from robots.ipr.shapes import shapes as of_kind
+
+        return of_kind(model.kind)
     return ()
+
+
+def parts_at(model: MobileModel, posture: ArrayLike) -> Array:
+    """Poses of a mobile robot's shapes in the world, (m, 4, 4), at a posture (x, y, θ) [m, m, rad], (3,).
+
+    Raises:
+        InvalidValueError: If the posture isn't finite or of that shape.
+    """
+    from robots.ipr.shapes import links
+
+    return links(model.kind if isinstance(model, Ipr) else "ipr", posture)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from interfaces.report.driven import FIGURES, shown
+
 if TYPE_CHECKING:
     from rich.table import Table
 
-ROWS = (
+    from interfaces.recording.recording import Recording
+
+ARM_ROWS = (
     ("duration_s", "duration", 1.0, "s"),
     ("behind.mean_s", "behind, mean", 1.0, "s"),
     ("behind.max_s", "behind, at most", 1.0, "s"),
@@ -31,6 +36,10 @@ ROWS = (
     ("path.progress", "progress", 1e2, "%"),
 )
 """Path in a summary, name, factor and unit (none: a count) of what two recordings are compared by."""
+MOBILE_ROWS = (("duration_s", "duration", 1.0, "s"), *FIGURES)
+"""The same of a mobile robot's."""
+ROWS = {"arm": ARM_ROWS, "mobile": MOBILE_ROWS}
+"""By the kind of robot."""
 
 
 def compare(
@@ -38,49 +47,50 @@ def compare(
     other: Annotated[Path | None, typer.Argument(metavar="[OTHER.mcap]", help="Another to set beside it.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write the figures as JSON on standard output.")] = False,
 ) -> None:
-    """Compare the twins of a recording; of a whole one of the laboratory --json is the run's own summary.json."""
+    """Compare the twins of a recording; of a whole one of an arm --json is the run's own summary.json."""
     from interfaces.recording.figures import differences
+    from interfaces.recording.kinds import check_alike
+    from interfaces.recording.recording import open_recording
     from interfaces.report.summary import to_json
 
-    first = summary_of(recording)
-    if other is None:
-        if as_json:
-            typer.echo(to_json(first), nl=False)
-        else:
-            _show(recording, first)
-        return
-    second = summary_of(other)
-    changes = differences(first, second)
+    with ExitStack() as stack:
+        opened = [stack.enter_context(open_recording(path)) for path in (recording, other) if path is not None]
+        check_alike(opened)
+        kind = opened[0].kind.word
+        first, *others = (_summary(one) for one in opened)
     if as_json:
-        value = {"first": first, "second": second, "differences": changes}
+        if not others:
+            typer.echo(to_json(first), nl=False)
+            return
+        value = {"first": first, "second": others[0], "differences": differences(first, others[0])}
         typer.echo(json.dumps(value, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False))
-    else:
-        _show(recording, first)
-        _show(other, second)
-        _print(_beside(first, second))
+        return
+    for path, found in zip((recording, other), (first, *others), strict=False):
+        _show(path, kind, found)
+    for second in others:
+        _print(_beside(kind, first, second))
 
 
-def summary_of(path: Path) -> dict[str, Any]:
+def _summary(recording: Recording) -> dict[str, Any]:
     """The summary of a recording; what is missing is also told on standard error.
 
     Raises:
-        FormatError: If it's none, or too little is left of it.
+        FormatError: If too little is left of it.
     """
-    from interfaces.recording.figures import summary
-    from interfaces.recording.recording import open_recording
-
-    with open_recording(path) as recording:
-        value = summary(recording)
+    value = recording.kind.summary(recording)
     for line in value.get("missing", ()):
-        typer.echo(f"vrs: {path.name}: missing: {line}", err=True)
+        typer.echo(f"vrs: {recording.path.name}: missing: {line}", err=True)
     return value
 
 
-def _show(path: Path, summary: dict[str, Any]) -> None:
-    from interfaces.cli.demo import tables
-
+def _show(path: Path | None, kind: str, summary: dict[str, Any]) -> None:
     typer.echo(f"{path}: {summary['title']}, {summary['duration_s']:.1f} s")
-    tables(summary)
+    if kind == "arm":
+        from interfaces.cli.demo import tables
+
+        tables(summary)
+    else:
+        _print(_alone(kind, summary))
 
 
 def _print(table: Table) -> None:
@@ -89,17 +99,29 @@ def _print(table: Table) -> None:
     Console().print(table)
 
 
-def _beside(first: dict[str, Any], second: dict[str, Any]) -> Table:
+def _alone(kind: str, summary: dict[str, Any]) -> Table:
+    """The figures of one recording."""
+    from rich.table import Table
+
+    table = Table(show_header=False)
+    for justify in ("left", "right", "left"):
+        table.add_column(justify=justify)
+    for path, name, scale, unit in ROWS[kind]:
+        table.add_row(name, shown(_at(summary, path), scale, unit), unit)
+    return table
+
+
+def _beside(kind: str, first: dict[str, Any], second: dict[str, Any]) -> Table:
     """Figures of two recordings, and by how much the second's are larger."""
     from rich.table import Table
 
     table = Table(title="Side by side", title_justify="left")
     for name in ("", "first", "second", "difference", ""):
         table.add_column(name, justify="right" if name else "left")
-    for path, name, scale, unit in ROWS:
+    for path, name, scale, unit in ROWS[kind]:
         a, b = _at(first, path), _at(second, path)
         change = None if a is None or b is None else b - a
-        table.add_row(name, *(_shown(value, scale, unit) for value in (a, b, change)), unit)
+        table.add_row(name, *(shown(value, scale, unit) for value in (a, b, change)), unit)
     return table
 
 
@@ -108,10 +130,3 @@ def _at(summary: dict[str, Any], path: str) -> float | None:
     for name in path.split("."):
         value = value[name]
     return None if value is None else float(value)
-
-
-def _shown(value: float | None, scale: float, unit: str) -> str:
-    """A value in its unit; without one it's a count."""
-    if value is None:
-        return "undefined"
-    return f"{scale * value:z.3f}" if unit else f"{value:z.0f}"

@@ -49,14 +49,10 @@ def export(
 
 
 def _report(recording: Recording, path: Path) -> None:
-    from interfaces.recording.figures import figures
-    from interfaces.report.html import write_report
-    from interfaces.report.summary import summarize
-
-    found = figures(recording)
-    for line in found.missing:
+    text, missing = recording.kind.report(recording)
+    for line in missing:
         typer.echo(f"vrs: {recording.path.name}: missing: {line}", err=True)
     try:
-        write_report(path, found.run, summarize(found.run, found.attributions, found.offsets))
+        path.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise FormatError(str(path), f"can't be written: {error.strerror}") from None

@@ -10,8 +10,6 @@ import typer
 from interfaces.cli.demo import prepare
 
 if TYPE_CHECKING:
-    from interfaces.lab.driving.run import Drive
-    from interfaces.lab.driving.sweep import Row
     from interfaces.lab.pool import Calls, Made
 
 
@@ -48,6 +46,9 @@ def lab(
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
     ] = 2,
+    record: Annotated[
+        bool, typer.Option("--record", help="Keep each run as runs/NAME.mcap in DIR; changes no figure.")
+    ] = False,
     attribution: Annotated[
         bool,
         typer.Option("--attribution", help="Say how much is due to delay, model, localization and environment."),
@@ -59,8 +60,9 @@ def lab(
     from interfaces.lab.driving.operators import operator as make
     from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
     from interfaces.lab.driving.pictures import drawn, pictures
+    from interfaces.lab.driving.recorded import Kept, measure_recorded, paths
     from interfaces.lab.driving.run import ROBOTS
-    from interfaces.lab.driving.sweep import cases, measure_kept
+    from interfaces.lab.driving.sweep import cases
     from interfaces.link.profiles import delay_profile
     from interfaces.teleop.architectures import ARCHITECTURES, Transport
     from vrs.checks import one_of
@@ -75,9 +77,10 @@ def lab(
         make(who, seed, 0.1)
     prepare(out)
     chosen = cases(architectures, transports, delays, robots, operators, range(seed, seed + runs), length)
-    calls = [(measure_kept, given) for given in zip(chosen, drawn(chosen), strict=True)]
-    measured: list[tuple[Row, Drive | None]] = _worked(calls, "runs", workers)
-    rows = [row for row, _ in measured]
+    files = paths(chosen, out) if record else [None] * len(chosen)
+    calls = [(measure_recorded, given) for given in zip(chosen, drawn(chosen), files, strict=True)]
+    measured: list[Kept] = _worked(calls, "runs", workers)
+    rows = [kept.row for kept in measured]
     causes = []
     if attribution:
         taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
@@ -87,7 +90,9 @@ def lab(
         "robots": robots, "operators": operators, "runs": runs, "seed": seed, "length_s": length,
     }  # fmt: skip
     found = summary(rows, settings, causes)
-    write(rows, found, pictures([drive for _, drive in measured if drive is not None]), out)
+    write(rows, found, pictures([kept.drive for kept in measured if kept.drive is not None]), out)
+    for problem in dict.fromkeys(kept.problem for kept in measured if kept.problem):
+        typer.echo(f"vrs: {problem}", err=True)
     if as_json:
         import json
 

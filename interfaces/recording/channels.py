@@ -14,12 +14,16 @@ from typing import Any, Final, TypeAlias
 import msgspec
 
 from interfaces.recording import messages as m
+from interfaces.recording.driving import messages as d
 from interfaces.recording.poses import FrameTransforms, RealPose, VirtualPose
 
 _ENDLESS = 2**63 - 1
 """A range up to here is none."""
 _SIMPLE = ("boolean", "string", "number", "integer")
 _RANGES = ("minimum", "maximum", "exclusiveMinimum", "minItems", "maxItems", "minLength", "maxLength")
+
+
+Kinds: TypeAlias = tuple[type[msgspec.Struct], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,37 +33,52 @@ class Channel:
     topic: str
     schema: str
     """Name of the schema: Foxglove's know what to draw."""
-    kinds: tuple[type[msgspec.Struct], ...]
+    arm: Kinds
+    """Messages in an arm's recordings; none where those don't have the channel."""
+    mobile: Kinds
+    """Messages in a mobile robot's recordings."""
     file: str | None = None
     """Foxglove's own schema; None where it's made from the kinds."""
     many: bool = True
     """Whether it has many messages; those of the others stand together, in blocks of their own."""
 
     @property
-    def json_schema(self) -> bytes:
-        """The schema as it stands in a file."""
+    def kinds(self) -> Kinds:
+        """All messages that it may have."""
+        return tuple(dict.fromkeys((*self.arm, *self.mobile)))
+
+    def json_schema(self, kinds: Kinds) -> bytes:
+        """The schema as it stands in a file that has these kinds."""
         if self.file is not None:
             path = resources.files("interfaces.recording").joinpath("foxglove", self.file)
             return msgspec.json.format(path.read_bytes(), indent=-1)
-        return _schema(self.schema, self.kinds)
+        return _schema(self.schema, kinds)
 
 
+_SESSION = m.Begin, m.Dropped, m.End
+_COMMANDS = m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry
 CHANNELS: Final = (
-    Channel("/session", "vrs.Session", (m.Begin, m.Dropped, m.End), many=False),
+    Channel("/session", "vrs.Session", _SESSION, (*_SESSION, d.RoomEntry), many=False),
+    Channel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
     Channel(
-        "/commands",
-        "vrs.Command",
-        (m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry),
+        "/timeline",
+        "vrs.Timeline",
+        (m.HistoryEntry, m.ChangeEntry),
+        (d.ArcHistory, d.ArcChange),
         many=False,
     ),
-    Channel("/timeline", "vrs.Timeline", (m.HistoryEntry, m.ChangeEntry), many=False),
-    Channel("/virtual/joints", "vrs.VirtualJoints", (m.VirtualSample,)),
-    Channel("/real/joints", "vrs.RealJoints", (m.RealSample,)),
-    Channel("/virtual/pose", "foxglove.PoseInFrame", (VirtualPose,), "PoseInFrame.json"),
-    Channel("/real/pose", "foxglove.PoseInFrame", (RealPose,), "PoseInFrame.json"),
-    Channel("/tf", "foxglove.FrameTransforms", (FrameTransforms,), "FrameTransforms.json"),
-    Channel("/link", "vrs.Packet", (m.LinkEntry,)),
-    Channel("/events", "vrs.Event", (m.EventEntry,), many=False),
+    Channel("/virtual/joints", "vrs.VirtualJoints", (m.VirtualSample,), ()),
+    Channel("/real/joints", "vrs.RealJoints", (m.RealSample,), ()),
+    Channel("/virtual/pose", "foxglove.PoseInFrame", (VirtualPose,), (VirtualPose,), "PoseInFrame.json"),
+    Channel("/real/pose", "foxglove.PoseInFrame", (RealPose,), (RealPose,), "PoseInFrame.json"),
+    Channel("/tf", "foxglove.FrameTransforms", (FrameTransforms,), (FrameTransforms,), "FrameTransforms.json"),
+    Channel("/link", "vrs.Packet", (m.LinkEntry,), (m.LinkEntry,)),
+    Channel("/events", "vrs.Event", (m.EventEntry,), (m.EventEntry,), many=False),
+    Channel("/virtual/posture", "vrs.VirtualPosture", (), (d.VirtualPosture,)),
+    Channel("/real/posture", "vrs.RealPosture", (), (d.RealPosture,)),
+    Channel("/real/measured", "vrs.MeasuredPosture", (), (d.MeasuredPosture,)),
+    Channel("/virtual/estimated", "vrs.EstimatedPosture", (), (d.EstimatedPosture,)),
+    Channel("/environment", "vrs.Cells", (), (d.CellsEntry,), many=False),
 )
 """Every channel of a recording."""
 
@@ -71,13 +90,13 @@ TOPIC_OF: Final = {kind: channel.topic for channel in CHANNELS for kind in chann
 Message: TypeAlias = (
     m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.GivenEntry
     | m.HistoryEntry | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms
-    | m.LinkEntry | m.EventEntry
+    | m.LinkEntry | m.EventEntry | d.DriveMessage
 )  # fmt: skip
 """What can be recorded."""
 
 
 @cache
-def _schema(name: str, kinds: tuple[type[msgspec.Struct], ...]) -> bytes:
+def _schema(name: str, kinds: Kinds) -> bytes:
     found, parts = msgspec.json.schema_components(kinds, ref_template="{name}")
     merged = _merged([_plain(schema, parts) for schema in found])
     return msgspec.json.encode({"title": name, **_sayable(merged or {})})

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from interfaces.recording.history import arm_timeline
 from interfaces.recording.messages import Anchor, CommandEntry
 from interfaces.recording.poses import quaternions
 from interfaces.recording.recording import Recording
@@ -49,16 +50,21 @@ def tables(recording: Recording) -> tuple[Table, ...]:
     Raises:
         FormatError: If the recording's robot isn't known.
     """
+    return recording.kind.tables(recording)
+
+
+def arm_tables(recording: Recording) -> tuple[Table, ...]:
+    """An arm's tables; see `tables`."""
     return (
         _virtual(recording),
         _real(recording),
-        _commands(recording),
-        _receipts(recording),
+        commands_table(recording),
+        receipts_table(recording),
         _segments(recording),
-        _edits(recording),
+        edits_table(recording),
         _packets(recording),
-        _link(recording),
-        _events(recording),
+        link_table(recording),
+        events_table(recording),
     )
 
 
@@ -137,14 +143,16 @@ def _text(value: Any) -> str:
     return repr(float(value)) if isinstance(value, float) else str(value)
 
 
-def _table(name: str, *columns: Column | Sequence[Column]) -> Table:
+def table(name: str, *columns: Column | Sequence[Column]) -> Table:
+    """A table of columns, and of lists of them."""
     found: list[Column] = []
     for column in columns:
         found += [column] if isinstance(column, Column) else column
     return Table(name, tuple(found))
 
 
-def _seconds(name: str, values: Sequence[float | None]) -> Column:
+def seconds(name: str, values: Sequence[float | None]) -> Column:
+    """A column of times."""
     return Column(f"{name}_s", "s", float, values)
 
 
@@ -173,38 +181,42 @@ def _tool(recording: Recording, q: Array) -> list[Column]:
 def _virtual(recording: Recording) -> Table:
     t = recording.track(VIRTUAL).t
     q = recording.virtual(t)
-    return _table("virtual", _seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
+    return table("virtual", seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
 
 
 def _real(recording: Recording) -> Table:
     track = recording.track(REAL)
-    return _table(
+    return table(
         "real",
-        _seconds("t", track.t.tolist()),
-        _seconds("play", track.play.tolist()),
+        seconds("t", track.t.tolist()),
+        seconds("play", track.play.tolist()),
         _joints("q", track.q),
         _joints("reference", track.reference),
         _tool(recording, track.q),
     )
 
 
-def _commands(recording: Recording) -> Table:
+def commands_table(recording: Recording) -> Table:
+    """What the operator's engine was told."""
     entries = recording.commands
     receipts = [entry.receipt if isinstance(entry, CommandEntry) else None for entry in entries]
 
     def told(name: str) -> list[Any]:
         return [None if receipt is None else getattr(receipt, name) for receipt in receipts]
 
-    n = len(recording.session.q)
-    q = np.array([[math.nan] * n if row is None or len(row) != n else row for row in told("q")]).reshape(-1, n)
-    return _table(
+    # A drive command has no target.
+    n = len(recording.session.q) if recording.kind.word == "arm" else 0
+    q = np.array([[math.nan] * n if row is None or len(row) != n else row for row in told("q")]).reshape(
+        len(entries), n
+    )
+    return table(
         "commands",
         Column("number", "", int, [entry.number for entry in entries]),
-        _seconds("at", [entry.at for entry in entries]),
+        seconds("at", [entry.at for entry in entries]),
         Column("command", "", str, [_kind(entry) for entry in entries]),
         Column("command_id", "", int, told("command_id")),
         Column("status", "", str, [None if status is None else str(status) for status in told("status")]),
-        [_seconds(name, told(name)) for name in _STAMPS],
+        [seconds(name, told(name)) for name in _STAMPS],
         _joints("q", q),
         Column("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
         Column("reason", "", str, [_reason(entry) for entry in entries]),
@@ -231,20 +243,21 @@ def _content(entry: CommandEntry | Anchor) -> str | None:
     return msgspec.json.encode(entry.command).decode()
 
 
-def _receipts(recording: Recording) -> Table:
+def receipts_table(recording: Recording) -> Table:
+    """The newest truth about each command at each site."""
     rows = [("virtual", receipt) for receipt in recording.receipts("virtual")]
     rows += [("real", receipt) for receipt in recording.receipts("real")]
 
     def told(name: str) -> list[Any]:
         return [getattr(receipt, name) for _, receipt in rows]
 
-    return _table(
+    return table(
         "receipts",
         Column("site", "", str, [site for site, _ in rows]),
         Column("command_id", "", int, told("command_id")),
         Column("status", "", str, [str(status) for status in told("status")]),
-        [_seconds(name, told(name)) for name in _STAMPS],
-        _seconds("shift", told("shift")),
+        [seconds(name, told(name)) for name in _STAMPS],
+        seconds("shift", told("shift")),
         Column("superseded_by", "", int, told("superseded_by")),
         Column("undone", "", bool, told("undone")),
         Column("reason", "", str, told("reason")),
@@ -254,15 +267,15 @@ def _receipts(recording: Recording) -> Table:
 def _segments(recording: Recording) -> Table:
     """The newest timeline, a row a segment and joint."""
     rows: list[tuple[int, float, float, int | None, int, list[float]]] = []
-    for number, segment in enumerate(recording.timeline.segments):
+    for number, segment in enumerate(arm_timeline(recording.timeline).segments):
         for joint, powers in enumerate(segment.coefficients.T.tolist(), start=1):
             rows.append((number, segment.start, segment.duration, segment.command_id, joint, powers))
     most = max((len(row[-1]) for row in rows), default=1)
-    return _table(
+    return table(
         "segments",
         Column("segment", "", int, [row[0] for row in rows]),
-        _seconds("start", [row[1] for row in rows]),
-        _seconds("duration", [row[2] for row in rows]),
+        seconds("start", [row[1] for row in rows]),
+        seconds("duration", [row[2] for row in rows]),
         Column("command_id", "", int, [row[3] for row in rows]),
         Column("joint", "", int, [row[4] for row in rows]),
         [
@@ -279,47 +292,52 @@ def _power(k: int, per: str) -> str:
     return RADIANS if k == 0 else f"{RADIANS}{per}s{k if k > 1 else ''}"
 
 
-def _edits(recording: Recording) -> Table:
+def edits_table(recording: Recording) -> Table:
+    """The timelines that the virtual robot had."""
     edits = recording.edits
-    return _table(
+    return table(
         "edits",
         Column("edit", "", int, [edit.number for edit in edits]),
-        _seconds("at", [edit.at for edit in edits]),
+        seconds("at", [edit.at for edit in edits]),
         Column("version", "", int, [edit.timeline.version for edit in edits]),
         Column("command_id", "", int, [edit.command_id for edit in edits]),
-        _seconds("end", [edit.timeline.end for edit in edits]),
+        seconds("end", [edit.timeline.end for edit in edits]),
     )
 
 
 def _packets(recording: Recording) -> Table:
     packets = recording.packets
-    return _table(
+    return table(
         "packets",
         Column("command_id", "", int, [packet.command_id for packet in packets]),
         Column("real_id", "", int, [packet.real_id for packet in packets]),
-        _seconds("sent", [packet.sent for packet in packets]),
-        _seconds("arrived", [packet.arrived for packet in packets]),
+        seconds("sent", [packet.sent for packet in packets]),
+        seconds("arrived", [packet.arrived for packet in packets]),
         Column("lost", "", bool, [packet.lost for packet in packets]),
     )
 
 
-def _link(recording: Recording) -> Table:
+def link_table(recording: Recording) -> Table:
+    """Packets of the link."""
     entries = recording.link
-    return _table(
+    sized = any(entry.size for entry in entries)
+    return table(
         "link",
         Column("direction", "", str, [entry.direction for entry in entries]),
-        _seconds("sent", [entry.sent for entry in entries]),
-        _seconds("arrived", [entry.arrived for entry in entries]),
+        seconds("sent", [entry.sent for entry in entries]),
+        seconds("arrived", [entry.arrived for entry in entries]),
         Column("lost", "", bool, [entry.lost for entry in entries]),
         Column("attempts", "", int, [entry.attempts for entry in entries]),
+        [Column("size_byte", "byte", int, [entry.size for entry in entries])] if sized else [],
     )
 
 
-def _events(recording: Recording) -> Table:
+def events_table(recording: Recording) -> Table:
+    """What else happened."""
     events = recording.events
-    return _table(
+    return table(
         "events",
-        _seconds("t", [event.t for event in events]),
+        seconds("t", [event.t for event in events]),
         Column("kind", "", str, [event.kind for event in events]),
         Column("text", "", str, [event.text for event in events]),
     )

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from interfaces.recording.history import arm_timeline
 from interfaces.recording.messages import OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
-from interfaces.recording.rerun import Rerun, begun, rerun
+from interfaces.recording.rerun import Rerun, rerun
 from interfaces.recording.runs import extras_of
 from interfaces.recording.track import APART, REAL, Track
 from interfaces.report.summary import Json, summarize
@@ -179,12 +180,12 @@ class _Reading:
     def _shown(self, again: Rerun) -> Timeline:
         """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
         if not again.missing and not again.difference:
-            return again.timeline
+            return arm_timeline(again.timeline)
         why = again.difference or again.missing
         self.missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
         if self.recording.certain < math.inf:
             self.missing.append(f"edits of the virtual robot's timeline after {self.recording.certain:.3f} s")
-        return self.recording.timeline
+        return arm_timeline(self.recording.timeline)
 
     def _corrections(self) -> tuple[Correction, ...]:
         anchors = (entry for entry in self.recording.commands if isinstance(entry, Anchor))
@@ -203,7 +204,7 @@ class _Reading:
     def _alone(self) -> Timeline:
         """What the commands alone make of the virtual robot."""
         sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
-        return carried_out(*begun(self.recording), sent)
+        return carried_out(*self.recording.kind.begun(self.recording), sent)
 
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[Packet, ...]:
         if not self._live:

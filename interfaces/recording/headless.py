@@ -150,7 +150,7 @@ def lines(at: float, moment: Moment, passed: Passed, *, as_json: bool) -> Iterat
         if frame.q_real is not None:
             line += f"  real {_joints(frame.q_real)}"
         if frame.behind is not None and frame.error is not None:
-            line += f"  behind {frame.behind:.3f} s, off {frame.error:.4f} rad"
+            line += f"  behind {frame.behind:.3f} s, off {frame.error:.4f} {frame.unit}"
         yield line
 
 

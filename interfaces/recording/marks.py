@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
-from interfaces.stream.wire.commands import MoveWire
+from interfaces.stream.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
+from vrs.model import Array
 from vrs.receipt import Status
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
-    from interfaces.recording.history import RecordedEdit
+    from interfaces.recording.history import AnyTimeline, RecordedEdit
     from interfaces.recording.recording import Recording
     from interfaces.runtime.run import Event
 
@@ -61,6 +62,7 @@ OF_EVENTS: Final = {
     "up": MarkKind.LINK,
     "down": MarkKind.LINK,
     "rerouted": MarkKind.LINK,
+    "collision": MarkKind.STOPPED,
 }
 """Kinds of events, as they are marked; all others are `OTHER`."""
 
@@ -156,7 +158,7 @@ class MarkReader:
         return self._marks[index] if 0 <= index < len(self._marks) else None
 
 
-def falsified(before: Timeline, after: Timeline, at: float) -> tuple[float, float] | None:
+def falsified(before: AnyTimeline, after: AnyTimeline, at: float) -> tuple[float, float] | None:
     """What an edit changed of what had been planned.
 
     Args:
@@ -173,7 +175,7 @@ def falsified(before: Timeline, after: Timeline, at: float) -> tuple[float, floa
     times = [np.linspace(low, high, _SAMPLES)]
     for timeline in (before, after):
         first = max(timeline.index_at(low), 0)
-        starts, _ = timeline.knots(first, min(first + _SEGMENTS, len(timeline)))
+        starts = _starts(timeline, first, min(first + _SEGMENTS, len(timeline)))
         times.append(0.5 * (starts[1:] + starts[:-1]))
     t = np.unique(np.concatenate(times))
     t = t[(t >= low) & (t <= high)]
@@ -181,6 +183,13 @@ def falsified(before: Timeline, after: Timeline, at: float) -> tuple[float, floa
     if not len(differs):
         return None
     return float(t[max(differs[0] - 1, 0)]), float(t[differs[-1]])
+
+
+def _starts(timeline: AnyTimeline, low: int, high: int) -> Array:
+    """Starts of the segments low to high − 1 [s]."""
+    if isinstance(timeline, Timeline):
+        return timeline.knots(low, high)[0]
+    return np.array([timeline.start_of(index) for index in range(low, high)])
 
 
 def _changed(before: RecordedEdit, edit: RecordedEdit) -> Iterator[Mark]:
@@ -207,11 +216,17 @@ def _told(entry: CommandEntry | Anchor) -> Iterator[Mark]:
         where = f"joint {joint + 1} was {off:.3g}° off"
         text = f"the virtual robot joined the real one's plan until {entry.end:.2f} s ({where}): {entry.reason}"
         yield Mark(entry.at, MarkKind.CORRECTED, text, (entry.at, entry.end))
-    elif entry.receipt is not None:
+    elif entry.receipt is not None and not _usual(entry):
         receipt = entry.receipt
         start, end = receipt.execute_at, receipt.end
         span = None if start is None or end is None else (start, end)
         yield Mark(entry.at, _OF_STATUS[receipt.status], _described(entry, receipt), span, receipt.command_id)
+
+
+def _usual(entry: CommandEntry) -> bool:
+    """Whether it's one of the many by which somebody drives."""
+    accepted = entry.receipt is not None and entry.receipt.status is Status.ACCEPTED
+    return accepted and isinstance(entry.command, DriveWire)
 
 
 def _described(entry: CommandEntry, receipt: FullReceipt) -> str:

@@ -100,9 +100,8 @@ class McapFile:
         """Bytes of messages that wait."""
         return len(self._few.records) + len(self._many.records)
 
-    def add_channel(self, topic: str, schema: str, json_schema: bytes, *, many: bool) -> None:
-        """Add a channel of JSON messages; channels are numbered from 1."""
-        number = len(self._channels) + 1
+    def add_channel(self, number: int, topic: str, schema: str, json_schema: bytes, *, many: bool) -> None:
+        """Add a channel of JSON messages under a number that no other has, from 1."""
         named = next((known for known in self._schemas if known.name == schema), None)
         if named is None:
             named = Schema(id=len(self._schemas) + 1, data=json_schema, encoding="jsonschema", name=schema)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 from msgspec import Meta
 
+from interfaces.recording.driving.messages import DriveFacts
 from interfaces.stream.wire.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.stream.wire.fields import (
     MOST_JOINTS,
@@ -80,13 +81,13 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     delay: Word
     """Delay profile, as it was asked for."""
     offset: Word
-    """`adaptive`, `fixed:S`, or `OWN`."""
+    """`adaptive`, `fixed:S`, or `OWN`; `none` of a mobile robot whose architecture has none."""
     service: Word
     link_loss: Word
     step: Seconds
     """Between two samples [s]."""
     q: Joints
-    """Joints of both robots at the start [rad]."""
+    """Joints of both robots at the start [rad]; of a mobile robot its posture."""
     lateness: Word
     software: Word
     """What wrote the file, with its version."""
@@ -94,6 +95,8 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     """Seconds since 1970 at `t`; None in the laboratory, where the same seed gives the same bytes."""
     late: Late | None = None
     """None where nothing had been commanded yet."""
+    drive: DriveFacts | None = None
+    """Of a mobile robot; None of an arm."""
 
 
 class Drop(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -302,8 +305,11 @@ class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     direction: Literal["forward", "backward"]
     sent: Time
     arrived: Time | None = None
+    """[s]; None where it was lost, or still on its way when the recording ended."""
     lost: bool = False
     attempts: Count = 1
+    size: Count = 0
+    """[byte]; 0 where that wasn't recorded."""
 
 
 class EventEntry(Wire, frozen=True, omit_defaults=True, gc=False):

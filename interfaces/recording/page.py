@@ -17,7 +17,6 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from interfaces.playhead import Mode
 from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Moment, Playback, Track
-from interfaces.stream.meshcat import MeshcatScene
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import HEADERS, files
 from interfaces.stream.meshcat.viewers import Viewers
@@ -128,7 +127,8 @@ class ReplayPage:
             show: Time between two frames [s].
         """
         self.playback, self._clock, self._first, self._show = playback, clock, first, show
-        self.scenes = tuple(MeshcatScene(track.recording.model) for track in playback.tracks)
+        self._stages = tuple(track.recording.kind.stage(track.recording) for track in playback.tracks)
+        self.scenes = tuple(stage.scene for stage in self._stages)
         self.board = Newest(BEGIN) if board is None else board
         """What pages are told: JSON by key."""
         self._told = float("-inf")
@@ -176,12 +176,10 @@ class ReplayPage:
         moment = self.playback.advance(now=now)
         if not self.board.readers:
             return
-        for scene, track, frame in zip(self.scenes, self.playback.tracks, moment.frames, strict=True):
-            links = track.recording.model.links
-            real = None if frame.q_real is None else links(frame.q_real)
+        for stage, track, frame in zip(self._stages, self.playback.tracks, moment.frames, strict=True):
             # Where nobody knows where it was, it stays where it was last seen; the page says so.
             if frame.q_virtual is not None:
-                scene.show(virtual=links(frame.q_virtual), real=real, path=track.committed(frame), now=now)
+                stage.show(frame, track.committed(frame), now=now)
         if now >= self._told + TOLD:
             self._told = now
             self._tell(moment, now)
@@ -290,6 +288,9 @@ def _recording(track: Track, name: str, growing: bool) -> dict[str, Any]:
         "name": name,
         "title": session.title,
         "robot": session.robot,
+        "kind": recording.kind.word,
+        "unit": recording.kind.unit,
+        "shows": recording.kind.shows(session),
         "driver": session.driver,
         "delay": session.delay,
         "damage": "; ".join(filter(None, (str(damage) if damage else "", track.problem))),

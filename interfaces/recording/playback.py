@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, TypeVar
 import numpy as np
 
 from interfaces.playhead import LiveEdge, Mode, PlayHead
+from interfaces.recording.kinds import check_alike
 from interfaces.recording.marks import Mark, MarkReader
 from interfaces.stream.meshcat.committed import Committed
 from vrs.commands import finite
@@ -54,13 +55,18 @@ class Frame:
     t: float
     """On the recording's own timeline [s]."""
     q_virtual: Array | None
-    """Joints of the virtual robot, g(t) [rad], (n,); None where a lost part of the file may have changed them."""
+    """Joints of the virtual robot, g(t) [rad], (n,), or its posture; None where a lost part of the file may have
+    changed them."""
     q_real: Array | None
-    """Joints of the real robot as measured, between two samples linear [rad], (n,); None where none were."""
+    """Joints of the real robot as measured, between two samples linear [rad], (n,), or its true posture; None where
+    none were."""
     play: float | None
-    """The time of the timeline at which the real robot is [s]."""
+    """The time of the timeline at which the real robot is [s]; of a mobile robot, by the place on the path."""
     error: float | None
-    """Largest difference of a joint between the real robot and g(play) [rad]."""
+    """Largest difference of a joint between the real robot and g(play) [rad]; of a mobile robot, its path error
+    [m]."""
+    unit: str = "rad"
+    """Of the error."""
 
     @property
     def behind(self) -> float | None:
@@ -85,6 +91,7 @@ class Track:
         self.recording, self.marks = recording, MarkReader(recording)
         self.shift = shift
         """The play-back's time less the recording's own [s]."""
+        self._follower = recording.kind.follower(recording)
         self.problem = ""
         """What of the file makes no sense, the first line of it; empty where all does."""
         self._more = True
@@ -120,14 +127,14 @@ class Track:
         """What is there at a time of the play-back [s]."""
         own = t - self.shift
         recording = self.recording
+        unit = recording.kind.unit
         q_virtual = self._known(recording.virtual, own)
         q_real = self._known(recording.real, own)
         if q_real is None:
-            return Frame(own, q_virtual, None, None, None)
-        play = float(recording.play(own))
-        q_matched = self._known(recording.virtual, play)
-        error = None if q_matched is None else float(np.abs(q_real - q_matched).max())
-        return Frame(own, q_virtual, q_real, play, error)
+            return Frame(own, q_virtual, None, None, None, unit)
+        play = self._read(lambda: self._follower.play(own))
+        error = None if play is None else self._read(lambda: self._follower.error(own, q_real, play))
+        return Frame(own, q_virtual, q_real, play, error, unit)
 
     def committed(self, frame: Frame) -> Committed | None:
         """Where the real robot was going, as the plan was known then; None where it isn't there."""
@@ -155,10 +162,12 @@ class Playback:
             align: What two of them have in common.
 
         Raises:
-            InvalidValueError: If there are more, or one of two to be aligned by the calendar doesn't know it.
+            InvalidValueError: If there are more, or of robots of two kinds, or one of two to be aligned by the
+                calendar doesn't know it.
         """
         if not 1 <= len(recordings) <= 2:
             raise InvalidValueError("recordings", len(recordings), "1 or 2")
+        check_alike(recordings)
         self.tracks = tuple(Track(recording, _shift(recordings[0], recording, align)) for recording in recordings)
         self._edge = LiveEdge()
         self.growing = False

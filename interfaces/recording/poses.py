@@ -10,7 +10,9 @@ from interfaces.stream.wire.fields import Wire
 from vrs.model import Array
 
 BASE = "base"
-"""Frame of both robots' bases."""
+"""Frame of both arms' bases."""
+WORLD = "world"
+"""Frame of the floor that mobile robots drive on."""
 POSE_DIGITS = 9
 """Decimal places of a pose's numbers [m, quaternion]."""
 LINK_DIGITS = 6
@@ -62,11 +64,11 @@ class PoseInFrame(Wire, frozen=True, gc=False):
 
 
 class VirtualPose(PoseInFrame, frozen=True, gc=False):
-    """Of the virtual robot's last link."""
+    """Of the virtual robot's last link, or of the mobile robot."""
 
 
 class RealPose(PoseInFrame, frozen=True, gc=False):
-    """Of the real robot's last link."""
+    """Of the real robot's last link, or of the mobile robot."""
 
 
 class FrameTransform(Wire, frozen=True, gc=False):
@@ -103,6 +105,23 @@ def virtual_pose(t: float, X: Array) -> VirtualPose:
 def real_pose(t: float, X: Array) -> RealPose:
     """The pose of the real robot's last link in the base frame, X (4, 4), at a time [s]."""
     return RealPose(timestamp(t), BASE, _pose(X))
+
+
+def placed_pose(t: float, X: Array, *, virtual: bool) -> VirtualPose | RealPose:
+    """The pose of a mobile robot on the floor, X (4, 4), at a time [s]."""
+    return (VirtualPose if virtual else RealPose)(timestamp(t), WORLD, _pose(X))
+
+
+def frames(t: float, robots: Sequence[tuple[str, Array]]) -> FrameTransforms:
+    """Mobile robots as frames on the floor: their names and poses, (4, 4), at a time [s]."""
+    stamp = timestamp(t)
+    rows = _rows(np.stack([X for _, X in robots]), LINK_DIGITS)
+    return FrameTransforms(
+        tuple(
+            FrameTransform(stamp, WORLD, name, Vector3(*row[:3]), Quaternion(*row[3:]))
+            for (name, _), row in zip(robots, rows, strict=True)
+        )
+    )
 
 
 def _pose(X: Array) -> Pose:

@@ -13,32 +13,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from interfaces.recording.damage import Damage
-from interfaces.recording.history import Chain, RecordedEdit
+from interfaces.recording.driving.messages import CellsEntry, RoomEntry
+from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.kinds import Kind, kind_of
 from interfaces.recording.log import Log
 from interfaces.recording.messages import (
     Anchor,
     Begin,
-    ChangeEntry,
     CommandEntry,
     Dropped,
     End,
     EventEntry,
     GivenEntry,
-    HistoryEntry,
     LinkEntry,
     PacketEntry,
     ReceiptEntry,
 )
 from interfaces.recording.scan import NUMBERS, Blocks
 from interfaces.recording.source import Source
-from interfaces.recording.track import REAL, VIRTUAL, Track, Tracks
+from interfaces.recording.track import Track, Tracks
 from interfaces.runtime.run import Event, Packet
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.receipt import Receipt
 from vrs.segment import times
 from vrs.standing import Known
-from vrs.timeline import Timeline
 
 
 def _puma560() -> RobotModel:
@@ -48,7 +47,7 @@ def _puma560() -> RobotModel:
 
 
 MODELS: Final[dict[str, Callable[[], RobotModel]]] = {"puma560": _puma560}
-"""Robots that recordings may be of."""
+"""Arms that recordings may be of."""
 
 
 def open_recording(path: Path | str) -> Recording:
@@ -79,7 +78,9 @@ class Recording:
                 raise FormatError(str(path), "isn't a recording, or the block that it begins with is destroyed")
             self.session: Begin = begin
             """How the run was set up."""
-            self._tracks = Tracks(self._blocks, len(begin.q), str(path))
+            self.kind: Kind = kind_of(begin)
+            """What its robot is."""
+            self._tracks = Tracks(self._blocks, len(begin.q), self.kind.told(begin), str(path))
             self._chain, self._applied = Chain(str(path)), 0
             self._model: RobotModel | None = None
         except FormatError:
@@ -147,12 +148,14 @@ class Recording:
 
     @property
     def model(self) -> RobotModel:
-        """The robot.
+        """The arm.
 
         Raises:
             FormatError: If it's none that is known here, or has other joints.
         """
         if self._model is None:
+            if self.session.drive is not None:
+                raise FormatError(str(self.path), "of a mobile robot, which has no joints")
             made = MODELS.get(self.session.robot)
             model = None if made is None else made()
             if model is None or model.limits.dof != len(self.session.q):
@@ -164,7 +167,7 @@ class Recording:
     def span(self) -> tuple[float, float]:
         """From the beginning to the last sample [s]."""
         start, last = self.session.t, self.session.t
-        for topic in (VIRTUAL, REAL):
+        for topic in (self.kind.virtual, self.kind.real):
             for index in reversed(self._blocks.having(NUMBERS[topic])):
                 first, end = self._blocks.span(index)
                 track = self._tracks.between(topic, first * 1e-9 - 1e-6, end * 1e-9 + 1e-6)
@@ -217,7 +220,7 @@ class Recording:
         return tuple(Event(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
 
     @property
-    def changes(self) -> tuple[HistoryEntry | ChangeEntry, ...]:
+    def changes(self) -> tuple[AnyHistory | AnyChange, ...]:
         """The messages about the timeline, as they stand in the file."""
         return tuple(self._logs["/timeline"].entries())
 
@@ -238,7 +241,7 @@ class Recording:
         return self._chain.edits
 
     @property
-    def timeline(self) -> Timeline:
+    def timeline(self) -> AnyTimeline:
         """The newest that is known.
 
         Raises:
@@ -252,7 +255,7 @@ class Recording:
             raise FormatError(str(self.path), "the block with the timeline is destroyed")
         return edits
 
-    def timeline_at(self, t: float) -> Timeline:
+    def timeline_at(self, t: float) -> AnyTimeline:
         """The timeline as it was known at a user time [s]: what came later isn't in it.
 
         Raises:
@@ -272,13 +275,13 @@ class Recording:
         if self._chain.broken:
             return max(newest.at, spans[0][0]) if spans else newest.at
         for first, last in spans:
-            after = self._tracks.between(VIRTUAL, last, last + 2.0)
+            after = self._tracks.between(self.kind.virtual, last, last + 2.0)
             if not len(after.t) or after.edit[0] != newest.number:
                 return max(newest.at, first)
         return math.inf
 
     def virtual(self, t: ArrayLike) -> Array:
-        """Joints of the virtual robot, computed from the newest timeline.
+        """Joints of the virtual robot, or its posture, computed from the newest timeline.
 
         Args:
             t: User time [s], scalar or (k,).
@@ -295,7 +298,7 @@ class Recording:
         return found
 
     def real(self, t: ArrayLike) -> Array:
-        """Joints of the real robot as measured, on lines between the samples.
+        """Joints of the real robot as measured, or its true posture, on lines between the samples.
 
         Args:
             t: User time [s], scalar or (k,).
@@ -309,21 +312,32 @@ class Recording:
         return self._at(t, "q")
 
     def play(self, t: ArrayLike) -> Array:
-        """Where the real robot played its timeline [s]; see `real`."""
+        """Where the real robot played its timeline, or wanted to [s]; see `real`."""
         return self._at(t, "play")
 
     def _at(self, t: ArrayLike, column: str) -> Array:
         moments = times(t)
-        found = self._tracks.at(REAL, np.atleast_1d(moments), column)
+        found = self._tracks.at(self.kind.real, np.atleast_1d(moments), column)
         return found if moments.ndim else found[0]
 
     def track(self, topic: str, since: float = -math.inf, until: float = math.inf) -> Track:
         """The samples of a robot, both ends included [s]; only blocks that are needed are read.
 
         Raises:
-            InvalidValueError: If the topic is neither `/virtual/joints` nor `/real/joints`.
+            InvalidValueError: If the topic has none.
         """
         return self._tracks.between(topic, since, until)
+
+    @property
+    def room(self) -> RoomEntry | None:
+        """Where a mobile robot drove; None if that isn't there."""
+        rooms = [entry for entry in self._logs["/session"].entries() if isinstance(entry, RoomEntry)]
+        return rooms[0] if rooms else None
+
+    @property
+    def learned(self) -> tuple[CellsEntry, ...]:
+        """What came into the virtual environment, and went, in order."""
+        return tuple(self._logs["/environment"].entries())
 
     def messages(self) -> Array:
         """When packets to the robot were sent and arrived [s], (m, 2), in the order of the file; NaN: lost."""

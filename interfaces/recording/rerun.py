@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import msgspec
-import numpy as np
 
-from interfaces.recording.capture import edit_entries
-from interfaces.recording.messages import Anchor, ChangeEntry, CommandEntry, FullReceipt, HistoryEntry, Late
+from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
+from interfaces.recording.kinds import Kind
+from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt, Late
 from vrs.clock import ManualClock
-from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
+from vrs.commands import Cancel, InsertVia, Resume, Retime
 from vrs.engine import Engine
-from vrs.errors import FormatError, VrsError
+from vrs.errors import VrsError
 from vrs.receipt import Receipt, Status
-from vrs.standing import Standing
-from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from interfaces.recording.recording import Recording
@@ -37,41 +35,10 @@ class Rerun:
     """The first that differs; empty where none does."""
     missing: str
     """Why some couldn't be run or compared; empty where all could."""
-    timeline: Timeline
+    timeline: AnyTimeline
     """What they made."""
     receipts: tuple[Receipt, ...]
     """The newest truth about each command."""
-
-
-def begun(recording: Recording) -> tuple[Engine, ManualClock]:
-    """An engine that stands as the recorded one did when the recording began, and its clock.
-
-    Raises:
-        FormatError: If it can't stand so, or what it needs for that is missing from the file.
-    """
-    begin, where = recording.session, str(recording.path)
-    try:
-        clock, lateness = ManualClock(begin.t), Lateness(begin.lateness)
-        if begin.late is None:
-            return Engine(recording.model, q=begin.q, clock=clock, lateness=lateness), clock
-        edits = recording.edits
-        if not edits or edits[0].number:
-            raise FormatError(where, "the timeline that it begins with is destroyed")
-        engine = Engine(recording.model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
-        engine.take_up(_stand(recording, begin.late, engine))
-    except FormatError:
-        raise
-    except ValueError as error:
-        raise FormatError(where, f"its beginning: {error}") from None
-    return engine, clock
-
-
-def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
-    limits = replace(
-        engine.limits, **{name: np.array(getattr(late, name)) for name in ("qd_max", "qdd_max", "qddd_max")}
-    )
-    steered = None if late.steered is None else (late.steered, late.steered_at)
-    return Standing(late.newest, Lateness(recording.session.lateness), limits, steered, recording.given)
 
 
 def rerun(recording: Recording) -> Rerun:
@@ -80,8 +47,8 @@ def rerun(recording: Recording) -> Rerun:
     Raises:
         FormatError: If the recording is of a robot that isn't known, or holds no commands that can be.
     """
-    engine, clock = begun(recording)
-    again = _Again(engine, clock, recording.changes, late=recording.session.late)
+    engine, clock = recording.kind.begun(recording)
+    again = _Again(engine, clock, recording.kind, recording.changes, late=recording.session.late)
     for entry in recording.commands:
         if entry.number != again.commands + 1:
             some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
@@ -112,12 +79,13 @@ class _Again:
         self,
         engine: Engine,
         clock: ManualClock,
-        changes: Sequence[HistoryEntry | ChangeEntry],
+        kind: Kind,
+        changes: Sequence[AnyHistory | AnyChange],
         *,
         late: Late | None,
     ) -> None:
-        self._engine, self._clock, self._late = engine, clock, late
-        self._recorded: dict[int, list[HistoryEntry | ChangeEntry]] = {}
+        self._engine, self._clock, self._kind, self._late = engine, clock, kind, late
+        self._recorded: dict[int, list[AnyHistory | AnyChange]] = {}
         for change in changes:
             self._recorded.setdefault(change.edit, []).append(change)
         first = self._recorded.pop(0, [])
@@ -153,7 +121,8 @@ class _Again:
             self.difference = f"{_named(entry)} {problem}"
         elif engine.timeline is not before:
             self._edit += 1
-            self._compare(edit_entries(before, engine.timeline, self._edit, entry.at, command_id), entry)
+            after = engine.timeline
+            self._compare(self._kind.edit_entries(before, after, self._edit, entry.at, command_id), entry)
 
     def _goes_back(self, entry: CommandEntry | Anchor, made: Receipt | None) -> bool:
         """Whether a command needs what only an engine from before the recording knows."""
@@ -181,7 +150,7 @@ class _Again:
         answer: object = self._engine.execute(command)  # type: ignore[arg-type]
         return answer if isinstance(answer, Receipt) else None
 
-    def _compare(self, made: tuple[ChangeEntry | HistoryEntry, ...], entry: CommandEntry | Anchor) -> None:
+    def _compare(self, made: tuple[AnyChange | AnyHistory, ...], entry: CommandEntry | Anchor) -> None:
         recorded = self._recorded.pop(self._edit, None)
         if recorded is None:
             self._unseen.append(self._edit)

@@ -1,4 +1,4 @@
-"""Samples of a robot's joints: read where they're needed, linear between neighbours."""
+"""Samples of a robot's joints or postures: read where they're needed, linear between neighbours."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from interfaces.recording.driving import messages as d
 from interfaces.recording.log import DECODING, unreadable
 from interfaces.recording.messages import RealSample, VirtualSample
 from interfaces.recording.scan import NUMBERS, Blocks
@@ -20,9 +21,15 @@ APART = 0.2
 AROUND = 1.5
 """Samples from so long before and after one moment are kept for the next [s]."""
 VIRTUAL, REAL = "/virtual/joints", "/real/joints"
+VIRTUAL_POSTURE, REAL_POSTURE = "/virtual/posture", "/real/posture"
+MEASURED, ESTIMATED = "/real/measured", "/virtual/estimated"
 _DECODERS: dict[str, msgspec.json.Decoder[Any]] = {
     VIRTUAL: msgspec.json.Decoder(list[VirtualSample]),
     REAL: msgspec.json.Decoder(list[RealSample]),
+    VIRTUAL_POSTURE: msgspec.json.Decoder(list[d.VirtualPosture]),
+    REAL_POSTURE: msgspec.json.Decoder(list[d.RealPosture]),
+    MEASURED: msgspec.json.Decoder(list[d.MeasuredPosture]),
+    ESTIMATED: msgspec.json.Decoder(list[d.EstimatedPosture]),
 }
 
 
@@ -33,11 +40,12 @@ class Track:
     t: Array
     """User time [s], (m,)."""
     q: Array
-    """Joints [rad], (m, n)."""
+    """Joints [rad], (m, n), or postures (x, y, θ) [m, m, rad], (m, 3)."""
     play: Array
     """Play time [s], (m,); of the virtual robot the user's."""
     reference: Array
-    """What the real robot's own timeline asked for [rad], (m, n); NaN where that isn't known."""
+    """What the real robot's own timeline asked for [rad], (m, n); of a mobile robot what it was told, v and ω
+    [m/s, rad/s], (m, 2). NaN where that isn't known."""
     edit: Array
     """Number of the virtual robot's newest edit, (m,); 0 of the real one."""
     block: Array
@@ -47,8 +55,8 @@ class Track:
 class Tracks:
     """The samples of both robots in a file."""
 
-    def __init__(self, blocks: Blocks, dof: int, where: str) -> None:
-        self._blocks, self._dof, self._where = blocks, dof, where
+    def __init__(self, blocks: Blocks, dof: int, told: int, where: str) -> None:
+        self._blocks, self._dof, self._told, self._where = blocks, dof, told, where
         self._near: dict[str, tuple[float, float, int, Track]] = {}
 
     def between(self, topic: str, since: float, until: float) -> Track:
@@ -58,8 +66,8 @@ class Tracks:
             InvalidValueError: If the topic has none.
             FormatError: If a sample is none.
         """
-        if topic not in (VIRTUAL, REAL):
-            raise InvalidValueError("topic", topic, f"{VIRTUAL} or {REAL}")
+        if topic not in _DECODERS:
+            raise InvalidValueError("topic", topic, ", ".join(_DECODERS))
         number, found, places = NUMBERS[topic], [], []
         for index in self._blocks.having(number, since * 1e9 - 1, until * 1e9 + 1):
             data = b"[" + b",".join(self._blocks.read(index, number)) + b"]"
@@ -72,19 +80,20 @@ class Tracks:
         return self._track(found, places, since, until)
 
     def _track(self, samples: list[Any], places: list[int], since: float, until: float) -> Track:
-        n, unknown = self._dof, [math.nan] * self._dof
+        n, told = self._dof, self._told
         if any(len(sample.q) != n for sample in samples):
             raise FormatError(self._where, f"a sample that hasn't {n} joints")
-        real = bool(samples) and isinstance(samples[0], RealSample)
+        real = bool(samples) and isinstance(samples[0], RealSample | d.RealPosture)
         t: Array = np.array([sample.t for sample in samples])
         q: Array = np.array([sample.q for sample in samples]).reshape(-1, n)
-        play, edit, reference = t, np.zeros(len(t)), np.full_like(q, math.nan)
+        play, edit, reference = t, np.zeros(len(t)), np.full((len(q), told), math.nan)
         if real:
             play = np.array([sample.play for sample in samples])
             references = [sample.reference for sample in samples]
-            if any(row is not None and len(row) != n for row in references):
-                raise FormatError(self._where, f"a reference that hasn't {n} joints")
-            reference = np.array([unknown if row is None else row for row in references]).reshape(-1, n)
+            if any(row is not None and len(row) != told for row in references):
+                raise FormatError(self._where, f"a reference that hasn't {told} joints")
+            unknown = [math.nan] * told
+            reference = np.array([unknown if row is None else row for row in references]).reshape(-1, told)
         else:
             edit = np.array([float(sample.edit) for sample in samples])
         kept = np.argsort(t, kind="stable")
@@ -104,7 +113,7 @@ class Tracks:
         Returns:
             (k, n), or (k,) of the play time; NaN where nothing is known.
         """
-        shape = (len(t),) if column == "play" else (len(t), self._dof)
+        shape = {"play": (len(t),), "reference": (len(t), self._told)}.get(column, (len(t), self._dof))
         found: Array = np.full(shape, np.nan)
         order = np.argsort(t, kind="stable")
         cuts = np.flatnonzero(np.diff(t[order]) > 2 * AROUND) + 1

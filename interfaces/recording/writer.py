@@ -61,8 +61,11 @@ class RecordingWriter:
         """Whether nothing more can be written."""
         try:
             self._file = McapFile(self._sink, FORMAT, session.software)
-            for channel in CHANNELS:
-                self._file.add_channel(channel.topic, channel.schema, channel.json_schema, many=channel.many)
+            for number, channel in enumerate(CHANNELS, 1):
+                kinds = channel.arm if session.drive is None else channel.mobile
+                if kinds:
+                    schema = channel.json_schema(kinds)
+                    self._file.add_channel(number, channel.topic, channel.schema, schema, many=channel.many)
             self.write(session, t=session.t)
             self.flush()
         except RecordingError:

@@ -237,7 +237,7 @@ def _open(paths: Sequence[Path], align: Align, found: list[Recording]) -> Playba
     found.extend(open_recording(path) for path in paths)
     for recording in found:
         # What is read or put together once is read here.
-        recording.model.links(recording.virtual(recording.span[0]))
+        recording.kind.prepare(recording)
     playback = Playback(found, align=align)
     playback.read_marks()
     return playback

@@ -37,10 +37,20 @@ def _cell(value: float | int | str | None) -> str:
 
 
 def _row(row: Row) -> list[str]:
-    values: list[Any] = [*row.group, row.seed, *(getattr(row.metrics, name) for name in METRICS)]
-    return [
-        _cell(value) for value in (*values, row.collisions, row.limits_passed, row.sent_bytes, row.longest_delay)
-    ]
+    return [_cell(value) for value in _values(row)]
+
+
+def _values(row: Row) -> list[Any]:
+    """What stands in the columns."""
+    metrics = (getattr(row.metrics, name) for name in METRICS)
+    rest = row.collisions, row.limits_passed, row.sent_bytes, row.longest_delay
+    return [*row.group, row.seed, *metrics, *rest]
+
+
+def facts_of(row: Row) -> dict[str, Any]:
+    """A row of runs.csv as JSON takes it, by the names of its columns: the very digits that stand there."""
+    shown = [float(_cell(value)) if isinstance(value, float) else value for value in _values(row)]
+    return dict(zip(COLUMNS, shown, strict=True))
 
 
 def _estimate(found: Estimate | None) -> dict[str, float] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 
@@ -53,6 +53,8 @@ SENSING = ("extended",)
 """Architectures whose robot has sonars, and whose operator has the map of the room."""
 ROBOTS = ("ipr", "micro", "bare")
 """Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""
+DriveLink: TypeAlias = Link[Packet, Report]
+"""What is between both sites."""
 POSITIONS: Final[dict[str, Callable[[MobileRobot], Position]]] = {
     "fused": FusedPosition,
     "odometry": OdometryPosition,
@@ -160,12 +162,13 @@ def make_robot(case: Case, start: Posture, room: str | Room) -> MobileRobot:
     return MobileBody(case.robot, start, room=where, reality=case.reality, rng=rng, senses=senses)
 
 
-def run(case: Case, driver: Operator | None = None) -> Drive:
+def run(case: Case, driver: Operator | None = None, witness: Witness | None = None) -> Drive:
     """Run a case; the same case gives the same to the last bit.
 
     Args:
         case: What to run.
         driver: Who drives, instead of the case's operator.
+        witness: Who notes what happens.
 
     Raises:
         InvalidValueError: If a name or a value isn't allowed.
@@ -173,18 +176,30 @@ def run(case: Case, driver: Operator | None = None) -> Drive:
     """
     constants = case.constants
     driver = operator(case.operator, case.seed, constants.period) if driver is None else driver
-    link: Link[Packet, Report] = Link(
+    link: DriveLink = Link(
         LinkConditions.symmetric(Conditions(delay=delay_profile(case.delay), service=case.transport.service)),
         np.random.default_rng([case.seed, 2]),
     )
     with make_robot(case, driver.start, case.room or driver.room) as body:
-        return _Run(case, driver, link, body).whole()
+        return _Run(case, driver, link, body, witness).whole()
+
+
+class Witness(Protocol):
+    """Who notes what happens in a run, and changes nothing of it."""
+
+    def begun(self, case: Case, start: Posture, body: MobileRobot, site: OperatorSite, link: DriveLink) -> None:
+        """The run begins; the site and the link tell those who listen."""
+
+    def sent(self, direction: str, now: float, size: int) -> None:
+        """A packet of so many bytes goes `forward` or `backward` now [s]."""
 
 
 class _Run:
     """A run while it goes on."""
 
-    def __init__(self, case: Case, driver: Operator, link: Link[Packet, Report], body: MobileRobot) -> None:
+    def __init__(
+        self, case: Case, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
+    ) -> None:
         self._case, self._driver, self._link, self._body = case, driver, link, body
         model = ipr.model("micro" if case.robot == "micro" else "ipr", period=case.constants.period)
         made = controller(case.architecture, driver.start, case.constants)
@@ -202,6 +217,9 @@ class _Run:
         self._estimate: list[float] = []
         self._bytes = self._reported = 0
         self._learned: list[tuple[float, tuple[tuple[int, int], ...]]] = []
+        self._witness = witness
+        if witness is not None:
+            witness.begun(case, driver.start, body, self._site, link)
 
     def whole(self) -> Drive:
         """From the start until the real robot could have done all."""
@@ -238,6 +256,7 @@ class _Run:
         if send:
             report = robot.report(now=now)
             self._reported += report.size
+            self._note("backward", now, report.size)
             link.backward.send(report, now, report.size)
             self._estimate = self._site.estimator.posture.tolist()
         D = None if self._offset is None else self._offset.D
@@ -258,9 +277,14 @@ class _Run:
         else:
             return
         self._bytes += packet.size
+        self._note("forward", now, packet.size)
         arrival = self._link.forward.send(packet, now, packet.size)
         # A stream's packet arrives in the end; a datagram that gets no time of arrival is lost.
         self._waiting += driving and (arrival is not None or not datagrams)
+
+    def _note(self, direction: str, now: float, size: int) -> None:
+        if self._witness is not None:
+            self._witness.sent(direction, now, size)
 
     def _made(self, rows: Array) -> Drive:
         t = rows[:, 0]

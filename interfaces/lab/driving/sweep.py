@@ -48,16 +48,11 @@ class Row:
 
 def measure(case: Case) -> Row:
     """Run a case and keep its figures."""
-    return _row(run(case))
+    return row_of(run(case))
 
 
-def measure_kept(case: Case, keep: bool) -> tuple[Row, Drive | None]:
-    """Run a case and keep its figures, and the whole run if that's to be drawn."""
-    drive = run(case)
-    return _row(drive), drive if keep else None
-
-
-def _row(drive: Drive) -> Row:
+def row_of(drive: Drive) -> Row:
+    """The figures of a run."""
     case = drive.case
     return Row(
         *case.group, case.seed, drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,

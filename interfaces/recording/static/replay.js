@@ -6,6 +6,11 @@
   const write = VrsScene.write;
   const { KINDS, makeMark, seconds } = VrsSeekBar;
   const NAMES = ["A", "B"];
+  // What an error is called and how it's written, by its unit.
+  const ERRORS = {
+    rad: { name: "Largest joint error", text: (error) => ((error * 180) / Math.PI).toFixed(3) + "°" },
+    m: { name: "Path error", text: (error) => (100 * error).toFixed(2) + " cm" },
+  };
 
   let state = null; // what the server said last
   let items = []; // the recordings
@@ -80,6 +85,9 @@
       const item = items[k];
       write(view.part(".name"), letter(k) + item.name);
       view.part(".name").title = [item.title, "delay " + item.delay, item.driver].filter(Boolean).join(" · ");
+      write(view.part(".error-name"), ERRORS[item.unit].name);
+      for (const path of ["driven", "learned"])
+        view.part(`[data-path=${path}]`).parentElement.hidden = !item.shows.includes(path);
       view.part(".damage").hidden = !item.damage;
       write(view.part(".damage"), item.damage);
     });
@@ -134,7 +142,7 @@
       if (!view) return;
       write(view.part(".own"), seconds(pane.t, 3));
       write(view.part(".behind"), pane.behind === null ? "–" : seconds(pane.behind, 3));
-      write(view.part(".error"), pane.error === null ? "–" : ((pane.error * 180) / Math.PI).toFixed(3) + "°");
+      write(view.part(".error"), pane.error === null ? "–" : ERRORS[items[k].unit].text(pane.error));
       view.part(".absent").hidden = pane.real && pane.virtual;
       write(view.part(".absent"), pane.virtual ? "The real robot wasn't recorded here" : "This part of the file is lost");
     });

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vrs.checks import number_in
-from vrs.model import Array, RobotModel
+from vrs.mobile import ArcTimeline
+from vrs.model import Array
 from vrs.timeline import Timeline
 
 PIECE = 0.5
@@ -25,11 +28,18 @@ DISC, SMALL_DISC, BALL = 0.021, 0.012, 0.016
 """Radius of the tick of a whole second, of that of a half, and of the ball at the end [m]."""
 
 
+class Kinematics(Protocol):
+    """Says where a robot's last link is; of a mobile robot, the robot itself."""
+
+    def forward(self, q: ArrayLike) -> Array:
+        """Poses (k, 4, 4) at what timelines give, (k, n)."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Committed:
     """What the real robot is committed to."""
 
-    timeline: Timeline
+    timeline: Timeline | ArcTimeline
     """The operator's."""
     play: float
     """The time of that timeline at which the real robot is [s], within ±1e9."""
@@ -71,7 +81,7 @@ class Piece:
 class Path:
     """The path of one plan, sampled once; pieces of equal motion are equal, whatever else the plan holds."""
 
-    def __init__(self, model: RobotModel, timeline: Timeline, play: float, tool: Array) -> None:
+    def __init__(self, model: Kinematics, timeline: Timeline | ArcTimeline, play: float, tool: Array) -> None:
         """Sample a plan.
 
         Args:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.view_parts import link_shapes
+from vrs.mobile import MobileModel
 from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
-    from robots.puma560.shapes import LinkShape
+    from robots.solids import LinkShape
 
 CREASE = math.cos(math.radians(35.0))
 """Cosine of the angle between faces [rad] beyond which the edge between them stays sharp."""
@@ -40,7 +41,7 @@ class Bodies(NamedTuple):
     """Lowest point of the base in its frame [m]; 0 for a robot without shapes."""
 
 
-def bodies(model: RobotModel) -> Bodies:
+def bodies(model: RobotModel | MobileModel) -> Bodies:
     """Make the meshes of a robot; the first time that takes a second, most of it to load trimesh."""
     shapes = link_shapes(model)
     floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)

@@ -93,6 +93,11 @@ def solid(path: str, mesh: ShadedMesh) -> Json:
     return group(path, [Part(Shaded(mesh, coloured=True), material)])
 
 
+def plain(path: str, mesh: ShadedMesh, colour: int) -> Json:
+    """Lower what has one colour, whatever light falls on it."""
+    return group(path, [Part(Shaded(mesh, coloured=False), g.MeshBasicMaterial(color=colour, side=FRONT))])
+
+
 def ghost(path: str, mesh: ShadedMesh) -> Json:
     """Lower a link of the virtual robot: translucent.
 
@@ -129,7 +134,9 @@ def trace(path: str, points: Array, colour: int) -> Json:
     return group(path, [Part(line, g.LineBasicMaterial(color=colour), "Line")])
 
 
-def committed_piece(path: str, points: Array, marks: Sequence[tuple[Array, float]], data: Json) -> Json:
+def committed_piece(
+    path: str, points: Array, marks: Sequence[tuple[Array, float]], data: Json, *, scale: float = 1.0
+) -> Json:
     """Lower a piece of the committed path, seen faintly through what stands before it.
 
     Args:
@@ -138,18 +145,40 @@ def committed_piece(path: str, points: Array, marks: Sequence[tuple[Array, float
         marks: Pose of each mark, (4, 4), its z along the path, and its size: a disc of that radius [m], or for a
             negative one a ball.
         data: See `group`.
+        scale: What all thicknesses are multiplied by.
     """
     clear = g.MeshBasicMaterial(color=COMMITTED)
     hidden = g.MeshBasicMaterial(color=COMMITTED, opacity=0.3, depthTest=False, depthWrite=False)
     shapes: list[tuple[Any, Sequence[float] | None]] = []
     if len(points):
-        shapes.append((_tube(points, TUBE), None))
+        shapes.append((_tube(points, scale * TUBE), None))
     for X, size in marks:
-        shape = g.Cylinder(0.008, size) if size > 0 else g.Sphere(-size)
+        shape = g.Cylinder(scale * 0.008, scale * size) if size > 0 else g.Sphere(-scale * size)
         shapes.append((shape, (X @ _CYLINDER).T.ravel().tolist()))
     parts = [Part(shape, clear, matrix=matrix) for shape, matrix in shapes]
     parts += [Part(shape, hidden, matrix=matrix, order=3) for shape, matrix in shapes]
     return group(path, parts, data)
+
+
+def band(path: str, points: Array, width: float, colour: int) -> Json:
+    """Lower where a robot has driven: a flat band on the floor along points [m], (k, 3), k ≥ 2, so wide [m]."""
+    along = np.gradient(points[:, :2], axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    aside = 0.5 * width * np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(points))])
+    vertices = np.stack([points + aside, points - aside], axis=1).reshape(-1, 3)
+    k = 2 * np.arange(len(points) - 1)[:, None, None]
+    faces = (k + np.array([[0, 1, 2], [2, 1, 3]])).reshape(-1, 3)
+    return group(path, [Part(g.TriangularMeshGeometry(vertices, faces), g.MeshBasicMaterial(color=colour))])
+
+
+def tiles(path: str, places: Array, side: float, colour: int) -> Json:
+    """Lower square tiles on the floor: their middles [m], (k, 3), k ≥ 1, and their side [m]."""
+    h = 0.5 * side
+    corners = np.array([[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]])
+    vertices = (places[:, None] + corners).reshape(-1, 3)
+    faces = (4 * np.arange(len(places))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    material = g.MeshBasicMaterial(color=colour, opacity=0.6, transparent=True)
+    return group(path, [Part(g.TriangularMeshGeometry(vertices, faces), material)])
 
 
 def _tube(points: Array, radius: float) -> Any:

@@ -3,40 +3,26 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.stream.meshcat.commands import delete, set_object, set_property, set_transform
-from interfaces.stream.meshcat.committed import Committed, Path, Piece
+from interfaces.stream.meshcat.commands import set_transform
+from interfaces.stream.meshcat.committed import Committed
 from interfaces.stream.meshcat.meshes import Bodies, bodies
-from interfaces.stream.meshcat.newest import Newest, Slot
+from interfaces.stream.meshcat.twins import COLOURS, PATH_PERIOD, ROOT, TwinScene
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
-from vrs.timeline import Timeline
 
-ROOT: Final = "/vrs"
-"""The node below which everything stands."""
-PATH_PERIOD: Final = 0.1
-"""The committed path is renewed, trimmed and the traces are drawn at most this often [s]."""
-NODES: Final = 64
-"""Nodes for pieces of the committed path: they are used in turn, since the viewer never forgets one wholly."""
-STILL: Final = 2e-7
-"""A link is put anew where an element of its pose, (4, 4), is off by more than this [m, 1]."""
 TRACE: Final = 3.0
 """How long a robot without shapes leaves a trace [s]."""
-COLOURS: Final = {"virtual": 0x2F7DE1, "real": 0x8A8578}
 OPACITY: Final = {"virtual": 0.42, "real": 1.0}
 
 
-class MeshcatScene:
-    """What all viewers see, each as quickly as it can: a value that is overtaken is sent to nobody.
-
-    The virtual robot is a ghost, the real one solid; the committed path runs ahead of the real one's tool.
-    """
+class MeshcatScene(TwinScene):
+    """Two arms: see `TwinScene`. The committed path runs ahead of the real one's tool."""
 
     def __init__(self, model: RobotModel, *, tool: ArrayLike | None = None, dressed: bool = True) -> None:
         """Make the scene, with both robots at the first of the model's named poses and only the virtual one shown.
@@ -47,14 +33,10 @@ class MeshcatScene:
             dressed: Whether to make the robot's bodies now; else nothing is to be seen until `dress`.
         """
         self._model = model
-        self._tool = frozen_array(_tool_of(model) if tool is None else tool)
-        if self._tool.shape != (3,) or not np.isfinite(self._tool).all():
+        point = frozen_array(_tool_of(model) if tool is None else tool)
+        if point.shape != (3,) or not np.isfinite(point).all():
             raise InvalidValueError("tool", tool, "finite, of shape (3,)")
-        self._newest = Newest(delete(ROOT))
-        self._poses: dict[str, Array] = {}
-        self._path: tuple[Timeline, Path] | None = None
-        self._drawn: dict[int, Piece] = {}
-        self._due = float("-inf")
+        super().__init__(model, point)
         self._trails: dict[str, deque[tuple[float, Array]]] = {twin: deque(maxlen=128) for twin in COLOURS}
         self._dressed = False
         if dressed:
@@ -87,35 +69,15 @@ class MeshcatScene:
                 else:
                     before = None if i == 0 else _rod(model, i)
                     body = objects.frame(path, before, COLOURS[twin], OPACITY[twin])
-                self._put(f"{path} object", set_object(path, body))
+                self._set_object(path, body)
             self._move(twin, rest)
         self._set(f"{ROOT}/real", "visible", False)
         self._newest.wake()
 
     @property
-    def viewers(self) -> int:
-        """How many viewers there are."""
-        return self._newest.readers
-
-    @property
     def tool(self) -> Array:
         """The point whose path is drawn, in the last link's frame [m], (3,), read-only."""
         return self._tool
-
-    def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
-        """Give a viewer a place: it gets the scene, and from then on what changes.
-
-        Args:
-            changed: Is called when there may be something to take; it must return at once.
-
-        Raises:
-            InvalidValueError: If there are too many.
-        """
-        return self._newest.join(changed)
-
-    def leave(self, slot: Slot) -> None:
-        """Give a place back; one that was given back already is none."""
-        self._newest.leave(slot)
 
     def show(
         self, *, virtual: ArrayLike, real: ArrayLike | None = None, path: Committed | None = None, now: float
@@ -155,42 +117,6 @@ class MeshcatScene:
             raise InvalidValueError(name, X.shape, f"finite poses of shape {shape}")
         return X
 
-    def _move(self, twin: str, links: Array) -> None:
-        shown = self._poses.get(twin)
-        if shown is None:
-            shown = self._poses[twin] = np.full_like(links, np.inf)
-        moved = np.abs(links - shown).max(axis=(1, 2)) > STILL
-        for i in np.flatnonzero(moved).tolist():
-            path = f"{ROOT}/{twin}/body/{i}"
-            self._put(path, set_transform(path, links[i]))
-        shown[moved] = links[moved]
-
-    def _draw(self, committed: Committed | None) -> None:
-        pieces: tuple[Piece, ...] = ()
-        if committed is not None:
-            timeline, play = committed.timeline, committed.play
-            known = self._path
-            # A path reaches only so far ahead: it's sampled again as the robot comes nearer to where it was cut.
-            if known is None or known[0] is not timeline or not known[1].reaches(play):
-                known = self._path = timeline, Path(self._model, timeline, play, self._tool)
-            pieces = known[1].pieces(play)
-            if pieces:
-                self._set(f"{ROOT}/committed", "play", round(play, 2))
-        wanted = {piece.index % NODES: piece for piece in pieces if piece}
-        for node in self._drawn.keys() - wanted.keys():
-            del self._drawn[node]
-            self._set(f"{ROOT}/committed/{node}", "visible", False)
-        for node, piece in wanted.items():
-            known_piece = self._drawn.get(node)
-            if known_piece is not None and known_piece.equals(piece):
-                continue
-            self._drawn[node] = piece
-            where = f"{ROOT}/committed/{node}"
-            label = {} if piece.t is None else {"t": round(piece.t, 3), "end": piece.ends}
-            lowered = self._objects.committed_piece(where, piece.points, piece.marks, label)
-            self._put(f"{where} object", set_object(where, lowered))
-            self._set(where, "visible", True)
-
     def _trace(self, poses: dict[str, Array], now: float) -> None:
         for twin, trail in self._trails.items():
             links = poses.get(twin)
@@ -203,14 +129,8 @@ class MeshcatScene:
             path = f"{ROOT}/{twin}/trace"
             if len(trail) > 1:
                 points = np.array([point for _, point in trail])
-                self._put(f"{path} object", set_object(path, self._objects.trace(path, points, COLOURS[twin])))
+                self._set_object(path, self._objects.trace(path, points, COLOURS[twin]))
             self._set(path, "visible", len(trail) > 1)
-
-    def _set(self, path: str, name: str, value: Any) -> None:
-        self._put(f"{path} {name}", set_property(path, name, value))
-
-    def _put(self, key: str, command: bytes) -> None:
-        self._newest.put(key, command)
 
 
 def _tool_of(model: RobotModel) -> ArrayLike:

@@ -95,7 +95,7 @@ function withoutSmoothing(make) {
   }
 }
 
-// Both robots and the committed path in a pane; throws where the browser offers no WebGL.
+// Both robots, their paths and their room in a pane; throws where the browser offers no WebGL.
 window.VrsScene = class {
   static software = SOFTWARE;
 
@@ -171,10 +171,11 @@ window.VrsScene = class {
     const half = (camera.fov * Math.PI) / 360;
     const narrow = Math.min(1, this.pane.clientWidth / this.pane.clientHeight);
     const radius = 0.5 * Math.hypot(...low.map((x, k) => high[k] - x));
-    // Nearer than would show the whole reach: arms are rarely stretched out.
-    const distance = (0.66 * radius) / Math.sin(Math.atan(Math.tan(half) * Math.max(narrow, 0.45)));
-    const azimuth = -0.3 * Math.PI;
-    const elevation = 0.34;
+    // Of an arm, nearer than would show the whole reach: it's rarely stretched out.
+    const root = this.node(VrsScene.ROOT);
+    const distance = ((root.away ?? 0.66) * radius) / Math.sin(Math.atan(Math.tan(half) * Math.max(narrow, 0.45)));
+    const azimuth = root.azimuth ?? -0.3 * Math.PI;
+    const elevation = root.elevation ?? 0.34;
     const eye = [
       middle[0] + distance * Math.cos(elevation) * Math.cos(azimuth),
       middle[1] + distance * Math.cos(elevation) * Math.sin(azimuth),
@@ -209,6 +210,8 @@ window.VrsScene = class {
       virtual: ["virtual"],
       real: ["real", "body"],
       committed: ["committed"],
+      driven: ["driven"],
+      learned: ["learned"],
     }))
       this.node(VrsScene.ROOT, ...path).visible = !this.hidden.has(name);
   }

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from interfaces.teleop.architectures.controllers import Controller
 from interfaces.teleop.architectures.segments import Packet, Receiver, Sender, Transport
 from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.listening import Deed
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.mobile import DriveLimits, MobileEngine, MobileModel, PostureEstimator
@@ -77,6 +79,8 @@ class OperatorSite:
         self._model = model
         self.surroundings = surroundings
         """What the virtual robot avoids, if anything."""
+        self.listener: Callable[[Deed], object] | None = None
+        """Is told of each command at once."""
         self.before = STAND
         """What was driven last."""
 
@@ -102,7 +106,10 @@ class OperatorSite:
         v, w = self.before = Drive(*limited((v, w), self.before, period, self._model.limits))
         self._clock.advance(now - self._clock.now())
         start = max(self.engine.timeline.end, now)
-        receipt = self.engine.execute(DriveCommand(v, w, period, execute_at=start))
+        command = DriveCommand(v, w, period, execute_at=start)
+        receipt = self.engine.execute(command)
+        if self.listener is not None:
+            self.listener(Deed(self._clock.now(), command, receipt, refused=False))
         self.estimator.command(v, w)
         arc = known_arc(start, period, self._end, v, w, receipt.command_id)
         self._sender.add(arc)

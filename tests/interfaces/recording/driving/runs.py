@@ -1,0 +1,26 @@
+"""Short runs of the bare mobile robot, with their recordings."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.recording.driving.recorder import DriveRecorder
+from interfaces.teleop.architectures import Transport
+
+SLALOM = Case("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 6.0)
+WANDER = Case("extended", Transport.STREAM, "constant:0.4", "bare", "wander", 1, 12.0)
+_FOLDER = TemporaryDirectory(prefix="vrs-drives-")
+
+
+@cache
+def recorded(case: Case) -> tuple[Drive, Path]:
+    """A run, and where its recording stands; it isn't to be changed."""
+    path = Path(_FOLDER.name) / f"{abs(hash(case))}.mcap"
+    recorder = DriveRecorder(path)
+    drive = run(case, witness=recorder)
+    recorder.finish(drive)
+    assert recorder.problem == ""
+    return drive, path
