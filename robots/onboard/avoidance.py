@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from robots.ipr.parameters import IPR_LIMITS
 from robots.onboard.driving import STAND, Drive, kept
+from robots.onboard.free_ways import CREEP, ROUNDING, Outline, free_ways
 from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
@@ -27,40 +28,18 @@ from vrs.model import Array
 
 _CURVATURES = np.array([0.0, *(s * k for k in (0.2, 0.4, 0.7, 1.0, 1.4, 1.9, 2.5, 3.3, 4.5) for s in (1, -1))])
 """Curvatures to choose from [1/m]."""
-_STRAIGHT = 1e-4
-"""Curvatures of less [1/m] are driven as this one: over a metre it's 0.05 mm beside."""
 _ON_THE_SPOT = 1e3
 """Curvature [1/m] of a turn on the spot: its centre is 1 mm beside the axle's middle."""
 _TURNS = np.radians(np.arange(15.0, 181.0, 15.0))
 """Turns on the spot to choose from, either way."""
 _SPREAD, _SEEN = 0.85, 0.9
 """Shares of a cone that points are put on, and that are looked through: its edges are its neighbours', too."""
-_CREEP = 0.01
-"""How much nearer the outline may come to a point that's within the clearance already [m]."""
 _ROOM = 0.5
 """Share of the look-ahead that's enough to set out."""
 _INCHING = 0.02
 """A robot that may drive no faster [m/s] stands: else it would follow the readings' noise."""
 _LEAST_WAY = 0.08
 """A way of less [m] isn't worth driving."""
-_ROUNDING = 1e-6
-"""Lengths that differ by less [m] are taken as equal where points are left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outline:
-    """A rectangle round the robot, seen from the middle of its driving axle."""
-
-    front: float
-    """[m], in [0.005, 5]."""
-    rear: float
-    """[m], in [0.005, 5]."""
-    half_width: float
-    """[m], in [0.005, 5]."""
-
-    def __post_init__(self) -> None:
-        for name in ("front", "rear", "half_width"):
-            number_in(name, getattr(self, name), 0.005, 5.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,10 +202,10 @@ class ObstacleAvoidance:
         """
         points, found = self._near(posture, now), np.zeros(len(v))
         for sense in (1, -1):
-            those = v * sense > _ROUNDING
+            those = v * sense > ROUNDING
             if those.any():
                 found[those] = self._ways(points, sense * w[those] / v[those], sense)
-        return np.maximum(found - 2 * _CREEP, 0.0)
+        return np.maximum(found - 2 * CREEP, 0.0)
 
     def slowed(self, wanted: Drive, posture: tuple[float, float, float], *, now: float, v_before: float) -> Drive:
         """Drive a curve, forward or in reverse, or turn, as fast as there's room and no faster than is wanted.
@@ -241,7 +220,7 @@ class ObstacleAvoidance:
         self._side = 0.0
         if v_before * wanted.v < 0 and abs(v_before) > config.limits.a_max * config.period:
             return self._brake(v_before)
-        if abs(wanted.v) < _ROUNDING:
+        if abs(wanted.v) < ROUNDING:
             found = self._turn(points, wanted.w) if wanted.w else STAND
         else:
             found = self._limited(points, wanted.v, wanted.w / wanted.v)
@@ -276,42 +255,7 @@ class ObstacleAvoidance:
 
     def _ways(self, points: Array, curvatures: Array, sense: int = 1) -> Array:
         """Ways until the outline touches a point, for each curvature, (n,) [m]; infinity where it never does."""
-        if not len(points):
-            return np.full(len(curvatures), np.inf)
-        outline, clearance = self._config.outline, self._config.clearance
-        x, y = points[:, 0] * sense, points[:, 1]
-        front, rear = (outline.front, outline.rear)[::sense]
-        half = outline.half_width
-        beyond = np.hypot(np.maximum(np.maximum(x - front, -rear - x), 0), np.maximum(np.abs(y) - half, 0))
-        if ((beyond <= 0) & (x > 0)).any():
-            return np.zeros(len(curvatures))
-        margin = np.minimum(clearance, np.maximum(beyond - _CREEP, 0))
-        k = np.where(np.abs(curvatures) < _STRAIGHT, np.copysign(_STRAIGHT, curvatures), curvatures)
-        # A reversing robot goes forward in a mirror, and turns the other way there.
-        k = k * sense
-        centre = (1 / k)[:, None]
-        radius = np.hypot(x, y - centre)
-        # Points nearer to the centre of rotation or further from it than any of the outline are never touched.
-        inner = np.abs(centre) - half - clearance - _ROUNDING
-        outer = np.hypot(max(front, rear) + clearance, np.abs(centre) + half + clearance) + _ROUNDING
-        curve, point = np.nonzero((radius >= inner) & (radius <= outer))
-        ways = np.full(len(curvatures), np.inf)
-        if not len(curve):
-            return ways
-        k, centre, radius = k[curve], centre[curve, 0], radius[curve, point]
-        x, y, margin = x[point], y[point], margin[point]
-        # Front and rear are met at ± an angle, the sides at an angle and what it lacks to π.
-        ends = np.stack([front + margin, -rear - margin])
-        sides = np.stack([half + margin, -half - margin])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            across, beside = np.arccos(ends / radius), np.arcsin((sides - centre) / radius)
-        solution = np.concatenate([across, -across, beside, math.pi - beside])
-        met = np.concatenate([centre + radius * np.sin(solution[:4]), radius * np.cos(solution[4:])])
-        low, high = np.repeat([sides[1], ends[1]], 4, axis=0), np.repeat([sides[0], ends[0]], 4, axis=0)
-        inside = (met >= low - 1e-9) & (met <= high + 1e-9)
-        turned = np.remainder((np.arctan2(y - centre, x) - solution) * np.sign(k), math.tau)
-        np.minimum.at(ways, curve, np.where(inside, turned / np.abs(k), np.inf).min(axis=0))
-        return ways
+        return free_ways(points, curvatures, self._config.outline, self._config.clearance, sense)
 
     def _straight_ways(self, points: Array, turns: Array) -> Array:
         """Ways straight ahead after turns on the spot [rad], (n,) [m]."""
@@ -326,7 +270,7 @@ class ObstacleAvoidance:
 
     def _speed(self, way: float) -> float:
         config = self._config
-        return config.limits.braking_speed(way - 2 * _CREEP, config.period + config.lag)
+        return config.limits.braking_speed(way - 2 * CREEP, config.period + config.lag)
 
     def _limited(self, points: Array, v: float, curvature: float) -> Drive:
         """The same curve, slower if need be."""
@@ -354,7 +298,7 @@ class ObstacleAvoidance:
         config, limits = self._config, self._config.limits
         k_wanted = w / v
         way = float(self._ways(points, np.array([k_wanted]))[0])
-        if way >= min(config.lookahead, left + _CREEP):
+        if way >= min(config.lookahead, left + CREEP):
             self._curvature, self._side = k_wanted, 0.0
             speed = min(v, self._speed(way))
             return Drive(speed, k_wanted * speed)
@@ -367,11 +311,11 @@ class ObstacleAvoidance:
         least = max(v_before - limits.a_max * config.period, 0.0)
         # So much is left that the robot's corners have room to turn on the spot where it comes to a stand.
         outline = config.outline
-        spare = math.hypot(outline.front, outline.half_width) - outline.front + _CREEP
+        spare = math.hypot(outline.front, outline.half_width) - outline.front + CREEP
         slow = np.array([self._speed(one - spare) for one in ways.tolist()])
         cost[(slow < least - 1e-9) | (ways < _LEAST_WAY)] = np.inf
         i = int(np.argmin(cost))
-        if cost[i] < np.inf and (reach[i] >= _ROOM * config.lookahead or slow[i] > _CREEP):
+        if cost[i] < np.inf and (reach[i] >= _ROOM * config.lookahead or slow[i] > CREEP):
             self._curvature, self._side = float(curvatures[i]), 0.0
             bend = limits.w_max / max(abs(self._curvature), 1e-6)
             speed = min(max(v, config.detour), float(slow[i]), max(bend, least))
