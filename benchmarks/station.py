@@ -265,9 +265,7 @@ def memory() -> None:
     # Before that the page fills its quarter of an hour of measurements.
     settled = np.array([look for look in looks if look[0] > 60.0 * MINUTES * 2 / 3])
     heap, nodes, rss = np.polyfit(settled[:, 0] / 60.0, settled[:, 1:], 1)[0]
-    print(
-        f"in the last third: heap {heap:+.3f} MiB a minute, nodes {nodes:+.1f}, server and robot {rss:+.2f} MiB"
-    )
+    print(f"in the last third: heap {heap:+.3f} MiB a minute, nodes {nodes:+.1f}, server and robot {rss:+.2f} MiB")
 
 
 def main() -> None:

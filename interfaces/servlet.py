@@ -29,17 +29,11 @@ from interfaces.messages import (
     Verdict,
     Want,
 )
-from vrs.commands import Stop
+from interfaces.ordering import REMEMBERED, OrderBook
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import frozen_array
 from vrs.timeline import Timeline
-
-BACKLOG = 256
-"""Orders that wait for an earlier one that's still under way, at most."""
-
-REMEMBERED = 1024
-"""Outcomes and answers that are kept, to be sent again."""
 
 WATCHED = 64
 """Newest outcomes that are sent again when later commands change them."""
@@ -50,16 +44,11 @@ OUTBOX = 1024
 PULSE = 0.1
 """Period at which a follower of segments is told how far the timeline is complete [s]."""
 
-OVERTAKEN = "issued before a stop that came first"
-"""Why an order is refused that a stop has overtaken."""
-
 
 class Servlet:
     """Carries out a client's orders once each, in their order, and answers what it asks.
 
-    An order that comes twice is answered twice and carried out once. One that comes too early waits for those
-    before it. A stop doesn't wait: orders that were issued before it and come later are refused, since it would
-    have dropped them.
+    See `OrderBook` for the order of the orders.
     """
 
     def __init__(
@@ -83,9 +72,7 @@ class Servlet:
         self.lead = lead
         self._broadcasters = tuple(broadcasters)
         self._outbox: deque[Reply] = deque(maxlen=OUTBOX)
-        self._next = 1
-        self._early: dict[int, Order] = {}
-        self._outcomes: OrderedDict[int, Outcome] = OrderedDict()
+        self._orders = OrderBook(self._carry_out, self._outbox.append)
         self._answers: OrderedDict[int, Frame] = OrderedDict()
         self._forecasts = Forecasts(REMEMBERED)
         self._edit = self.journal.look()
@@ -107,7 +94,7 @@ class Servlet:
         """
         self._catch_up(now)
         if isinstance(message, Order):
-            self._take(message, now)
+            self._orders.take(message, now)
         elif isinstance(message, Ask):
             self._answer(message, now)
         elif isinstance(message, Follow):
@@ -149,46 +136,17 @@ class Servlet:
             self._source.leave(self._slot)
         self._slot = self._source = self._beat = self._follow = None
 
-    def _take(self, order: Order, now: float) -> None:
-        number = order.number
-        if number < self._next:
-            outcome = self._outcomes.get(number) or Outcome(number, None, OVERTAKEN, 0, now)
-            self._keep(outcome)
-            self._outbox.append(outcome)
-            return
-        if isinstance(order.command, Stop):
-            for early in sorted(n for n in self._early if n < number):
-                del self._early[early]
-                self._settle(Outcome(early, None, OVERTAKEN, 0, now))
-            self._next = number
-        if number - self._next <= BACKLOG:
-            self._early[number] = order
-        while self._next in self._early:
-            self._next += 1
-            self._carry_out(self._early.pop(self._next - 1), now)
-
-    def _carry_out(self, order: Order, now: float) -> None:
+    def _carry_out(self, order: Order, now: float) -> Outcome:
         refusal = "" if self._admit is None else self._admit(order)
         if refusal:
-            self._settle(Outcome(order.number, None, refusal, 0, now))
-            return
+            return Outcome(order.number, None, refusal, 0, now)
         try:
             receipt = self.journal.execute(order.command)
         except VrsError as error:
-            self._settle(Outcome(order.number, None, str(error), 0, now))
-            return
+            return Outcome(order.number, None, str(error), 0, now)
         if receipt is None and order.command is None:
             refusal = self.journal.engine.undo_refusal()
-        self._settle(Outcome(order.number, None if receipt is None else portable(receipt), refusal, 0, now))
-
-    def _settle(self, outcome: Outcome) -> None:
-        self._keep(outcome)
-        self._outbox.append(outcome)
-
-    def _keep(self, outcome: Outcome) -> None:
-        self._outcomes[outcome.number] = outcome
-        if len(self._outcomes) > REMEMBERED:
-            self._outcomes.popitem(last=False)
+        return Outcome(order.number, None if receipt is None else portable(receipt), refusal, 0, now)
 
     def _answer(self, ask: Ask, now: float) -> None:
         frame = self._answers.get(ask.number)
@@ -275,13 +233,13 @@ class Servlet:
 
     def _revise(self, now: float) -> None:
         """Send the receipts again that a later command changed."""
-        for number in list(self._outcomes)[-WATCHED:]:
-            outcome = self._outcomes[number]
+        for number in list(self._orders.outcomes)[-WATCHED:]:
+            outcome = self._orders.outcomes[number]
             old = outcome.receipt
             if old is None or not old.stands:
                 continue
             new = self.journal.engine.receipt(old.command_id)
             if new.version != old.version:
                 revised = Outcome(number, portable(new), "", outcome.revision + 1, now)
-                self._outcomes[number] = revised
+                self._orders.outcomes[number] = revised
                 self._outbox.append(revised)

@@ -59,6 +59,11 @@ class Site:
         """The broadcasters, in the order in which they were made."""
         return tuple(self._broadcasters)
 
+    @property
+    def robot(self) -> str:
+        """Name of the robot's model."""
+        return self.engine.model.name
+
     def broadcast(self, rate: float, *, lead: float = 0.0) -> Broadcaster:
         """Add a broadcaster; see there."""
         self._broadcasters.append(Broadcaster(self.journal, rate=rate, lead=lead))

@@ -8,7 +8,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -18,6 +18,7 @@ from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import asyncio
+    from contextlib import AsyncExitStack
 
     from interfaces.stream.access import Access
     from interfaces.stream.control import Role
@@ -102,3 +103,18 @@ def keep_quiet() -> None:
     """Let the garbage collector pass over all that is loaded: its long passes would stop a robot for 20 ms."""
     gc.collect()
     gc.freeze()
+
+
+async def start_robot(robots: AsyncExitStack, robot_at: str | None, options: Sequence[str]) -> str:
+    """Where the robot is; one is started if there's none."""
+    from interfaces.runtime.live.process import local_robot
+
+    return await robots.enter_async_context(local_robot(options)) if robot_at is None else robot_at
+
+
+async def abandon(task: asyncio.Task[str]) -> None:
+    """Let a task end that nobody waits for any more."""
+    import asyncio
+
+    task.cancel()
+    await asyncio.wait([task])

@@ -8,6 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of
+from interfaces.cli.mobile import (
+    ARCHITECTURE,
+    ROBOTS,
+    ROOM,
+    Architecture,
+    RobotName,
+    RoomName,
+    run_mobile,
+    without,
+)
 from interfaces.software import software
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
@@ -21,6 +31,9 @@ def robot(
         str,
         typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
     ] = "127.0.0.1:8601",
+    name: RobotName = "puma560",
+    architecture: Architecture = ARCHITECTURE,
+    room: RoomName = ROOM,
     offset: Annotated[
         str,
         typer.Option(
@@ -76,6 +89,17 @@ def robot(
     from robots import puma560
     from robots.onboard import LossPolicy, WatchdogConfig
 
+    if one_of("robot", name, ROBOTS) == "ipr":
+        without(name, {
+            "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, "puma560"),
+            "friction": (friction, True), "pose": (pose, "nominal"),
+        })  # fmt: skip
+        run_mobile(
+            listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
+            reports=reports, token_file=token_file, until_eof=until_eof,
+        )  # fmt: skip
+        return
+    without(name, {"architecture": (architecture, ARCHITECTURE), "room": (room, ROOM)})
     address = parse_address("--listen", listen)
     model = puma560.model()
     q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], BodyKind(one_of("body", body, BodyKind))

@@ -9,26 +9,50 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of
+from interfaces.cli.doors import (
+    TokenFile,
+    abandon,
+    access_for,
+    end_on_signal,
+    end_with_input,
+    keep_quiet,
+    names_of,
+    start_robot,
+)
+from interfaces.cli.mobile import (
+    ARCHITECTURE,
+    ROBOTS,
+    ROOM,
+    Architecture,
+    MobileServing,
+    RobotName,
+    RoomName,
+    room_of,
+    serve_mobile,
+    without,
+)
 from interfaces.cli.options import PROFILES, Host, Port
 from interfaces.software import software
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    import asyncio
     from collections.abc import Sequence
-    from contextlib import AsyncExitStack
 
     from interfaces.link import LinkConditions
     from interfaces.recording.live import LiveRecording
     from interfaces.stream.access import Access
 
+RECORDINGS = Path("recordings")
+"""Where the station records to, unless told otherwise."""
+
 
 def serve(
     host: Host = "127.0.0.1",
     port: Port = 8600,
-    robot: Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560.")] = "puma560",
+    robot: RobotName = "puma560",
+    architecture: Architecture = ARCHITECTURE,
+    room: RoomName = ROOM,
     delay: Annotated[
         str,
         typer.Option(
@@ -91,7 +115,7 @@ def serve(
     recordings: Annotated[
         Path,
         typer.Option("--recordings", metavar="DIR", help="Where the station records to; made when it's needed."),
-    ] = Path("recordings"),
+    ] = RECORDINGS,
     until_eof: Annotated[bool, typer.Option("--until-eof", help="End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
@@ -106,13 +130,31 @@ def serve(
     from interfaces.runtime.offset import fixed_offset, spelled
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
+    from interfaces.teleop.architectures import ARCHITECTURES
     from robots.onboard import LossPolicy
 
-    if robot != "puma560":
-        raise InvalidValueError("robot", robot, "puma560")
+    one_of("robot", robot, ROBOTS)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     profile = delay_profile(delay)
     way = Conditions(delay=profile, loss=loss_model(loss), service=service)  # type: ignore[arg-type]
+    link = LinkConditions.symmetric(way)
+    advice = late_often(link, policy, max_age)
+    at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
+    token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
+    if robot == "ipr":
+        without(robot, {
+            "offset": (offset, "adaptive"), "body": (body, "puma560"), "val-port": (val_port, None),
+            "val-files": (val_files, Path()), "record": (record, None), "recordings": (recordings, RECORDINGS),
+        })  # fmt: skip
+        room_of(room)
+        one_of("architecture", architecture, ARCHITECTURES)
+        serving = MobileServing(
+            host, port, room, architecture, link, policy.value, max_age, seed, at, token, until_eof
+        )
+        _advise(advice)
+        uvloop.run(serve_mobile(serving, access_for(host, token_file, free=OPEN)))
+        return
+    without(robot, {"architecture": (architecture, ARCHITECTURE), "room": (room, ROOM)})
     behind = spelled(fixed_offset(offset, profile))
     options = ["--offset", behind, "--link-loss", policy, "--body", body, "--max-age", f"{max_age:g}"]
     recording = None
@@ -126,12 +168,7 @@ def serve(
         Sink.create(record).close()
         options += ["--reports", f"{RATE:g}"]
         recording = LiveRecording(record, *told, _recording_failed)
-    link = LinkConditions.symmetric(way)
-    advice = late_often(link, policy, max_age)
-    if advice:
-        typer.echo(f"vrs: {advice}", err=True)
-    at = None if robot_at is None else parse_address("--robot-at", robot_at)
-    token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
+    _advise(advice)
     if not val_files.is_dir():
         raise InvalidValueError("val-files", str(val_files), "a directory")
     access = access_for(host, token_file, free=OPEN)
@@ -143,13 +180,19 @@ def serve(
             doors,
             link,
             seed,
-            None if at is None else f"ws://{at}/site",
+            at,
             token,
             options,
             recording,
             _Shelved(recordings, *told),
         )
     )
+
+
+def _advise(advice: str) -> None:
+    """Say what is likely to go wrong, if anything is."""
+    if advice:
+        typer.echo(f"vrs: {advice}", err=True)
 
 
 def _recording_failed(problem: str) -> None:
@@ -206,11 +249,12 @@ async def _serve(
         val_listening = None
         if doors.val_port is not None:
             val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", doors.val_port)))
-        robot = asyncio.create_task(_start_robot(robots, robot_at, options))
-        stack.push_async_callback(_abandon, robot)
+        robot = asyncio.create_task(start_robot(robots, robot_at, options))
+        stack.push_async_callback(abandon, robot)
         await asyncio.to_thread(_load)
 
         from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
+        from interfaces.station.chain import described
         from interfaces.station.page import Station
         from interfaces.station.record import RecordingFacts, Recordings
         from interfaces.station.shelf import Shelf
@@ -225,7 +269,7 @@ async def _serve(
             server=software(), recording=recording,
         )  # fmt: skip
         operator = LiveOperator(config, access)
-        station = Station(model, operator.scene.tool)
+        station = Station(described(model, operator.scene.tool))
         shown = f"[{host}]" if ":" in host else host
         near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())
@@ -254,21 +298,6 @@ async def _serve(
             operator.robot.url = robot.result()
             typer.echo(f"vrs: robot at {robot.result()}, emulated delay {conditions.forward.delay.name}", err=True)
         await ending
-
-
-async def _start_robot(robots: AsyncExitStack, robot_at: str | None, options: Sequence[str]) -> str:
-    """Where the robot is; one is started if there's none."""
-    from interfaces.runtime.live.process import local_robot
-
-    return await robots.enter_async_context(local_robot(options)) if robot_at is None else robot_at
-
-
-async def _abandon(task: asyncio.Task[str]) -> None:
-    """Let a task end that nobody waits for any more."""
-    import asyncio
-
-    task.cancel()
-    await asyncio.wait([task])
 
 
 def _load() -> None:

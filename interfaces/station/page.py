@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import AsyncIterator, Iterable
-from typing import Final
+from collections.abc import AsyncIterator, Iterable, Mapping
+from typing import Any, Final
 
 from fastapi import FastAPI
 from nicegui import Client, core, ui
@@ -16,10 +16,8 @@ from nicegui.element import Element
 from starlette.routing import BaseRoute, Mount
 
 from interfaces.station.bounds import Bounds
-from interfaces.station.chain import described
 from interfaces.station.files import route
 from interfaces.station.panels import PANELS, Panel, Place
-from vrs.model import Array, RobotModel
 
 TITLE: Final = "VRS teleop"
 KEEP: Final = 30.0
@@ -37,21 +35,20 @@ class Station:
 
     def __init__(
         self,
-        model: RobotModel,
-        tool: Array,
+        robot: Mapping[str, Any],
         *,
         panels: Iterable[Panel] = PANELS,
     ) -> None:
         """Make the page; nobody sees it yet.
 
         Args:
-            model: The robot.
-            tool: The tool's point in the last link's frame [m], (3,).
+            robot: What the panels' scripts are told of it: of an arm `chain.described`, of a mobile robot that it's
+                `mobile`.
             panels: What the page has.
         """
         self._panels = tuple(panels)
         listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in self._panels]
-        self._config = json.dumps({"robot": described(model, tool), "panels": listed})
+        self._config = json.dumps({"robot": robot, "panels": listed})
         self._app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         core.sio.eio.transports = ["websocket"]
         core.app.config.socket_io_js_transports = ["websocket"]

@@ -62,3 +62,16 @@ PANELS: Final[tuple[Panel, ...]] = (
     Panel("hints", "Hints", Place.NOWHERE),
 )
 """What the page has, in the order of its tabs and of the keyboard."""
+
+MOBILE_PANELS: Final[tuple[Panel, ...]] = (
+    Panel("floor", "3D view", Place.PANE),
+    Panel("link", "Connection", Place.HEADER),
+    Panel("control", "Control", Place.HEADER),
+    Panel("theme", "Light or dark", Place.HEADER),
+    Panel("stop", "Stop", Place.HEADER),
+    Panel("drive", "Drive", Place.SIDE, icon="gamepad"),
+    Panel("deviation", "Plots", Place.SIDE, icon="show_chart"),
+    Panel("network", "Link", Place.SIDE, icon="network_check"),
+    Panel("hints", "Hints", Place.NOWHERE),
+)
+"""What a mobile robot's page has."""

@@ -16,6 +16,7 @@ from interfaces.ports import RemotePort, earliest
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.control import Notice, ProblemCode, Role
+from interfaces.stream.mobile import MobileWelcome
 from interfaces.stream.network import Impair, Network, Survey
 
 FROM_SERVER = 4 * LARGEST
@@ -33,7 +34,7 @@ KEPT = 1024
 UNKNOWN = "unknown: the session was lost before an answer came"
 """Refusal of an order that may have been carried out."""
 
-_COMING = Reply | Notice
+_COMING = Reply | Notice | MobileWelcome
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
@@ -190,6 +191,9 @@ class ClientCore:
         self._heard = now
         if isinstance(message, control.Welcome):
             self._begin(message, now)
+        elif isinstance(message, MobileWelcome):
+            text = f"the mobile robot {message.robot} is driven here, not an arm; docs/protocol.md says how"
+            self._complain(control.Problem(ProblemCode.REFUSED, text, fatal=True))
         elif isinstance(message, control.Ping):
             t = self.time(now)
             self._send(control.Pong(message.number, message.t, now if t is None else t, now if t is None else t))

@@ -14,21 +14,33 @@ import numpy as np
 
 from interfaces import messages
 from interfaces.messages import Reply, Request
-from interfaces.stream import control, network
+from interfaces.stream import control, mobile, network
 from interfaces.stream.control import Notice, ProblemCode, Question
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.wire import Message as Wire
 from interfaces.stream.wire import control as controls
+from interfaces.stream.wire import driving, replies, requests, sites
 from interfaces.stream.wire import network as networks
-from interfaces.stream.wire import replies, requests, sites
 from interfaces.stream.wire.segments import Packed, Plain
+from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536
 """Longest message that is read unless told otherwise [B]."""
 
-Value: TypeAlias = Request | Reply | Question | Notice | Orders | Report
+Value: TypeAlias = (
+    Request
+    | Reply
+    | Question
+    | Notice
+    | mobile.MobileWelcome
+    | mobile.Postures
+    | Orders
+    | Report
+    | DriveOrders
+    | DriveReport
+)
 """What crosses."""
 T = TypeVar("T")
 
@@ -63,6 +75,10 @@ WIRES: dict[type, type[Wire]] = {
     network.Network: networks.NetworkWire,
     Orders: sites.OrdersWire,
     Report: sites.ReportWire,
+    mobile.MobileWelcome: driving.MobileWelcomeWire,
+    mobile.Postures: driving.PosturesWire,
+    DriveOrders: driving.DriveOrdersWire,
+    DriveReport: driving.DriveReportWire,
 }
 """The wire form of each message."""
 TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}

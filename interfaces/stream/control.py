@@ -150,7 +150,7 @@ class Attached:
     robot: str
     """Name of the robot's model."""
     q: Array
-    """Measured joints [rad], (n,)."""
+    """Measured joints [rad], (n,); of a mobile robot its posture, x, y, θ [m, m, rad]."""
     link_loss: str
     """What it does when nothing is heard: `halt` or `hold`."""
     timeout: float
@@ -164,6 +164,10 @@ class Attached:
     protocol: int = PROTOCOL
     max_age: float | None = None
     """Older messages don't count under `halt` [s]; None where that isn't known, or under `hold`."""
+    architecture: str = ""
+    """Of a mobile robot: what it does with the operator's path, by name."""
+    room: str = ""
+    """Of a mobile robot: name of the room that it drives in."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from interfaces.ports import earliest
-from interfaces.site import Site
 from interfaces.stream import control
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.control import PROTOCOL, Problem, ProblemCode, Role
+from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import Leasing, Robot
 from interfaces.stream.limits import Bucket, Limits
 from interfaces.stream.network import Impair, Network
-from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, Seat, Session, Wish
+from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, Seat, Session, State, Welcome, Wish
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
 
@@ -72,13 +72,14 @@ class Hub:
 
     def __init__(
         self,
-        site: Site,
+        site: Hosted,
         lease: Lease,
         access: Access,
         robot: Robot,
         *,
         config: HubConfig | None = None,
         emulation: Emulation | None = None,
+        welcome: Greeter | None = None,
         random_bytes: Callable[[int], bytes] = secrets.token_bytes,
     ) -> None:
         """Serve nobody yet.
@@ -90,6 +91,7 @@ class Hub:
             robot: What the lease does to the robot.
             config: How to serve.
             emulation: The way to the robot, where one is emulated.
+            welcome: Makes what a client of another robot than an arm is told.
             random_bytes: So many bytes that nobody can guess, to name sessions.
         """
         self.config = HubConfig() if config is None else config
@@ -97,14 +99,15 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
+        self._greeting = arms(site) if welcome is None else welcome
         self._leasing = Leasing(lease, robot, self.limits.sharers)
         self._random = random_bytes
         if not site.broadcasters:
             for rate in self.config.rates:
                 site.broadcast(rate)
-        self.state: control.State | None = None
+        self.state: State | None = None
         """The real robot, as clients are told."""
-        self._newest: control.State | None = None
+        self._newest: State | None = None
         self._state_due = -math.inf
         self.network_version = 0
         """Counts the changes of the way to the robot."""
@@ -195,7 +198,7 @@ class Hub:
         self._seats.pop(seat.key, None)
         self._leasing.forget(seat)
 
-    def show(self, state: control.State) -> None:
+    def show(self, state: State) -> None:
         """Take the newest that is known of the real robot."""
         self._newest = state
 
@@ -233,7 +236,7 @@ class Hub:
             self._now, self._t = now, self.site.time(now)
         return self._t
 
-    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, control.Welcome] | Problem:
+    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, Welcome] | Problem:
         """Let a client in, or say why not; see `Session`."""
         if hello.protocol != PROTOCOL:
             return Problem(ProblemCode.VERSION, f"this server speaks version {PROTOCOL} of the protocol")
@@ -258,22 +261,10 @@ class Hub:
         seat.servlet = self.site.servlet(admit=lambda order: self._leasing.refusal(seat, order, self._now))
         return seat
 
-    def _welcome(self, seat: Seat, resumed: bool, now: float) -> control.Welcome:
-        model = self.site.engine.model
-        return control.Welcome(
-            session=seat.key,
-            role=seat.role,
-            robot=model.name,
-            limits=model.limits,
-            poses=model.poses,
-            now=now,
-            lease=self.lease_for(seat),
-            rates=tuple(broadcaster.rate for broadcaster in self.site.broadcasters),
-            resumed=resumed,
-            instance=self.config.instance,
-            server=self.config.server,
-            lease_timeout=self._leasing.timeout,
-        )
+    def _welcome(self, seat: Seat, resumed: bool, now: float) -> Welcome:
+        config, timeout = self.config, self._leasing.timeout
+        facts = seat.key, seat.role, now, self.lease_for(seat), resumed, config.instance, config.server, timeout
+        return self._greeting(Greeting(*facts))
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
         """How the way to the robot is; None where none is emulated."""

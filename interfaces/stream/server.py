@@ -153,7 +153,7 @@ class HubServer:
         facts = {
             "ok": True,
             "now": self.clock.now(),
-            "robot": hub.site.engine.model.name,
+            "robot": hub.site.robot,
             "server": hub.config.server,
             "clients": len(self._clients),
             "cut_off": self.cut_off,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
-from interfaces.messages import Ask, Broadcast, Follow, Order, Outcome, Pulse, Want
-from interfaces.servlet import Servlet
+from interfaces.messages import Ask, Broadcast, Follow, Order, Outcome, Pulse, Request, Want
 from interfaces.stream import control
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
 from interfaces.stream.control import Problem, ProblemCode, Role
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.limits import Bucket, Limits
+from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.network import Impair, Network, Survey
 from interfaces.stream.outbox import Outbox
 
@@ -30,6 +30,28 @@ _ALLOWED = control.Ping | control.Pong | control.Problem | Wish | Survey | Impai
 """What may come once the client is welcome."""
 
 
+Welcome: TypeAlias = control.Welcome | MobileWelcome
+"""What greets a client: of an arm's site, of a mobile robot's."""
+State: TypeAlias = control.State | Postures
+"""What is known of the real robot, the same."""
+
+
+class Served(Protocol):
+    """What serves one client's orders and questions; times are the robot's site's [s]."""
+
+    def receive(self, message: Request, *, now: float) -> None:
+        """Take a message of the client."""
+
+    def advance(self, *, now: float) -> tuple[Value, ...]:
+        """What is to be sent to it."""
+
+    def next_deadline(self) -> float | None:
+        """When there's something to be sent; −∞ for at once."""
+
+    def close(self) -> None:
+        """The client is gone for good."""
+
+
 class Seat:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
@@ -37,7 +59,7 @@ class Seat:
 
     def __init__(self, key: str, name: str, role: Role) -> None:
         self.key, self.name, self.role = key, name, role
-        self.servlet: Servlet
+        self.servlet: Served
         self.session: Session | None = None
         self.left = 0.0
         """When its connection was lost [s]."""
@@ -50,7 +72,7 @@ class Desk(Protocol):
 
     limits: Limits
     encoder: SharedEncoder
-    state: control.State | None
+    state: State | None
     network_version: int
 
     @property
@@ -60,7 +82,7 @@ class Desk(Protocol):
     def engine_time(self, now: float) -> float:
         """The engine's time [s]."""
 
-    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, control.Welcome] | Problem:
+    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, Welcome] | Problem:
         """Let a client in, or say why not."""
 
     def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
@@ -101,7 +123,7 @@ class Session:
         self._lease = -1
         self._network: int | None = None
         """Version of the way to the robot that the client knows; None while it hasn't asked."""
-        self._state: control.State | None = None
+        self._state: State | None = None
 
     @property
     def dropped(self) -> int:

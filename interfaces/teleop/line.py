@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TypeAlias
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -15,8 +15,29 @@ from interfaces.stream.control import Ping, Pong
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 
-ToRobot: TypeAlias = Orders | Pong
-ToOperator: TypeAlias = Report | Ping
+O = TypeVar("O")  # noqa: E741 - orders
+R = TypeVar("R")
+O_co = TypeVar("O_co", covariant=True)
+R_contra = TypeVar("R_contra", contravariant=True)
+
+
+class Speaker(Protocol[O_co, R_contra]):
+    """An operator's site: what gives orders, and hears reports. Times are the operator's [s]."""
+
+    def advance(self, *, now: float) -> tuple[O_co, ...]:
+        """Do what is due, and say what is to be sent."""
+
+    def receive(self, report: R_contra, *, now: float) -> None:
+        """Take in a report."""
+
+    def next_deadline(self) -> float:
+        """When there's something to do."""
+
+    def measure_anew(self, *, now: float) -> None:
+        """Forget what was measured of the way: it's another one."""
+
+
+S = TypeVar("S", bound=Speaker)  # type: ignore[type-arg]
 
 LOGGED = 500
 """Records of packets that each way keeps until somebody takes them."""
@@ -24,10 +45,10 @@ TOLD = 64
 """Messages to the robot of which `RobotLine.messages` tells at once, at most."""
 
 
-class RobotLine:
+class SiteLine(Generic[S, O, R]):
     """Carries what the operator's site says to a connection, and back. Times are the operator's session time."""
 
-    def __init__(self, operator: OperatorSite, conditions: LinkConditions, rng: np.random.Generator) -> None:
+    def __init__(self, operator: S, conditions: LinkConditions, rng: np.random.Generator) -> None:
         """Begin without a connection.
 
         Args:
@@ -36,7 +57,7 @@ class RobotLine:
             rng: Source of everything random in that.
         """
         self.operator = operator
-        self.link: Link[ToRobot, ToOperator] = Link(conditions, rng, keep=LOGGED)
+        self.link: Link[O | Pong, R | Ping] = Link(conditions, rng, keep=LOGGED)
         self._messages: deque[tuple[float, float | None]] = deque(maxlen=TOLD)
         self.there, self.back = Gauge(), Gauge()
         """What the emulation does to packets, each way."""
@@ -46,11 +67,11 @@ class RobotLine:
         self.heard = -math.inf
         """When something came from the robot last [s]."""
 
-    def receive(self, message: ToOperator, *, now: float) -> None:
+    def receive(self, message: R | Ping, *, now: float) -> None:
         """Take a message off the connection: it's delayed, and may be lost, as the link has it."""
         self.link.backward.send(message, now)
 
-    def advance(self, *, now: float) -> tuple[ToRobot, ...]:
+    def advance(self, *, now: float) -> tuple[O | Pong, ...]:
         """Do what is due by now [s], and say what is to be put on the connection."""
         for delivery in self.link.backward.receive(now):
             self._take(delivery.payload, now)
@@ -59,7 +80,7 @@ class RobotLine:
         ready = tuple(delivery.payload for delivery in self.link.forward.receive(now))
         return ready if self.connected else ()
 
-    def _take(self, message: ToOperator, now: float) -> None:
+    def _take(self, message: R | Ping, now: float) -> None:
         self.heard = now
         if isinstance(message, Ping):
             self.link.forward.send(Pong(message.number, message.t, now, now), now)
@@ -97,3 +118,7 @@ class RobotLine:
     def silence(self, *, now: float) -> float:
         """For how long nothing has been heard of the robot [s]; infinite before the first time."""
         return now - self.heard
+
+
+RobotLine: TypeAlias = SiteLine[OperatorSite, Orders, Report]
+"""To an arm."""

@@ -1,6 +1,6 @@
 """What a robot carries on board, whatever robot it is."""
 
-from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
 from robots.onboard.command_filter import (
     CommandFilter,
     CommandFilterConfig,
@@ -10,6 +10,7 @@ from robots.onboard.command_filter import (
 )
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, FollowingMonitor, Tolerance
+from robots.onboard.free_ways import Outline
 from robots.onboard.known_trajectory import KnownTrajectory
 from robots.onboard.lease import Ended, Grant, Lease, LeaseConfig, LeaseEnd, LeaseRefusal, LeaseState, Pending
 from robots.onboard.movers import Mover, MoversConfig, MoverTracker

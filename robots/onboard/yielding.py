@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots.ipr.parameters import IPR_LIMITS
-from robots.onboard.avoidance import ObstacleAvoidance, Outline
+from robots.onboard.avoidance import ObstacleAvoidance
 from robots.onboard.driving import Drive
+from robots.onboard.free_ways import Outline
 from robots.onboard.movers import Mover
 from vrs.checks import number_in
 from vrs.mobile import DriveLimits

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from interfaces import Designer, Supervisor
 from interfaces.messages import Order, Outcome
-from interfaces.servlet import OVERTAKEN, Servlet
+from interfaces.ordering import OVERTAKEN
+from interfaces.servlet import Servlet
 from tests.interfaces.joined import MODEL, Joined, bad, constant, place, to
 from vrs import (
     Cancel,

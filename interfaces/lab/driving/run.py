@@ -204,7 +204,7 @@ class _Run:
         model = ipr.model("micro" if case.robot == "micro" else "ipr", period=case.constants.period)
         made = controller(case.architecture, driver.start, case.constants)
         senses = case.architecture in SENSING
-        there = operator_surroundings(body, driver.start, model) if senses else None
+        there = operator_surroundings(body.room, body.chassis, driver.start, model) if senses else None
         here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
         self._site = OperatorSite(model, driver.start, case.transport, surroundings=there)
         position = POSITIONS[case.position](body)

@@ -8,12 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from interfaces.teleop.architectures import Controller, Following, OperatorSurroundings, RobotSurroundings
-from robots.bullet.rooms import EMPTY
+from robots.bullet.rooms import EMPTY, Room
+from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.parameters import CELL, CELLS
 from robots.ipr.robot import MobileRobot
-from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
 from robots.onboard.driving import Posture
+from robots.onboard.free_ways import Outline
 from robots.onboard.movers import MoversConfig, MoverTracker
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
 from robots.onboard.yielding import Yielding, YieldingConfig
@@ -27,43 +29,43 @@ MARGIN = 0.02
 class BodySonar:
     """A real robot's sonars."""
 
-    def __init__(self, body: MobileRobot) -> None:
-        """Take the robot."""
-        self._body = body
+    def __init__(self, body: MobileRobot, since: float = 0.0) -> None:
+        """Take the robot; times count from `since` [s] of its own."""
+        self._body, self._since = body, since
 
     def scan(self) -> tuple[float, Sequence[float]] | None:
         """See `interfaces.teleop.architectures.surroundings.Sonar`."""
         scan = self._body.sonar
-        return None if scan is None else (scan.time, scan.ranges.tolist())
+        return None if scan is None else (scan.time - self._since, scan.ranges.tolist())
 
 
-def grid_of(body: MobileRobot, start: Posture) -> Grid:
-    """Cells of the robot's room; where there's none, the paper's number of them around the start."""
-    room = body.room
+def grid_of(room: Room, start: Posture) -> Grid:
+    """Cells of a room; where there's none, the paper's number of them around the start."""
     if room is EMPTY:
         return Grid(CELLS, CELL, (start.x - CELLS[0] * CELL / 2, start.y - CELLS[1] * CELL / 2))
     m, n = (math.ceil(size / CELL - _ROUNDING) for size in (room.length, room.width))
     return Grid((m, n), CELL)
 
 
-def operator_surroundings(body: MobileRobot, start: Posture, model: MobileModel) -> OperatorSurroundings:
+def operator_surroundings(room: Room, chassis: Chassis, start: Posture, model: MobileModel) -> OperatorSurroundings:
     """The virtual environment with the room's known map, and what keeps the virtual robot out of it.
 
     Args:
-        body: The real robot, for its room and its size.
+        room: Where the real robot drives.
+        chassis: Its size.
         start: Where both robots begin.
         model: The virtual robot.
     """
-    grid, chassis = grid_of(body, start), body.chassis
-    known = _known(body, grid, 0.0)
+    grid = grid_of(room, start)
+    known = _known(room, grid, 0.0)
     environment = VirtualEnvironment(grid.shape, cell=grid.cell, origin=grid.origin, walls=known)
-    outline = _outline(body)
+    outline = _outline(chassis)
     radius = math.hypot(max(outline.front, outline.rear), chassis.width / 2) + MARGIN
     return OperatorSurroundings(environment, Avoidance(model.limits, radius, period=model.period))
 
 
 def robot_surroundings(
-    body: MobileRobot, start: Posture, controller: Controller, period: float
+    body: MobileRobot, start: Posture, controller: Controller, period: float, *, since: float = 0.0
 ) -> RobotSurroundings:
     """What the real robot has on board of it.
 
@@ -72,6 +74,7 @@ def robot_surroundings(
         start: Where it begins.
         controller: What drives it.
         period: Between two drives [s].
+        since: The body's time that is 0 of the drive's [s].
     """
     near, far = body.chassis.sonar_reach
     mounts = tuple(
@@ -80,14 +83,14 @@ def robot_surroundings(
     )
     sonar = body.senses.sonar
     half_cone = 0.0 if sonar is None else sonar.half_angle
-    grid = grid_of(body, start)
+    grid = grid_of(body.room, start)
     seen = SupervisorConfig(mounts, half_cone=half_cone, range_min=near, range_max=far)
-    outline = _outline(body)
+    outline = _outline(body.chassis)
     careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
     avoidance = ObstacleAvoidance(careful)
     return RobotSurroundings(
-        BodySonar(body),
-        EnvironmentSupervisor(grid, _known(body, grid, body.chassis.sonar_height), seen),
+        BodySonar(body, since),
+        EnvironmentSupervisor(grid, _known(body.room, grid, body.chassis.sonar_height), seen),
         avoidance,
         MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
@@ -95,14 +98,13 @@ def robot_surroundings(
     )
 
 
-def _outline(body: MobileRobot) -> Outline:
-    chassis = body.chassis
+def _outline(chassis: Chassis) -> Outline:
     half = chassis.length / 2
     return Outline(half + chassis.centre_x, half - chassis.centre_x, chassis.width / 2)
 
 
-def _known(body: MobileRobot, grid: Grid, height: float) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+def _known(room: Room, grid: Grid, height: float) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
     """Cells of the known map's things that are at least so high [m]; none where there's no room."""
-    if body.room is EMPTY:
+    if room is EMPTY:
         return np.zeros(grid.shape, bool)
-    return FloorPlan(body.room.known(), height).grid(grid.cell, grid.shape, 0.0)
+    return FloorPlan(room.known(), height).grid(grid.cell, grid.shape, 0.0)

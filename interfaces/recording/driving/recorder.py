@@ -58,7 +58,7 @@ class DriveRecorder:
         """See `Witness`."""
         self._case, self._start, self._site = case, start, site
         self._place = () if body.room is EMPTY else (room_entry(body.room),)
-        self._grid: Grid | None = None if site.surroundings is None else grid_of(body, start)
+        self._grid: Grid | None = None if site.surroundings is None else grid_of(body.room, start)
         self._first = site.engine.timeline
         site.listener = self._commanded
         for direction, lane in (("forward", link.forward), ("backward", link.backward)):

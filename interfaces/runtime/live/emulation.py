@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile, loss_model, spelled_loss
 from interfaces.link.delay import DelayProfile
@@ -12,15 +13,15 @@ from interfaces.link.profiles import ALLOWED
 from interfaces.runtime.ages import late_often
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.network import Impair, Network, Way
-from interfaces.teleop import RobotLine
+from interfaces.teleop.line import SiteLine
 from vrs.errors import InvalidValueError
 
 
 class LiveEmulation:
-    """Answers for a `RobotLine`, as `interfaces.stream.hub.Emulation`."""
+    """Answers for a `SiteLine`, as `interfaces.stream.hub.Emulation`."""
 
     def __init__(
-        self, line: RobotLine, robot: RobotClient, seed: int, changed: Callable[[float, str], None]
+        self, line: SiteLine[Any, Any, Any], robot: RobotClient, seed: int, changed: Callable[[float, str], None]
     ) -> None:
         """Answer for a line.
 

@@ -22,7 +22,7 @@ from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.runtime.live.warm import warm
 from interfaces.site import Site
 from interfaces.stream.access import Access
-from interfaces.stream.control import Role, State
+from interfaces.stream.control import Attached, Role, State
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.meshes import bodies
@@ -98,7 +98,9 @@ class LiveOperator:
             self.recorder = LiveRecorder(config.recording, self.line, config.model, seed=config.seed, began=began)
             self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
-        self.robot = RobotClient(self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token)
+        self.robot = RobotClient(
+            self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, unfit=self._unfit
+        )
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
         hub = HubConfig(rates=config.rates, server=config.server, instance=secrets.token_urlsafe(9))
@@ -231,6 +233,11 @@ class LiveOperator:
         if self.recorder is not None:
             self.recorder.tell(now, "rerouted", text)
         self._turning.soon()
+
+    def _unfit(self, robot: Attached) -> str:
+        """Why a robot isn't the one that is driven here; empty if it is."""
+        name = self.config.model.name
+        return "" if robot.robot == name else f"it's a {robot.robot}, and this site drives a {name}"
 
     def _end_lease(self, now: float) -> None:
         """Let the next one have the lease once both robots rest."""

@@ -7,15 +7,17 @@ import contextlib
 import secrets
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
 
-from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.stream.control import Attached, Hello, Ping, Pong, Problem, Role
+from interfaces.stream.codec import Encoding, Value, decode, encode
+from interfaces.stream.control import Attached, Hello, Ping, Problem, Role
 from interfaces.stream.dialling import dial
 from interfaces.stream.errors import ProtocolError
-from interfaces.teleop import Orders, Report, RobotLine
+from interfaces.teleop import Report
+from interfaces.teleop.line import SiteLine
 from vrs.clock import Clock
 from vrs.errors import VrsError
 
@@ -39,11 +41,27 @@ class RobotRefusedError(VrsError):
         super().__init__(f"the robot's site refuses: {text}")
 
 
+class RobotUnfitError(VrsError):
+    """A robot isn't the one that this operator's site drives."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"not the robot that is driven here: {reason}")
+
+
 class RobotClient:
-    """Keeps a `RobotLine` connected."""
+    """Keeps a `SiteLine` connected."""
 
     def __init__(
-        self, line: RobotLine, url: str, clock: Clock, changed: Callable[[], None], *, token: str | None = None
+        self,
+        line: SiteLine[Any, Any, Any],
+        url: str,
+        clock: Clock,
+        changed: Callable[[], None],
+        *,
+        token: str | None = None,
+        reports: type = Report,
+        unfit: Callable[[Attached], str] = lambda _: "",
     ) -> None:
         """Say where the robot is; `run` connects.
 
@@ -53,10 +71,14 @@ class RobotClient:
             clock: Session time.
             changed: Called when something has come, or the connection has.
             token: Of the role `site`.
+            reports: What its robots send.
+            unfit: Says why a robot isn't one for this operator; empty if it is.
         """
+        self._coming: Any = reports | Ping | Problem
+        self._unfit = unfit
         self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
         self._session = secrets.token_urlsafe(12)
-        self._waiting: deque[Orders | Pong] = deque(maxlen=_WAITING)
+        self._waiting: deque[Value] = deque(maxlen=_WAITING)
         self._wake = asyncio.Event()
         self.attached: Attached | None = None
         """What the robot said of itself; None while there's no connection."""
@@ -66,7 +88,7 @@ class RobotClient:
         """When something came off the connection last [s]; the emulated delay isn't in it."""
         self.connections = 0
 
-    def send(self, message: Orders | Pong) -> None:
+    def send(self, message: Value) -> None:
         """Put a message on the connection."""
         self._waiting.append(message)
         self._wake.set()
@@ -77,7 +99,14 @@ class RobotClient:
             try:
                 if self.url:
                     await self._once()
-            except (OSError, TimeoutError, WebSocketException, ProtocolError, RobotRefusedError) as error:
+            except (
+                OSError,
+                TimeoutError,
+                WebSocketException,
+                ProtocolError,
+                RobotRefusedError,
+                RobotUnfitError,
+            ) as error:
                 self.problem = str(error) or type(error).__name__
             finally:
                 self._line.connected, self.attached = False, None
@@ -92,6 +121,8 @@ class RobotClient:
                 answer = decode(_bytes(await socket.recv()), Encoding.MSGPACK, allowed=Attached | Problem)
             if isinstance(answer, Problem):
                 raise RobotRefusedError(answer.text)
+            if unfit := self._unfit(answer):
+                raise RobotUnfitError(unfit)
             self.attached, self.problem = answer, ""
             self.connections += 1
             self._waiting.clear()
@@ -108,9 +139,7 @@ class RobotClient:
             self.problem = "the robot's site closed the connection"
 
     def _take(self, data: bytes) -> None:
-        message: Report | Ping | Problem = decode(
-            data, Encoding.MSGPACK, allowed=Report | Ping | Problem, largest=LARGEST
-        )
+        message = decode(data, Encoding.MSGPACK, allowed=self._coming, largest=LARGEST)
         self.heard = self._clock.now()
         if isinstance(message, Problem):
             self.problem = message.text

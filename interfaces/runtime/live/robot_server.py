@@ -12,11 +12,12 @@ from starlette.routing import BaseRoute, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
 from interfaces.stream.access import Access
-from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.stream.control import PROTOCOL, Attached, Hello, Ping, Pong, Problem, ProblemCode, Role
+from interfaces.stream.codec import Encoding, Value, decode, encode
+from interfaces.stream.control import PROTOCOL, Attached, Hello, Pong, Problem, ProblemCode, Role
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.server import Endpoint
-from interfaces.teleop import Orders, Report, RobotHost
+from interfaces.teleop import Orders
+from interfaces.teleop.hosting import Host
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError
 
@@ -43,7 +44,7 @@ class _Connection:
         self.close: tuple[int, str] | None = None
         self.problems = 0
 
-    def send(self, message: Report | Ping | Attached | Problem) -> None:
+    def send(self, message: Value) -> None:
         self.waiting.append(encode(message, self.encoding))
         self.wake.set()
 
@@ -53,17 +54,18 @@ class _Connection:
 
 
 class RobotServer:
-    """Joins a `RobotHost` to the operator's site that has said hello last, if it's let in."""
+    """Joins a `Host` to the operator's site that has said hello last, if it's let in."""
 
     def __init__(
         self,
-        host: RobotHost,
+        host: Host[Any, Any, Any],
         clock: Clock,
         access: Access,
         *,
         attached: Callable[[], Attached],
         met: Callable[[], None],
         heard: Callable[[], None],
+        orders: type = Orders,
     ) -> None:
         """Serve a host.
 
@@ -74,9 +76,11 @@ class RobotServer:
             attached: What a site is told that is let in.
             met: Called when one has been.
             heard: Called when a message comes that the host is given.
+            orders: What its operators send.
         """
         self._host, self._clock, self._access = host, clock, access
         self._attached, self._met, self._heard = attached, met, heard
+        self._coming: Any = orders | Pong
         self._connection: _Connection | None = None
 
     @property
@@ -89,7 +93,7 @@ class RobotServer:
         """Whether an operator's site is there."""
         return self._connection is not None
 
-    def send(self, messages: Iterable[Report | Ping]) -> None:
+    def send(self, messages: Iterable[Value]) -> None:
         """Send messages to the operator's site; without one they're dropped."""
         if self._connection is not None:
             for message in messages:
@@ -149,7 +153,7 @@ class RobotServer:
         if self._connection is not connection:
             return
         try:
-            message: Orders | Pong = decode(data, connection.encoding, allowed=Orders | Pong, largest=LARGEST)
+            message = decode(data, connection.encoding, allowed=self._coming, largest=LARGEST)
         except ProtocolError as error:
             connection.problems += 1
             connection.send(Problem(error.code, str(error), fatal=connection.problems >= _PROBLEMS))

@@ -2,8 +2,8 @@
 
 const AT_ONCE = 400;
 const UNITS = [
-  [/^(t|play|D|age|round_trip|delay)$/, "_s"],
-  [/^(tool_.*|offset|link|servo|x|y|z)$/, "_m"],
+  [/^(t|play|D|age|round_trip|delay|time_difference|behind)$/, "_s"],
+  [/^(tool_.*|offset|link|servo|x|y|z|path_error)$/, "_m"],
   [/^(angle|real|reference|error)_/, "_rad"],
 ];
 

@@ -15,7 +15,17 @@ const HINTS = [
     text: "Drag the strip to another time: the robot goes on meanwhile. Live brings you back to now." },
 ];
 
+/** The same for a mobile robot. */
+const DRIVING = [
+  { ...HINTS[0], text: "Nothing drives before you have it. Others see who has it, and watch." },
+  { at: ["#tab-panels", "#side"], side: "left", title: "Drive",
+    text: "Hold a button, lean the stick, or use the arrow keys or W A S D. The space bar is STOP." },
+  { at: ["#badge"], side: "above", title: "Two robots",
+    text: "The blue ghost answers at once. The solid robot follows the orange path as soon as the network lets it." },
+];
+
 export function mount(station) {
+  const hints = station.config.robot.mobile ? DRIVING : HINTS;
   const count = h("span.muted");
   const title = h("h2", { id: "hint-title" });
   const text = h("p", { id: "hint-text" });
@@ -34,14 +44,14 @@ export function mount(station) {
 
   function show(number) {
     at = number;
-    const hint = HINTS[at];
+    const hint = hints[at];
     write(title, hint.title);
     write(text, hint.text);
-    write(count, `${at + 1} of ${HINTS.length}`);
-    write(next, at + 1 < HINTS.length ? "Next" : "Done");
+    write(count, `${at + 1} of ${hints.length}`);
+    write(next, at + 1 < hints.length ? "Next" : "Done");
     bubble.hidden = false;
     place();
-    station.announce(`Hint ${at + 1} of ${HINTS.length}. ${hint.title}. ${hint.text}`);
+    station.announce(`Hint ${at + 1} of ${hints.length}. ${hint.title}. ${hint.text}`);
   }
 
   function end() {
@@ -56,7 +66,7 @@ export function mount(station) {
   /** Beside what it's about, inside the window, and below the bar, where STOP is. */
   function place() {
     if (at === null) return;
-    const { at: names, side } = HINTS[at];
+    const { at: names, side } = hints[at];
     const found = names.map((name) => document.querySelector(name)).find((one) => one && one.getClientRects().length);
     const target = (found ?? document.getElementById("bar")).getBoundingClientRect();
     const { offsetWidth: width, offsetHeight: height } = bubble;
@@ -73,7 +83,7 @@ export function mount(station) {
     arrow.style.setProperty("--along", `${Math.round(Math.max(16, Math.min(along, (side === "left" ? height : width) - 16)))}px`);
   }
 
-  next.addEventListener("click", () => (at + 1 < HINTS.length ? show(at + 1) : end()));
+  next.addEventListener("click", () => (at + 1 < hints.length ? show(at + 1) : end()));
   close.addEventListener("click", end);
   help.addEventListener("click", () => {
     show(0);

@@ -28,6 +28,7 @@ function pill(id, title) {
 
 export function mount(station, box) {
   const session = station.session;
+  const body = station.config.robot.mobile ? "smart_toy" : "precision_manufacturing";
   const link = pill("link-pill", "Connection of this page to the server");
   const robot = pill("robot-pill", "The real robot, as the server last heard of it");
   const resume = h("button.small", { type: "button", id: "resume", hidden: true }, "Let it go on");
@@ -42,10 +43,10 @@ export function mount(station, box) {
     const state = session.state;
     const live = session.link === "live";
     const halted = live && state?.halted;
-    if (!live || !state) robot.show("none", "precision_manufacturing", "Real robot unknown");
+    if (!live || !state) robot.show("none", body, "Real robot unknown");
     else if (!state.connected && state.connected !== undefined) robot.show("bad", "cloud_off", "Real robot not heard");
     else if (halted) robot.show("warn", "pause_circle", "Real robot waits");
-    else robot.show("good", "precision_manufacturing", "Real robot follows");
+    else robot.show("good", body, "Real robot follows");
     robot.element.title = halted ? state.halted : "The real robot, as the server last heard of it";
     resume.hidden = !(halted && session.holds);
   }

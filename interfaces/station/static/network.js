@@ -165,10 +165,10 @@ export function mount(station, box) {
     write(cells.trip, trip.median == null ? "–" : `${time(trip.median)}, 95 % in ${time(trip.p95)}`);
     const mine = session.sync.uncertainty(performance.now() / 1000);
     write(cells.clock, `robot ± ${time(network.clock)}, page ± ${time(Number.isFinite(mine) ? mine : null)}`);
-    const behind = state ? `, ${time(Math.max(0, -state.D))} behind` : "";
+    const behind = state?.D == null ? "" : `, ${time(Math.max(0, -state.D))} behind`;
     write(cells.offset, !network.link_loss ? "–" : (network.offset == null ? "adaptive" : `fixed, D = ${(-network.offset).toFixed(2).replace(/^/, "−")} s`) + behind);
     write(cells.policy, policy(network));
-    const age = state && session.now !== null ? session.now - state.t : null;
+    const age = state?.t != null && session.now !== null ? session.now - state.t : null;
     write(cells.age, age === null ? "–" : time(Math.max(0, age)));
     write(cells.robot, network.problem ? `${network.robot || "not known yet"}: ${network.problem}` : network.robot.replace(/^wss?:\/\//, ""));
     write(cells.seed, String(network.seed ?? 0));

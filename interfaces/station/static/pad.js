@@ -1,4 +1,4 @@
-// The stick on the page, and a gamepad: both steer the tool.
+// The stick on the page, and a gamepad: both steer the tool, or a mobile robot.
 import { h, write } from "./dom.js";
 
 /** Deflections smaller than this are none. */
@@ -6,6 +6,10 @@ const DEAD = 0.12;
 const RADIUS = 38;
 /** Time between two looks at the gamepad [ms]. */
 const LOOK = 40;
+const TOOL = {
+  stick: "Stick: drag it to move the tool in x and y",
+  gamepad: "Gamepad: sticks move and turn the tool, the triggers lift it, B stops",
+};
 
 /** A deflection with a dead zone, finer near the middle. */
 function shaped(value) {
@@ -18,10 +22,11 @@ function shaped(value) {
  * @param {Element} box
  * @param {object} steer takes inputs
  * @param {object} jog knows speed and frame
+ * @param {{stick: string, gamepad: string}} words what they do
  */
-export function mountPad(station, box, steer, jog) {
+export function mountPad(station, box, steer, jog, words = TOOL) {
   const knob = h("i.knob");
-  const stick = h("div.stick", { role: "img", "aria-label": "Stick: drag it to move the tool in x and y" }, knob);
+  const stick = h("div.stick", { role: "img", "aria-label": words.stick }, knob);
   const found = h("p.hint.gamepad");
   box.append(stick, found);
   let lean = [0, 0];
@@ -54,7 +59,7 @@ export function mountPad(station, box, steer, jog) {
   setInterval(() => {
     const pad = gamepad();
     found.hidden = !pad;
-    write(found, pad ? "Gamepad: sticks move and turn the tool, the triggers lift it, B stops" : "");
+    write(found, pad ? words.gamepad : "");
     if (!pad) {
       if (held) steer.release("pad");
       held = false;

@@ -1,13 +1,12 @@
 // What the page hears of the real robot beside what the timeline says of the virtual one: errors, delay, offset.
 // Names and definitions are those of docs/summary.md; SI units.
+import { Messages } from "./messages.js";
 import { Table } from "./table.js";
 
 /** Samples that are kept: ten minutes of them. */
 const KEPT = 13000;
 /** Samples are so far apart at least [s]. */
 const APART = 0.046;
-/** Messages to the robot that are kept. */
-const MESSAGES = 24000;
 /** States that wait until the timeline is past where they are compared. */
 const WAITING = 200;
 /** Time between two places of the virtual tool [s]; so many are looked up at once. */
@@ -73,9 +72,7 @@ export class Samples {
     this.chain = station.chain;
     this.joints = station.chain.screws.length;
     this.table = new Table([...PLAIN, ...A_JOINT.flatMap((name) => numbered(name, this.joints))], KEPT);
-    /** Messages to the robot that arrived: when, and how long they took [s]; when lost ones were sent. */
-    this.arrived = new Table(["arrived", "delay"], MESSAGES);
-    this.lost = new Table(["sent"], MESSAGES);
+    this.messages = new Messages();
     /** Where the virtual tool was. */
     this.path = new Table(["t", "x", "y", "z"], Math.ceil((KEPT * APART) / STEP));
     this.clear();
@@ -86,11 +83,19 @@ export class Samples {
     station.on("state", (state) => this.hear(state));
   }
 
+  /** Messages to the robot that arrived, and lost ones; see `Messages`. */
+  get arrived() {
+    return this.messages.arrived;
+  }
+
+  get lost() {
+    return this.messages.lost;
+  }
+
   clear() {
-    for (const table of [this.table, this.arrived, this.lost, this.path]) table.clear();
+    for (const part of [this.table, this.messages, this.path]) part.clear();
     this.waiting = [];
-    this.heard = this.told = -Infinity;
-    this.delay = NaN;
+    this.heard = -Infinity;
     /** Epoch in which the robot stopped by itself last. */
     this.stopped = undefined;
     this.instance ??= null;
@@ -98,24 +103,13 @@ export class Samples {
 
   /** Take a state; it counts once what it is compared with can't change any more. */
   hear(state) {
-    for (const [sent, arrived] of state.messages ?? []) this.message(sent, arrived ?? null);
+    this.messages.hear(state.messages);
     if (state.t >= this.heard + APART) {
       this.heard = state.t;
-      this.waiting.push({ state, age: (this.session.now ?? NaN) - state.t, delay: this.delay });
+      this.waiting.push({ state, age: (this.session.now ?? NaN) - state.t, delay: this.messages.delay });
       if (this.waiting.length > WAITING) this.waiting.shift();
     }
     this.advance();
-  }
-
-  message(sent, arrived) {
-    if (arrived === null) {
-      if (sent > this.lost.newest) this.lost.push([sent]);
-    } else if (arrived > this.told || sent > this.arrived.newest) {
-      // Two may arrive at once; one that was told of before doesn't count again.
-      this.told = Math.max(this.told, arrived);
-      this.delay = arrived - sent;
-      this.arrived.push([Math.max(arrived, this.arrived.newest), this.delay]);
-    }
   }
 
   advance() {

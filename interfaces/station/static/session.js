@@ -31,6 +31,8 @@ export class Session extends EventTarget {
     this.token = token;
     /** "connecting", "live", "stale", "lost" or "locked". */
     this.link = "connecting";
+    /** Type of the message that lets this page in. */
+    this.welcomes = "welcome";
     this.welcome = null;
     this.lease = { state: "free" };
     this.state = null;
@@ -146,7 +148,7 @@ export class Session extends EventTarget {
   take(message) {
     const now = (this.heard = seconds());
     if (message.type === "problem") this.object(message);
-    else if (message.type === "welcome") this.begin(message, now);
+    else if (message.type === this.welcomes) this.begin(message, now);
     else if (message.type === "lease") this.setLease(message);
     else if (message.type === "pong") this.sync.receive(message.t, message.received, message.answered, now);
     else if (message.type === "state") {
@@ -183,14 +185,19 @@ export class Session extends EventTarget {
     this.orders.renew(welcome.resumed === true, now);
     if (!same) {
       this.sync = new ClockSync();
-      this.reader = new Reader((message) => this.send(message));
+      this.reader = this.makeReader();
       this.state = this.network = null;
       this.pings = 0;
-    } else this.reader.number += 1;
+    } else if (this.reader) this.reader.number += 1;
     for (let k = 0; k < PINGS; k++) this.ping();
     this.emit("welcome", welcome);
     this.setLease(welcome.lease);
-    this.reader.follow(now);
+    this.reader?.follow(now);
+  }
+
+  /** What keeps a copy of the timeline; null for a robot of which nothing is followed. */
+  makeReader() {
+    return new Reader((message) => this.send(message));
   }
 
   setLease(lease) {
@@ -230,7 +237,7 @@ export class Session extends EventTarget {
     if (this.connected && silent > LOST) this.lose();
     else if (this.link === "live" && silent > STALE) this.become("stale");
     if (!this.greeted) return;
-    this.reader.advance(now);
+    this.reader?.advance(now);
     this.orders.advance(now);
     if (Math.floor(now) !== Math.floor(now - late)) this.ping();
   }

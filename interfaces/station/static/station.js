@@ -1,6 +1,7 @@
 // The station: one session for the page, and the panels, each mounted into its own element.
 import { Chain } from "./chain.js";
 import { h } from "./dom.js";
+import { DriveSession } from "./drivesession.js";
 import { Layout } from "./layout.js";
 import { Session } from "./session.js";
 
@@ -11,8 +12,10 @@ class Station extends EventTarget {
   constructor(root, config) {
     super();
     this.config = config;
-    this.chain = new Chain(config.robot);
-    this.session = new Session({ name: myName(), token: sessionStorage.getItem("token") });
+    const mobile = config.robot.mobile === true;
+    /** Links and tool at joints; a mobile robot has none. */
+    this.chain = mobile ? null : new Chain(config.robot);
+    this.session = new (mobile ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
     this.layout = new Layout(root, config.panels);
     /** What panels offer each other, by the panel's name. */
     this.shared = {};

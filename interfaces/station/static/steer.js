@@ -1,4 +1,4 @@
-// Steering: as long as a hand holds something, its input is sent; when it lets go, the arm comes to rest.
+// Steering: as long as a hand holds something, its input is sent; when it lets go, the robot comes to rest.
 
 /** Time between two inputs [ms]; each holds for 0.2 s at the engine. */
 const PERIOD = 40;
@@ -28,7 +28,8 @@ export class Steer {
   /**
    * Hold an input until it's released.
    * @param {string} who "jog", "keys", "stick", "pad", "drag": an older one of the same is replaced
-   * @param {() => ?object} input {rates} or {twist, frame}, asked for each time; null is as good as released
+   * @param {() => ?object} input {rates} or {twist, frame}, or {type: "drive", v, w, duration} of a mobile robot; asked
+   * for each time, null is as good as released
    * @param {() => void} released called when it ends for another reason than `release`
    */
   hold(who, input, released = () => {}) {
@@ -80,7 +81,8 @@ export class Steer {
 }
 
 /** An input of the same kind, that asks for rest. */
-function stillAs({ rates, twist, frame }) {
+function stillAs({ rates, twist, frame, ...other }) {
+  if (other.type === "drive") return { ...other, v: 0, w: 0 };
   return rates ? { rates: rates.map(() => 0) } : { twist: twist.map(() => 0), frame };
 }
 

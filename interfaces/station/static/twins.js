@@ -3,7 +3,6 @@
 import { Pacing } from "./pacing.js";
 
 const ROOT = window.VrsScene.ROOT;
-const FURTHER = 1.2;
 
 export class StationScene extends window.VrsScene {
   constructor(...given) {
@@ -20,11 +19,16 @@ export class StationScene extends window.VrsScene {
     this.pacing = new Pacing(this.viewer);
   }
 
-  /** As the page of the view alone, from a little further away: the arm stretched up fits too. */
+  /** How much further away than on the page of the view alone the camera stands: the arm stretched up fits too. */
+  get further() {
+    return 1.2;
+  }
+
+  /** As the page of the view alone, from a little further away. */
   home() {
     super.home();
     const { camera, controls } = this.viewer;
-    camera.position.sub(controls.target).multiplyScalar(FURTHER).add(controls.target);
+    camera.position.sub(controls.target).multiplyScalar(this.further).add(controls.target);
     controls.update();
   }
 

@@ -1,4 +1,4 @@
-"""The page `/view`, and `/meshcat`, its WebSocket: a thin shell round a `MeshcatScene`."""
+"""The page `/view`, and `/meshcat`, its WebSocket: a thin shell round a `TwinScene`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
-from interfaces.stream.meshcat.scene import MeshcatScene
+from interfaces.stream.meshcat.twins import TwinScene
 from interfaces.stream.meshcat.viewers import Viewers
 from interfaces.view_parts import viewer_bundle
 
@@ -30,7 +30,7 @@ _TYPES: Final = {".html": "text/html", ".css": "text/css", ".js": "text/javascri
 
 
 def routes(
-    scene: MeshcatScene,
+    scene: TwinScene,
     *,
     admit: Callable[[HTTPConnection], bool] | None = None,
     authorize: Callable[[str | None], bool] | None = None,

@@ -167,12 +167,14 @@ class AttachedWire(Message, frozen=True, omit_defaults=True, gc=False, tag="atta
     instance: Word = ""
     server: Word = ""
     max_age: Annotated[float, Meta(gt=0, le=3600)] | None = None
+    architecture: Word = ""
+    room: Word = ""
 
     def read(self) -> control.Attached:
         """What the robot is."""
         return control.Attached(
             self.robot, array(self.q), self.link_loss, self.timeout, self.offset, self.instance, self.server,
-            self.protocol, self.max_age,
+            self.protocol, self.max_age, self.architecture, self.room,
         )  # fmt: skip
 
 

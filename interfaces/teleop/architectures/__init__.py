@@ -13,6 +13,7 @@ from interfaces.teleop.architectures.controllers import (
     Player,
     PlayerConfig,
 )
+from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
 from interfaces.teleop.architectures.segments import Packet, Receiver, Sender, Transport
 from interfaces.teleop.architectures.sites import OperatorSite, Position, Report, RobotSite
 from interfaces.teleop.architectures.surroundings import (
@@ -29,6 +30,8 @@ __all__ = [
     "CellChanges",
     "Constants",
     "Controller",
+    "DriveOrders",
+    "DriveReport",
     "Filtered",
     "Following",
     "Immediate",
@@ -46,4 +49,5 @@ __all__ = [
     "Sonar",
     "Transport",
     "controller",
+    "is_still",
 ]

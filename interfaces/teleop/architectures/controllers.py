@@ -18,7 +18,7 @@ from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import MovingPath
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
 from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
-from robots.onboard.trajectory_tracking import TrackingConfig, TrajectoryTracker
+from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
 from vrs.segment import ArcSegment
 
 STARVED = 0.5
@@ -179,6 +179,11 @@ class Player:
         self._ends: deque[float] = deque()
         """When each command ends [s], of those that aren't executed."""
         self.executed = 0
+
+    @property
+    def reference(self) -> Reference:
+        """What it aimed at last."""
+        return self._tracker.reference
 
     def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:
         """Lengthen the known path, and learn how late it is."""

@@ -10,13 +10,19 @@ from hypothesis import strategies as st
 from interfaces import messages as m
 from interfaces.link import Measured
 from interfaces.stream import control as c
+from interfaces.stream import mobile as b
 from interfaces.stream import network as n
+from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
+from interfaces.teleop.architectures import Report as Followed
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
+from robots.onboard.supervisor import CellChange
 from vrs import commands as v
+from vrs.mobile import DriveLimits
 from vrs.model import Limits
 from vrs.receipt import Receipt, Status
-from vrs.segment import PolynomialSegment
+from vrs.segment import ArcSegment, PolynomialSegment
 
 numbers = st.integers(1, 2**63 - 1)
 counts = st.integers(0, 2**63 - 1)
@@ -122,6 +128,25 @@ measured = st.builds(Measured, counts, st.none() | st.floats(0, 1), spans, spans
 plans = st.builds(PlanPart, counts, times, arrays, runs())
 entries = st.builds(Entry, numbers, times, st.none() | commands, counts)
 echoes = st.none() | st.tuples(numbers, times, times)
+postures = st.builds(Posture, times, times, times)
+drives = st.builds(Drive, st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+positive = st.floats(1e-3, 1e6)
+arcs = st.lists(
+    st.builds(
+        ArcSegment,
+        times,
+        st.floats(1e-6, 1e3),
+        st.tuples(times, times, times),
+        st.floats(-1e6, 1e6),
+        st.floats(-9, 9),
+    ),
+    max_size=3,
+).map(tuple)
+packets = st.builds(Packet, st.lists(st.tuples(counts, arcs), max_size=2).map(tuple), times, arcs)
+cells = st.lists(st.builds(CellChange, st.tuples(counts, counts), times, st.booleans()), max_size=2).map(tuple)
+followed = st.builds(Followed, numbers, counts, postures, counts, st.none() | st.builds(CellChanges, times, cells))
+
+
 messages = {
     m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
     m.Ask: st.builds(m.Ask, numbers, stamps),
@@ -138,7 +163,7 @@ messages = {
     c.Welcome: welcomes(),
     c.Attached: st.builds(
         c.Attached, words, arrays, words, st.floats(0.1, 60), stamps, words, words, numbers,
-        st.none() | st.floats(0.01, 2),
+        st.none() | st.floats(0.01, 2), words, words,
     ),
     c.Ping: st.builds(c.Ping, numbers, times),
     c.Pong: st.builds(c.Pong, numbers, times, times, times),
@@ -162,6 +187,20 @@ messages = {
         Report, epochs, numbers, times, echoes, counts, times, finite, arrays, times, times, words,
         st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans, st.none() | arrays,
         st.none() | st.floats(0, 1e3),
+    ),
+    b.MobileWelcome: st.builds(
+        b.MobileWelcome, words, st.sampled_from(c.Role), words, st.builds(DriveLimits, *[positive] * 4), positive,
+        positive, times, leases, st.booleans(), words, words, st.floats(0.1, 60), words, numbers,
+    ),
+    b.Postures: st.builds(
+        b.Postures, numbers, times, postures, drives, postures, stamps, st.none() | postures, st.none() | drives,
+        stamps, st.booleans(), st.none() | positive, st.none() | positive, st.integers(0, 2**64 - 1), st.booleans(),
+        words, counts, st.none() | finite, st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
+    ),
+    DriveOrders: st.builds(DriveOrders, epochs, numbers, times, times, st.none() | postures, packets),
+    DriveReport: st.builds(
+        DriveReport, st.integers(0, 2**64 - 1), numbers, times, times, postures, drives, echoes, words, words,
+        st.none() | followed, stamps, stamps, st.booleans(), st.none() | positive, stamps,
     ),
     n.Survey: st.builds(n.Survey, numbers),
     n.Impair: st.builds(n.Impair, numbers, epochs, st.none() | ways, st.none() | ways),

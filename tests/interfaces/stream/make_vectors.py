@@ -17,13 +17,20 @@ from interfaces.link import ClockSync, Measured, RoundTrip
 from interfaces.site import Site
 from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
+from interfaces.stream import mobile as b
 from interfaces.stream import network as n
+from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
+from interfaces.teleop.architectures import Report as Followed
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from robots import puma560
+from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
+from robots.onboard.supervisor import CellChange
 from vrs import Engine, Insertion, ManualClock, Motion, PolynomialSegment, Profile, commands
+from vrs.mobile import DriveLimits
 from vrs.model import Limits, frozen_array
 from vrs.receipt import Receipt, Status
+from vrs.segment import ArcSegment
 
 PATH = Path(__file__).with_name("vectors.json")
 Q = frozen_array([0.1, 0.2, -0.3])
@@ -89,6 +96,42 @@ def values() -> dict[str, Any]:
         ),
         "attached": c.Attached("puma560", Q, "halt", 0.5, None, "xyz", "vrs 0.1.0"),
         "attached, with an age": c.Attached("puma560", Q, "halt", 0.5, -0.5, "xyz", "vrs 0.1.0", max_age=0.4),
+        "attached, of a mobile robot": c.Attached(
+            "ipr", frozen_array([1.5, 3.0, 0.25]), "halt", 0.5, None, "xyz", "vrs 0.1.0", max_age=0.5,
+            architecture="timeline", room="Empty room",
+        ),
+        "mobile welcome": b.MobileWelcome(
+            "abc", c.Role.OPERATOR, "ipr", DriveLimits(0.5, 0.75, 0.52, 2.6), 0.1, 0.3, 2.5, held, False, "xyz",
+            "vrs 0.1.0", room="Empty room",
+        ),
+        "postures": b.Postures(
+            31, 2.5, Posture(1.75, 3.0, 0.5), Drive(0.3, -0.1), Posture(1.76, 3.01, 0.5), 2.25,
+            Posture(1.7, 3.0, 0.4), Drive(0.28, -0.05), -0.2, False, 0.002, 0.31, 7_730_941_132_801, True, "", 2,
+            0.41, ((2.0, 2.25), (2.05, None)),
+        ),
+        "postures before the real robot is met": b.Postures(
+            1, 0.5, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0), Posture(1.5, 3.0, 0.0), connected=False,
+            halted="the robot hasn't been met yet",
+        ),
+        "drive orders": DriveOrders(
+            3, 5, 2.75, 2.5, Posture(1.5, 3.0, 0.0),
+            Packet(
+                ((2, (ArcSegment(0.2, 0.1, (1.5, 3.0, 0.0), 0.05, -0.01),)),), 0.3,
+                (ArcSegment(0.3, 0.1, (1.505, 3.0, -0.001), 0.02, -0.004),),
+            ),
+        ),
+        "drive orders without a drive": DriveOrders(1, 1, 0.5, 0.0, None, Packet((), 0.0)),
+        "drive report": DriveReport(
+            3, 12, 2.95, 2.94, Posture(1.5, 3.0, 0.0), Drive(0.04, -0.01), (5, 2.75, 2.9), "", "",
+            Followed(4, 2, Posture(1.5, 3.0, 0.0), 3), 0.1, -0.2, False, 0.015, 12.25,
+        ),
+        "drive report of a robot that sees something new": DriveReport(
+            3, 13, 3.0, 2.99, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0),
+            report=Followed(5, 3, Posture(1.5, 3.0, 0.0), 3, CellChanges(0.45, (CellChange((7, 9), 0.4, True),))),
+        ),
+        "drive report of a halted robot": DriveReport(
+            3, 14, 3.05, 3.04, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0), halted="link loss", refused="too old",
+        ),
         "ping": c.Ping(1, 123.456),
         "pong": c.Pong(1, 123.456, 2.5, 2.5001),
         "acquire": c.Acquire(3),

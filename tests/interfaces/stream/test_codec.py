@@ -19,8 +19,10 @@ from interfaces import messages as m
 from interfaces.stream import LARGEST, Encoding, ProblemCode, ProtocolError, SharedEncoder, decode, encode
 from interfaces.stream import control as c
 from interfaces.stream.codec import TYPES, WIRES
+from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.wire.commands import ReceiptWire
 from interfaces.stream.wire.fields import MOST_NAMES
+from interfaces.teleop.architectures import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
 from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
@@ -33,6 +35,10 @@ QUICK = settings(max_examples=25, deadline=None, phases=PHASES, database=None, d
 Q = frozen(np.linspace(-1, 1, 6) / 3)
 PACKED, PLAIN = Encoding
 BROADCAST = m.Broadcast(m.Frame(7, 2.5, 2.0, Q, m.FrameStatus.PREDICTED), m.Verdicts(1, 5, ((2, 3, 4),)))
+
+
+MOBILE = {MobileWelcome, Postures, DriveOrders, DriveReport}
+"""Of mobile robots."""
 
 
 def write(encoding: Encoding, message: Any) -> bytes:
@@ -49,9 +55,9 @@ def code(data: bytes, encoding: Encoding, allowed: Any) -> ProblemCode:
 
 def test_every_message_has_a_wire_form_and_is_drawn() -> None:
     unions = (m.Request, m.Reply, c.Question, c.Notice)
-    kinds = {kind for union in unions for kind in union.__args__} | {Orders, Report}
+    kinds = {kind for union in unions for kind in union.__args__} | MOBILE | {Orders, Report}
     assert set(WIRES) == set(messages) == kinds
-    for kind in kinds - {Orders, Report}:
+    for kind in kinds - {Orders, Report, DriveOrders, DriveReport}:
         assert TYPES[kind.kind] is kind
 
 

@@ -1,0 +1,240 @@
+"""What `vrs serve` and `vrs robot` do for a mobile robot."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from interfaces.cli.doors import (
+    abandon,
+    access_for,
+    end_on_signal,
+    end_with_input,
+    keep_quiet,
+    names_of,
+    start_robot,
+)
+from interfaces.software import software
+from vrs.checks import number_in, one_of
+from vrs.errors import FormatError, InvalidValueError
+
+if TYPE_CHECKING:
+    from interfaces.link import LinkConditions
+    from interfaces.runtime.live.mobile_robot import LiveMobileRobot
+    from interfaces.stream.access import Access
+    from robots.bullet.rooms import Room
+
+ROBOTS = ("puma560", "ipr")
+"""Robots that can be served."""
+ARCHITECTURE, ROOM = "timeline", "empty"
+"""Unless others are asked for."""
+RobotName: TypeAlias = Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560 or ipr.")]
+Architecture: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--architecture",
+        metavar="NAME",
+        help="Of an ipr, what it does with the operator's path: I, II, III, III-capped, extended or timeline.",
+    ),
+]
+RoomName: TypeAlias = Annotated[
+    str,
+    typer.Option("--room", metavar="NAME|FILE", help="Of an ipr, where it drives: a room's name, or a .room file."),
+]
+
+
+def without(robot: str, given: Mapping[str, tuple[Any, Any]]) -> None:
+    """Check that no option was given that a robot hasn't.
+
+    Args:
+        robot: Its name.
+        given: What each option is, and what it is unless given.
+
+    Raises:
+        InvalidValueError: If one was.
+    """
+    for name, (value, usual) in given.items():
+        if value != usual:
+            raise InvalidValueError(name, str(value), f"left out: {robot} has nothing of the kind")
+
+
+def room_of(text: str) -> Room:
+    """A room by its name, or of a file.
+
+    Raises:
+        InvalidValueError: If there's neither a room of that name nor such a file.
+        FormatError: If the file can't be read.
+    """
+    from robots.bullet.rooms import load_room
+    from robots.ipr.robot import PLACES, place
+
+    if text in PLACES:
+        return place(text)
+    path = Path(text)
+    if not path.is_file():
+        raise InvalidValueError("room", text, f"one of {', '.join(PLACES)}, or a file that's there")
+    try:
+        return load_room(path)
+    except OSError as error:
+        raise FormatError(path.name, error.strerror or str(error)) from None
+
+
+@dataclass(frozen=True, slots=True)
+class MobileServing:
+    """What `vrs serve --robot ipr` serves, and where."""
+
+    host: str
+    port: int
+    room: str
+    architecture: str
+    conditions: LinkConditions
+    link_loss: str
+    max_age: float
+    seed: int
+    robot_at: str | None
+    """`ws://HOST:PORT/site`; None: one is started."""
+    robot_token: str | None = field(repr=False)
+    until_eof: bool
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Of the robot that is started."""
+        return (
+            "--robot", "ipr", "--room", self.room, "--architecture", self.architecture,
+            "--link-loss", self.link_loss, "--max-age", f"{self.max_age:g}",
+        )  # fmt: skip
+
+
+async def serve_mobile(serving: MobileServing, access: Access) -> None:
+    """Serve until a signal comes. The page is there before the robot is."""
+    import asyncio
+    import contextlib
+
+    from interfaces.stream import sockets
+    from interfaces.stream.access import hosts
+
+    ended = asyncio.Event()
+    end_on_signal(ended)
+    room = room_of(serving.room)
+    host = serving.host
+    async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
+        listening = stack.enter_context(contextlib.closing(sockets.bind(host, serving.port)))
+        port = listening.getsockname()[1]
+        robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options))
+        stack.push_async_callback(abandon, robot)
+        await asyncio.to_thread(_load)
+
+        from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
+        from interfaces.station.page import Station
+        from interfaces.station.panels import MOBILE_PANELS
+        from interfaces.stream.server import application
+        from robots import ipr
+
+        model = ipr.model()
+        config = LiveMobileOperatorConfig(
+            model, room, "", serving.conditions, serving.robot_token, serving.seed, software()
+        )
+        operator = LiveMobileOperator(config, access)
+        station = Station({"mobile": True, "name": model.name}, panels=MOBILE_PANELS)
+        app = application([*operator.routes, *station.routes], hosts(names_of(host), port))
+        await stack.enter_async_context(station.running())
+        await stack.enter_async_context(sockets.serve(app, listening))
+        await stack.enter_async_context(operator.running())
+        keep_quiet()
+        shown = f"[{host}]" if ":" in host else host
+        typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
+        typer.echo(f"vrs: operator station on http://{shown}:{port}/")
+        sys.stdout.flush()
+        if serving.until_eof:
+            end_with_input(ended)
+        ending = asyncio.create_task(ended.wait())
+        await asyncio.wait([robot, ending], return_when=asyncio.FIRST_COMPLETED)
+        if robot.done():
+            operator.robot.url = robot.result()
+            delay = serving.conditions.forward.delay.name
+            typer.echo(f"vrs: robot at {robot.result()}, emulated delay {delay}", err=True)
+        await ending
+
+
+def _load() -> None:
+    """Import what takes long, while the robot's process does the same."""
+    import interfaces.runtime.live.mobile_operator
+    import interfaces.station.page  # noqa: F401
+
+
+def run_mobile(
+    listen: str,
+    *,
+    architecture: str,
+    room: str,
+    link_loss: str,
+    watchdog: tuple[float, float],
+    reports: float,
+    token_file: Path | None,
+    until_eof: bool,
+) -> None:
+    """Run a mobile robot and its site, until Ctrl-C or SIGTERM.
+
+    Args:
+        listen: Where, HOST:PORT.
+        architecture: What it does with the operator's path, by name.
+        room: Where it drives, see `room_of`.
+        link_loss: `halt` or `hold`.
+        watchdog: T_loss, and how old a message may be [s].
+        reports: How often it says where it is [1/s].
+        token_file: Its tokens.
+        until_eof: Whether it ends with standard input.
+    """
+    import uvloop
+
+    from interfaces.lab.driving.run import CONTROL
+    from interfaces.link.proxy import parse_address
+    from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
+    from interfaces.stream.control import Role
+    from interfaces.teleop.architectures import ARCHITECTURES
+    from interfaces.teleop.driving import DrivenConfig
+    from robots.onboard import LossPolicy, WatchdogConfig
+
+    address = parse_address("--listen", listen)
+    one_of("architecture", architecture, ARCHITECTURES)
+    policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
+    timeout, max_age = watchdog
+    dog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
+    beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
+    driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
+    config = LiveMobileConfig(room_of(room), architecture, driven, server=software())
+    access = access_for(address.host, token_file, free={Role.SITE})
+
+    async def main() -> None:
+        await _run(LiveMobileRobot(config, access), address.host, address.port, until_eof=until_eof)
+
+    uvloop.run(main())
+
+
+async def _run(robot: LiveMobileRobot, host: str, port: int, *, until_eof: bool) -> None:
+    """Run until a signal comes, or standard input ends."""
+    from interfaces.runtime.live.process import READY
+    from interfaces.runtime.live.robot_server import LARGEST
+    from interfaces.runtime.priority import hasten
+    from interfaces.stream import sockets
+    from interfaces.stream.access import hosts
+    from interfaces.stream.server import application
+
+    end_on_signal(robot.ended)
+    listening = sockets.bind(host, port)
+    port = listening.getsockname()[1]
+    app = application(robot.routes, hosts(names_of(host), port))
+    async with sockets.serve(app, listening, largest=LARGEST), robot.running():
+        keep_quiet()
+        hasten(1)
+        typer.echo(f"{READY}ws://{host}:{port}/site (ipr, {robot.config.architecture})")
+        sys.stdout.flush()
+        if until_eof:
+            end_with_input(robot.ended)
+        await robot.ended.wait()
+        await robot.rest()

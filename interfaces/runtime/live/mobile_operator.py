@@ -1,0 +1,230 @@
+"""The operator's site of a mobile robot, live: the virtual robot, its clients, and the line to the real one."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import secrets
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from starlette.routing import BaseRoute
+
+from interfaces.lab.driving.surroundings import grid_of, operator_surroundings
+from interfaces.link import LinkConditions
+from interfaces.runtime.live.emulation import LiveEmulation
+from interfaces.runtime.live.mobile_drawing import MobileDrawing
+from interfaces.runtime.live.operator import GONE, SHOW, UNHEARD
+from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.stream.access import Access
+from interfaces.stream.control import Attached, Role
+from interfaces.stream.driving import DriveSite
+from interfaces.stream.hub import Hub, HubConfig
+from interfaces.stream.meshcat.page import routes as view_routes
+from interfaces.stream.mobile import Postures
+from interfaces.stream.server import HubServer
+from interfaces.teleop.architectures import DriveReport, OperatorSurroundings
+from interfaces.teleop.driving import DriveLine, DrivingOperator
+from interfaces.teleop.driving.operator import FREE, STOPPED
+from interfaces.timer import Turning
+from robots.bullet.rooms import EMPTY, Room
+from robots.ipr.chassis import chassis
+from robots.onboard.driving import Posture
+from robots.onboard.lease import Ended, Grant, Lease, LeaseState
+from vrs.clock import WallClock, seconds_since_1970
+from vrs.mobile import MobileModel
+
+PATIENCE = 6.0
+"""So long after a lease ended the real robot may take to say that it stands [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveMobileOperatorConfig:
+    """An operator's site."""
+
+    model: MobileModel
+    room: Room
+    """Where the robot drives: both sites have the same."""
+    robot: str
+    """Where the robot's site listens: `ws://HOST:PORT/site`; empty until that's known, see `RobotClient.url`."""
+    conditions: LinkConditions
+    """What is emulated on the way to the robot at first, both ways; clients may change it."""
+    robot_token: str | None = field(default=None, repr=False)
+    """Token of the role `site` at the robot."""
+    seed: int = 0
+    """Seed of the emulated link, ≥ 0."""
+    server: str = "vrs"
+    """Name and version of the program."""
+
+
+class LiveMobileOperator:
+    """The virtual robot and all that joins it to people and to the real one. Enter `running` in its loop."""
+
+    def __init__(self, config: LiveMobileOperatorConfig, access: Access) -> None:
+        """Session time begins here.
+
+        Args:
+            config: The site.
+            access: Who may do what.
+        """
+        self.config = config
+        self.clock = WallClock()
+        start = Posture(*config.room.start)
+        self.operator = DrivingOperator(config.model, start, now=0.0, around=self._around)
+        self.line = DriveLine(self.operator, config.conditions, np.random.default_rng(config.seed))
+        self._turning = Turning(self.clock, self._turn)
+        self.robot = RobotClient(
+            self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, reports=DriveReport,
+            unfit=self._unfit,
+        )  # fmt: skip
+        # Every lease of an earlier life has a smaller epoch.
+        lease = Lease(epoch=int(seconds_since_1970()) << 32)
+        hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
+        self.site = DriveSite(self.operator, config.model, room=config.room.name)
+        self.emulation = LiveEmulation(self.line, self.robot, config.seed, lambda _, __: self._turning.soon())
+        self.hub = Hub(
+            self.site, lease, access, self, config=hub, emulation=self.emulation, welcome=self.site.welcome
+        )
+        self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
+        self.drawing = MobileDrawing(config.model, start, config.room, grid_of(config.room, start))
+        self._view = view_routes(self.drawing.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
+        self._wants_resume = False
+        self._ending = -math.inf
+        """Since when a lease is ending [s]; −∞ while none is."""
+        self._states = 0
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """What it answers."""
+        return [*self.server.routes, *self._view]
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[LiveMobileOperator]:
+        """Serve clients, and keep the robot connected."""
+        async with self.server.running():
+            tasks = [asyncio.create_task(work) for work in (self.robot.run(), self._draw())]
+            self._turning.start()
+            try:
+                yield self
+            finally:
+                self._turning.stop()
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _around(self, start: Posture) -> OperatorSurroundings | None:
+        """What keeps the virtual robot out of the walls that are known."""
+        room = self.config.room
+        return None if room is EMPTY else operator_surroundings(room, chassis("ipr"), start, self.config.model)
+
+    def _unfit(self, robot: Attached) -> str:
+        """Why a robot isn't the one that is driven here; empty if it is."""
+        model, room = self.config.model.name, self.config.room.name
+        if robot.robot != model:
+            return f"it's a {robot.robot}, and this site drives an {model}"
+        return (
+            "" if robot.room == room else f"its room is {robot.room!r}, and this site has {room!r}: give both one"
+        )
+
+    async def _draw(self) -> None:
+        """Draw both robots for those who look."""
+        while True:
+            await asyncio.sleep(SHOW)
+            self.drawing.follow(self.operator)
+            if self.drawing.scene.viewers:
+                self.drawing.show(self.operator, now=self.clock.now())
+
+    def _turn(self, now: float) -> float | None:
+        report, steps = self.operator.report, self.operator.steps
+        for message in self.line.advance(now=now):
+            self.robot.send(message)
+        held = self.hub.lease_state is LeaseState.HELD
+        if self._wants_resume or (held and self.operator.halted == STOPPED):
+            # After a stop, too: the next drive begins where the real robot has come to rest.
+            self._wants_resume = bool(self.operator.resume(now=now))
+        self._end_lease(now)
+        if self.operator.report is not report or self.operator.steps != steps:
+            self._show(now)
+            self.server.kick()
+        return self.line.next_deadline()
+
+    def began(self, grant: Grant, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+        """A lease has begun: a drive may begin."""
+        self._wants_resume = True
+        self._turning.soon()
+
+    def ended(self, ended: Ended, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+        """A lease has ended: the robots stop on their way."""
+        self._ending, self._wants_resume = now, False
+        self.operator.stop()
+        self._turning.soon()
+
+    def resume(self, epoch: int, *, now: float) -> str:  # noqa: ARG002 - the hub says it
+        """Let a robot go on that stopped by itself; why it can't, empty if it does."""
+        return self.operator.resume(now=now)
+
+    def _end_lease(self, now: float) -> None:
+        """Let the next one have the lease once both robots rest."""
+        if self._ending == -math.inf or not self.operator.stands:
+            return
+        if self.operator.done or self.line.silence(now=now) >= GONE or now >= self._ending + PATIENCE:
+            self._ending = -math.inf
+            self.operator.halted = FREE
+            self.hub.stopped(now=now)
+            self.server.kick()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the robot's site is heard of."""
+        return self.line.connected and self.clock.now() - self.robot.heard < UNHEARD
+
+    def _show(self, now: float) -> None:
+        """Tell clients where both robots are."""
+        operator, report, deviation = self.operator, self.operator.report, self.operator.deviation
+        self._states += 1
+        real: dict[str, Any] = {}
+        if report is not None:
+            real = {"t": report.measured_at, "real": report.posture, "drive": report.drive, "D": report.D}
+            real |= {"starved": report.starved, "epoch": report.epoch}
+        if deviation is not None and not operator.halted:
+            real |= {"path_error": deviation.path_error, "time_difference": deviation.time_difference}
+        self.hub.show(
+            Postures(
+                number=self._states,
+                now=now,
+                virtual=operator.virtual(now),
+                command=operator.site.before,
+                estimate=Posture(*operator.site.estimator.posture.tolist()),
+                connected=self.connected,
+                halted=operator.halted,
+                drives=operator.epochs,
+                round_trip=operator.round_trip,
+                messages=self.line.messages(),
+                **real,
+            )
+        )
+
+    def health(self) -> dict[str, Any]:
+        """How it is, for `/health`."""
+        attached, silence = self.robot.attached, self.clock.now() - self.robot.heard
+        report, deviation = self.operator.report, self.operator.deviation
+        return {
+            "robot_at": self.robot.url,
+            "room": self.config.room.name,
+            "architecture": "" if attached is None else attached.architecture,
+            "delay": self.line.link.conditions.forward.delay.name,
+            "connected": self.connected,
+            "problem": self.robot.problem,
+            "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
+            "halted": self.operator.halted,
+            "epoch": self.operator.epoch,
+            "drives": self.operator.epochs,
+            "D": None if report is None else report.D,
+            "path_error": None if deviation is None else deviation.path_error,
+            "time_difference": None if deviation is None else deviation.time_difference,
+            "link_loss": None if attached is None else attached.link_loss,
+            "timer_late": self._turning.lateness.worst,
+        }

@@ -1,0 +1,217 @@
+"""A mobile robot's site, live: an architecture on board of a body in PyBullet, in step with the clock.
+
+Its process is the body's own: a control period's physics takes some 3 ms of 50.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import secrets
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from starlette.requests import Request
+from starlette.responses import JSONResponse
+from starlette.routing import BaseRoute, Route
+
+from interfaces.lab.driving.run import CONTROL, SENSING
+from interfaces.lab.driving.surroundings import robot_surroundings
+from interfaces.runtime.live.robot_server import RobotServer
+from interfaces.stream.access import Access
+from interfaces.stream.control import Attached
+from interfaces.teleop.architectures import ARCHITECTURES, Constants, DriveOrders, RobotSite, controller
+from interfaces.teleop.driving import DrivenConfig, DrivenHost, DrivenRobot
+from interfaces.teleop.hosting import HostConfig
+from interfaces.timer import Turning
+from robots.bullet.rooms import Room
+from robots.ipr.body import MobileBody
+from robots.ipr.chassis import Senses
+from robots.ipr.parameters import IPR_LIMITS
+from robots.ipr.position import FusedPosition
+from robots.onboard.driving import Posture
+from vrs.checks import one_of
+from vrs.clock import WallClock
+
+_REST = 3.0
+"""Longest time to come to rest in the end [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiveMobileConfig:
+    """A mobile robot, and how its site behaves."""
+
+    room: Room
+    """Where it drives; it stands at first where the room says."""
+    architecture: str = "timeline"
+    """What it does with the operator's path: a name of `ARCHITECTURES`."""
+    driven: DrivenConfig = field(default_factory=lambda: DrivenConfig(period=CONTROL))
+    """How its site behaves."""
+    constants: Constants = field(default_factory=Constants)
+    """Of all architectures."""
+    seed: int = 0
+    """Of slip and of the senses' noise, ≥ 0."""
+    server: str = "vrs"
+    """Name and version of the program."""
+
+    def __post_init__(self) -> None:
+        one_of("architecture", self.architecture, ARCHITECTURES)
+
+
+class LiveMobileRobot:
+    """A mobile robot that follows whoever says hello as an operator's site. Enter `running` where its loop runs."""
+
+    def __init__(self, config: LiveMobileConfig, access: Access) -> None:
+        """Put the robot into its room; its clock runs from here on.
+
+        Args:
+            config: The robot.
+            access: Who may come in as `Role.SITE`.
+        """
+        self.config = config
+        senses = Senses() if config.architecture in SENSING else Senses(sonar=None)
+        rng = np.random.default_rng(config.seed)
+        self.body = MobileBody("ipr", room=config.room, rng=rng, senses=senses)
+        self._position = FusedPosition(self.body)
+        # The first look of its senses, before anybody waits for it.
+        self.body.drive(0.0, 0.0, 0)
+        self.clock = WallClock()
+        self.instance = secrets.token_urlsafe(9)
+        self.host = DrivenHost(
+            self._site, HostConfig(lead=0.0), now=self.clock.now(), seed=secrets.randbelow(2**32)
+        )
+        self._turning = Turning(self.clock, self._turn)
+        soon = self._turning.soon
+        self._server = RobotServer(
+            self.host, self.clock, access, attached=self._attached, met=soon, heard=soon, orders=DriveOrders
+        )
+        self.ended = asyncio.Event()
+        """Set when it's to end."""
+        self.ticks = self.skipped = 0
+        """Control periods that were run, and left out as the process stood still."""
+        self.worst = 0.0
+        """By how much the latest of them was late [s]."""
+        self._touched = 0
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """`/site` and `/health`."""
+        return [Route("/health", self._say_health), *self._server.routes]
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[LiveMobileRobot]:
+        """Run the body, and serve meanwhile."""
+        control = asyncio.create_task(self._control())
+        self._turning.start()
+        try:
+            yield self
+        finally:
+            self._turning.stop()
+            control.cancel()
+            await asyncio.wait([control])
+            self._server.close()
+            self.body.close()
+
+    async def rest(self) -> None:
+        """Stop, and wait until the robot stands, if that doesn't take too long."""
+        self.host.halt("the robot's site stops", now=self.clock.now())
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_REST):
+                while self.host.site is not None and not self.host.site.rests(now=self.clock.now()):
+                    await asyncio.sleep(CONTROL)
+
+    async def _control(self) -> None:
+        """Drive the body, a control period at a time, as long as the clock says."""
+        due = self.clock.now()
+        try:
+            while True:
+                await asyncio.sleep(max(0.0, due - self.clock.now()))
+                now = self.clock.now()
+                late = now - due
+                self.worst = max(self.worst, late)
+                missed = int(late / CONTROL)
+                self.skipped += missed
+                due += (1 + missed) * CONTROL
+                self._drive(now)
+        except Exception:
+            # Whoever waits for the robot must not wait for ever.
+            self.ended.set()
+            raise
+
+    def _drive(self, now: float) -> None:
+        """One control period."""
+        drive = self.host.drive(now=now)
+        body = self.body
+        body.drive(drive.v, drive.w, round(CONTROL / body.reality.dt))
+        self.ticks += 1
+        collisions = body.collisions
+        if len(collisions) > self._touched:
+            self._touched = len(collisions)
+            self.host.halt(f"the robot touches something: {collisions[-1].thing}", now=now)
+        self._turning.soon()
+
+    def _site(self, t: float) -> DrivenRobot:
+        """What follows an operator from the time t of its clock on [s]."""
+        body, driven = self.body, self.config.driven
+        if driven.watchdog is not None:
+            # What is decided takes effect with the next control period.
+            timeout = max(driven.watchdog.timeout - CONTROL, 0.1)
+            driven = replace(driven, watchdog=replace(driven.watchdog, timeout=timeout))
+        return DrivenRobot(
+            self._architecture,
+            self._position,
+            IPR_LIMITS,
+            now=t,
+            world=lambda: body.time,
+            config=driven,
+        )
+
+    def _architecture(self, start: Posture, since: float) -> RobotSite:
+        """The architecture's parts for a drive that began at a posture, so long ago [s]."""
+        config, body = self.config, self.body
+        made = controller(config.architecture, start, config.constants)
+        around = None
+        if config.architecture in SENSING:
+            around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
+        return RobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
+
+    def _turn(self, now: float) -> float:
+        self._server.send(self.host.advance(now=now))
+        return self.host.next_deadline()
+
+    def _attached(self) -> Attached:
+        config, dog = self.config, self.config.driven.watchdog
+        loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
+        posture = np.array(self._position.posture())
+        return Attached(
+            "ipr", posture, loss, timeout, None, self.instance, config.server, max_age=age,
+            architecture=config.architecture, room=config.room.name,
+        )  # fmt: skip
+
+    def health(self) -> dict[str, Any]:
+        """How it is, for `/health`."""
+        site, body = self.host.site, self.body
+        return {
+            "ok": not self.ended.is_set(),
+            "robot": "ipr",
+            "server": self.config.server,
+            "instance": self.instance,
+            "now": self.clock.now(),
+            "architecture": self.config.architecture,
+            "room": self.config.room.name,
+            "operator": self._server.connected,
+            "epoch": 0 if site is None else site.epoch,
+            "halted": "" if site is None else site.halted,
+            "posture": list(self._position.posture()),
+            "truth": list(body.truth),
+            "motion": list(body.motion),
+            "touching": body.touching,
+            "collisions": len(body.collisions),
+            "ticks": {"run": self.ticks, "skipped": self.skipped, "worst": self.worst},
+            "timer_late": self._turning.lateness.worst,
+        }
+
+    async def _say_health(self, request: Request) -> JSONResponse:  # noqa: ARG002 - Starlette gives it
+        return JSONResponse(self.health())

@@ -1,0 +1,149 @@
+// Live plots of a mobile robot: how far the real one is from the path, how much later, and what the network does.
+import { Chart } from "./chart.js";
+import { save, textOf } from "./csv.js";
+import { h, mark, write } from "./dom.js";
+import { figure } from "./graphs.js";
+import { Messages } from "./messages.js";
+import { Table } from "./table.js";
+import { thinned } from "./thinning.js";
+
+/** Windows that one may choose: seconds, name, time between two pictures [ms]. */
+const SPANS = [[30, "30 s", 200], [120, "2 min", 400], [600, "10 min", 900]];
+/** Ten minutes of what comes ten to twenty times a second. */
+const KEPT = 13000;
+const TURN = 60;
+const SAID = 250;
+/** Values older than this aren't the present ones [s]. */
+const OLD = 1.5;
+const COLUMNS = ["t", "path_error", "time_difference", "behind", "delay", "round_trip", "age"];
+
+function graph(name, title, unit, factor, digits, columns, lines, note, more = {}) {
+  return {
+    name, title, unit, note, zero: true, open: true,
+    lines: lines.map(([label, colour, dash = []]) => ({ label, colour, dash, width: 1.6 })),
+    data({ samples: { table }, from, until, span }) {
+      const curves = columns.map((column) => table.column(column));
+      return thinned(table.column("t"), curves, table.before(from), table.before(until), span, factor);
+    },
+    words: ({ samples: { table }, index }) =>
+      `${columns.map((column) => figure(table.get(column, index) * factor, digits)).join(" / ")} ${unit}`,
+    ...more,
+  };
+}
+
+const GRAPHS = [
+  graph("path-error", "Path error", "cm", 100, 1, ["path_error"], [["path error", "--virtual"]],
+    "Distance of the real robot, as it takes itself to be, from the nearest place of the virtual one's path.", { least: 1 }),
+  graph("time-difference", "Time difference and D", "s", 1, 2, ["time_difference", "behind"],
+    [["time difference", "--virtual"], ["−D, how far behind it plays", "--committed", [6, 3]]],
+    "How much later the real robot is where the virtual one was. −D is what its architecture keeps of delay in store; braking distance comes on top.",
+    { least: 0.2 }),
+  graph("delay", "Delay", "s", 1, 2, ["delay", "round_trip"], [["to the robot", "--virtual"], ["round trip", "--real", [3, 3]]],
+    "Each message to the robot by the emulated link alone; the round trip has the real network in it.",
+    { least: 0.05, dots: true, marks: [["dot", "a message"], ["cross", "a lost one"]] }),
+  graph("age", "Age of what is known", "s", 1, 2, ["age"], [["age", "--virtual"]],
+    "How old the newest measurement of the real robot was when it came to this page.", { least: 0.2, open: false }),
+];
+
+class Samples {
+  constructor(station) {
+    this.session = station.session;
+    this.table = new Table(COLUMNS, KEPT);
+    this.messages = new Messages();
+    this.instance = null;
+    station.on("welcome", ({ instance }) => {
+      if (this.instance !== instance) this.clear();
+      this.instance = instance;
+    });
+    station.on("state", (state) => this.hear(state));
+  }
+
+  get arrived() { return this.messages.arrived; }
+  get lost() { return this.messages.lost; }
+
+  clear() {
+    this.table.clear();
+    this.messages.clear();
+  }
+
+  hear(state) {
+    this.messages.hear(state.messages);
+    const { now } = this.session;
+    if (state.t == null || now === null || state.now <= this.table.newest) return;
+    const gone = state.halted ? { ...state, D: null } : state;
+    this.table.push([state.now, state.path_error ?? NaN, state.time_difference ?? NaN, gone.D == null ? NaN : -gone.D,
+      this.messages.delay, state.round_trip ?? NaN, Math.max(0, now - state.t)]);
+  }
+}
+
+export function mount(station, box) {
+  for (const name of ["uplot", "plots"]) document.head.append(h("link", { rel: "stylesheet", href: `/station/${name}.css` }));
+  const { session, layout } = station;
+  const samples = new Samples(station);
+  const charts = GRAPHS.map((one) => new Chart(one));
+  const colours = new Map();
+  let span = SPANS[0];
+  let UPlot = null;
+  let said = -Infinity;
+
+  const buttons = SPANS.map((one) => h("button", { type: "button", "aria-pressed": String(one === span), "data-span": one[0],
+    onclick: () => choose(one) }, one[1]));
+  const file = h("button", { type: "button", id: "plots-save", title: "Save what is kept, ten minutes at most",
+    onclick: () => textOf(samples.table).then((parts) => save(parts, `vrs-drive-${Math.round(session.now ?? 0)}s.csv`)) }, "CSV");
+  box.append(
+    h("div.row.plots-head", {}, h("div.row.spans", { role: "group", "aria-label": "Time that is shown" }, ...buttons),
+      h("span.grow"), file),
+    ...charts.map((chart) => chart.element),
+    h("details.plot", {}, h("summary", {}, h("span.plot-title", {}, "What these show")),
+      h("dl.plot-notes", {}, ...GRAPHS.flatMap(({ title, note }) => [h("dt", {}, title), h("dd", {}, note)]))),
+  );
+
+  function choose(one) {
+    span = one;
+    buttons.forEach((button, k) => mark(button, "aria-pressed", String(SPANS[k] === one)));
+    again();
+  }
+
+  function again() {
+    for (const chart of charts) chart.wanted = true;
+  }
+
+  station.addEventListener("theme", () => {
+    colours.clear();
+    again();
+  });
+
+  function colour(name) {
+    if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+    return colours.get(name);
+  }
+
+  setInterval(() => {
+    const { now } = session;
+    if (document.hidden || layout.shown !== "deviation" || now === null) return;
+    const at = performance.now();
+    const view = { samples, from: now - span[0], until: now, span: span[0], cursor: null, events: [] };
+    if (at - said > SAID) say(view, (said = at));
+    if (!UPlot) {
+      UPlot = import("./uplot.js").then((found) => (UPlot = found.default));
+      return;
+    }
+    if (UPlot instanceof Promise) return;
+    const due = charts.find((chart) => chart.visible && (chart.wanted || at - chart.drawn > span[2]));
+    if (!due) return;
+    if (!due.plot) due.begin(UPlot, colour);
+    due.draw(view);
+    [due.drawn, due.wanted] = [at, false];
+  }, TURN);
+
+  function say(view) {
+    const { table } = samples;
+    const index = table.length - 1;
+    const known = index >= 0 && session.now - table.get("t", index) < OLD;
+    for (const chart of charts) {
+      const text = known ? chart.graph.words({ ...view, index }) : "nothing heard yet";
+      write(chart.value, text);
+      mark(chart.area, "aria-label", `${chart.graph.title}: ${text}`);
+    }
+  }
+}

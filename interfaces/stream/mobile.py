@@ -1,0 +1,88 @@
+"""What crosses a connection to the site of a mobile robot besides what is said of any robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from interfaces.stream.control import PROTOCOL, Lease, Role
+from robots.onboard.driving import Drive, Posture
+from vrs.mobile import DriveLimits
+
+
+@dataclass(frozen=True, slots=True)
+class MobileWelcome:
+    """Server: the client may go on; what there is."""
+
+    kind: ClassVar[str] = "mobile-welcome"
+    version: ClassVar[int] = 1
+    session: str = field(repr=False)
+    """Names this session, for a later `Hello`; nobody else may know it."""
+    role: Role
+    robot: str
+    """Name of the robot's model."""
+    limits: DriveLimits
+    """Of what it may be asked."""
+    period: float
+    """T: time between two commands of the virtual robot [s]."""
+    holds: float
+    """A drive order counts for so long after it was issued [s]."""
+    now: float
+    """Session time [s]."""
+    lease: Lease
+    resumed: bool = False
+    """Whether the session that was asked for goes on."""
+    instance: str = ""
+    """Names this run of the server."""
+    server: str = ""
+    """Name and version of the program."""
+    lease_timeout: float = 2.0
+    """A lease expires so long after the last beat [s]."""
+    room: str = ""
+    """Where it drives, for people."""
+    protocol: int = PROTOCOL
+
+
+@dataclass(frozen=True, slots=True)
+class Postures:
+    """Server: where both robots are; the newest one counts."""
+
+    kind: ClassVar[str] = "postures"
+    version: ClassVar[int] = 1
+    number: int
+    now: float
+    """Session time when it was made [s]."""
+    virtual: Posture
+    """Of the virtual robot, now."""
+    command: Drive
+    """What it drives."""
+    estimate: Posture
+    """Where the real robot is thought to come to with all commands so far. Source: Han et al., eq. (8)–(10)."""
+    t: float | None = None
+    """When the real robot was measured [s]; None before the first report, as all that follows."""
+    real: Posture | None = None
+    """Where it took itself to be."""
+    drive: Drive | None = None
+    """What its motors are told."""
+    D: float | None = None
+    """The time of the operator's path that it's to play less his clock, as the robot takes it to be, without what
+    braking needs: negative [s]; None where its architecture has none."""
+    starved: bool = False
+    """Whether it's slower than it should be, as nothing newer is known there."""
+    path_error: float | None = None
+    """How far it is from the virtual robot's path [m]."""
+    time_difference: float | None = None
+    """How much later than the virtual robot it is there [s]."""
+    epoch: int = 0
+    """Epoch that it follows; 0 for none."""
+    connected: bool = True
+    """Whether the robot's site is heard of."""
+    halted: str = ""
+    """Why it doesn't follow; empty while it does."""
+    drives: int = 0
+    """How often the virtual robot was put where the real one stood, to begin a drive."""
+    round_trip: float | None = None
+    """Newest time that a message to the robot and the answer were under way [s]; None before the first."""
+    messages: tuple[tuple[float, float | None], ...] = ()
+    """Messages to the robot of which the emulated link told since the one before: when each was sent, and when it
+    arrived [s]; None for one that was lost."""

@@ -1,0 +1,16 @@
+"""Both sites of a mobile robot that is driven live, round the parts of `interfaces.teleop.architectures`."""
+
+from interfaces.teleop.driving.deviation import Deviation, PathDeviation
+from interfaces.teleop.driving.host import DrivenHost
+from interfaces.teleop.driving.operator import DriveLine, DrivingOperator
+from interfaces.teleop.driving.robot import DrivenConfig, DrivenRobot
+
+__all__ = [
+    "Deviation",
+    "DriveLine",
+    "DrivenConfig",
+    "DrivenHost",
+    "DrivenRobot",
+    "DrivingOperator",
+    "PathDeviation",
+]

@@ -1,0 +1,235 @@
+"""The operator's site of a mobile robot, live: wishes become a command each T, at once on the virtual robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final, TypeAlias
+
+from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.teleop.architectures import OperatorSite, OperatorSurroundings, Packet, Transport
+from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
+from interfaces.teleop.driving.deviation import Deviation, PathDeviation
+from interfaces.teleop.line import SiteLine
+from robots.onboard.driving import STAND, Drive, Posture
+from vrs.checks import finite
+from vrs.mobile import MobileModel
+from vrs.mobile.limiting import braking
+from vrs.segment import ArcSegment
+
+NOT_MET: Final = "the robot hasn't been met yet"
+"""Why nothing can be commanded at first."""
+FREE: Final = "nobody has control"
+"""Why the real robot doesn't follow between two drives."""
+STOPPED: Final = "stopped"
+"""The same after a stop."""
+MOVING: Final = "the robot isn't at rest yet"
+"""Why it can't go on."""
+HOLDS: Final = 0.3
+"""A wish counts for so long [s]: who says nothing more stops."""
+TAKES_UP: Final = 4.0
+"""So long, and twice the usual round trip, a robot has to follow a new epoch [s]."""
+
+
+class DrivingOperator:
+    """The virtual robot, driven by what is wished, and what the real one says. Times are the operator's [s]."""
+
+    def __init__(
+        self,
+        model: MobileModel,
+        posture: Posture,
+        *,
+        now: float,
+        around: Callable[[Posture], OperatorSurroundings | None] = lambda _: None,
+    ) -> None:
+        """Stand, until the real robot has been met.
+
+        Args:
+            model: The virtual robot.
+            posture: Where it's shown until then.
+            now: [s].
+            around: Makes what the virtual robot avoids, for a drive that begins at a posture.
+        """
+        self._model, self._around = model, around
+        self.halted = NOT_MET
+        """Why the real robot doesn't follow; empty while it does."""
+        self.epoch = 1
+        self.steps = 0
+        """Commands since the drive began."""
+        self.epochs = 0
+        """How often the virtual robot was put where the real one stands."""
+        self.report: DriveReport | None = None
+        """The newest that counts."""
+        self.deviation: Deviation | None = None
+        """Of the newest report; None before the first of an epoch."""
+        self.round_trip: float | None = None
+        self.round_trips = SlidingQuantiles(1000, 120.0)
+        self._measured_since = -math.inf
+        self._packets = 0
+        self._wish, self._until = STAND, -math.inf
+        self._over = 0
+        """Number of the first packet that said that the drive is over; 0 while it isn't."""
+        self._set(posture, now)
+
+    def _set(self, posture: Posture, now: float) -> None:
+        """Begin a drive at a posture."""
+        self.began, self.start = now, posture
+        self.steps = self._over = 0
+        self._heard = now
+        self.site = OperatorSite(self._model, posture, Transport.DATAGRAMS, surroundings=self._around(posture))
+        self.path = PathDeviation(0.0, posture)
+        self.deviation = None
+
+    @property
+    def period(self) -> float:
+        """T, between two commands [s]."""
+        return self._model.period
+
+    def wish(self, v: float, w: float, *, issued_at: float, now: float, lasts: float = HOLDS) -> str:
+        """Drive so from the next command on, as far as the limits allow, for a while.
+
+        Args:
+            v: Linear speed [m/s].
+            w: Angular speed [rad/s].
+            issued_at: When that was wished; older than it holds, it moves nothing [s].
+            now: [s].
+            lasts: For how long from then on [s], at most `HOLDS`.
+
+        Returns:
+            Why not; empty if it counts.
+        """
+        finite("v", v)
+        finite("w", w)
+        if self.halted:
+            return f"the robot doesn't follow: {self.halted}"
+        self._wish, self._until = Drive(v, w), min(issued_at, now) + min(lasts, HOLDS)
+        return ""
+
+    def stop(self) -> None:
+        """Let both robots brake at once, each along its arc: the drive is over, with what's left of its path."""
+        self.halt(STOPPED)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the virtual robot's newest command is to stand."""
+        return self.site.before == STAND
+
+    @property
+    def done(self) -> bool:
+        """Whether a drive that's over has come to its end: both robots stand, and the real one knows it."""
+        report = self.report
+        if report is None or not self.stands:
+            return self.stands
+        knows = bool(report.halted) or (report.echo is not None and 0 < self._over <= report.echo[0])
+        return is_still(report.drive) and (knows or report.epoch != self.epoch or not self.epochs)
+
+    def resume(self, *, now: float) -> str:
+        """Begin a drive where the real robot stands; why that can't be, empty if it does."""
+        report = self.report
+        if report is None:
+            return NOT_MET
+        if not self.halted:
+            return ""
+        if not self.done:
+            return MOVING
+        self.epoch += 1
+        self.epochs += 1
+        self.halted, self._wish, self._until = "", STAND, -math.inf
+        self._set(report.posture, now)
+        return ""
+
+    def halt(self, reason: str) -> None:
+        """Let the drive be over; the virtual robot comes to rest."""
+        if not self.halted:
+            self.halted = reason
+            self._until = -math.inf
+
+    def advance(self, *, now: float) -> tuple[DriveOrders, ...]:
+        """Do what is due by now [s], and say what is to be sent."""
+        packet: Packet | None = None
+        while now >= self._due - 1e-9:
+            packet = self._step()
+        if packet is None:
+            if not self.halted or self._over:
+                return ()
+            # That a drive is over is said at once.
+            packet = Packet((), 0.0)
+        if not self.halted and self.report is not None and self.report.epoch < self.epoch:
+            usual = self.round_trips.quantile(0.95) or 0.0
+            if now > self.began + TAKES_UP + 2.0 * usual:
+                self.halt(self.report.refused or "the robot doesn't take up the new drive")
+        self._packets += 1
+        if self.halted and not self._over:
+            self._over = self._packets
+        start = None if self.halted else self.start
+        return (DriveOrders(self.epoch, self._packets, now, self.began, start, packet),)
+
+    @property
+    def next_t(self) -> float:
+        """Time of the next command, from the drive's beginning [s]: what surrounds the virtual robot goes by it."""
+        return self.steps * self._model.period
+
+    @property
+    def _due(self) -> float:
+        return self.began + self.next_t
+
+    def _step(self) -> Packet:
+        """One command; of a drive that's over the virtual robot only comes to rest."""
+        t = self.next_t
+        wished = self._wish if self.began + t < self._until else self._braked()
+        self.steps += 1
+        if self.halted and self.stands:
+            return Packet((), 0.0)
+        packet = self.site.drive(wished.v, wished.w, now=t)
+        v, w = self.site.before
+        x, y, theta = self.site.engine.posture(t).tolist()
+        self.path.add(ArcSegment(t, self._model.period, (x, y, theta), v, w))
+        return Packet((), 0.0) if self.halted else packet
+
+    def _braked(self) -> Drive:
+        """The next command on the way to rest, along the arc."""
+        steps = braking(self.site.before, self._model.period, self._model.limits)
+        return Drive(*steps[0]) if steps else STAND
+
+    def next_deadline(self) -> float:
+        """When there's something to do [s]."""
+        return self._due
+
+    def receive(self, report: DriveReport, *, now: float) -> None:
+        """Take in a report of the robot."""
+        if self.report is not None and report.number <= self.report.number:
+            return
+        self._heard = now
+        if self.report is None:
+            self._set(report.posture, now)
+            self.halted = FREE
+        self.report = report
+        if report.echo is not None and report.epoch == self.epoch:
+            _, sent, arrived = report.echo
+            self.round_trip = now - sent - (report.sent_at - arrived)
+            if sent >= self._measured_since:
+                self.round_trips.add(self.round_trip, now=now)
+        if report.epoch != self.epoch:
+            return
+        if report.halted:
+            self.halt(report.halted)
+        elif report.report is not None:
+            self.site.receive(report.report, now=self.next_t)
+            self.deviation = self.path.match(report.posture, report.measured_at - self.began)
+
+    def heard_ago(self, now: float) -> float:
+        """How long ago the newest report came [s]."""
+        return max(0.0, now - self._heard)
+
+    def measure_anew(self, *, now: float) -> None:
+        """Forget the round trips of messages that were sent before now [s]: the way is another one."""
+        self.round_trips.clear()
+        self._measured_since = now
+
+    def virtual(self, now: float) -> Posture:
+        """Where the virtual robot is [s]."""
+        return Posture(*self.site.engine.timeline.sample(now - self.began).tolist())
+
+
+DriveLine: TypeAlias = SiteLine[DrivingOperator, DriveOrders, DriveReport]
+"""To a mobile robot."""

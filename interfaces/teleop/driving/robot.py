@@ -1,0 +1,212 @@
+"""A mobile robot's site, live: an architecture for each epoch, the watchdog before it, and the way to rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from interfaces.teleop.architectures import Player, Position, RobotSite
+from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
+from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
+from robots.onboard.driving import STAND, Drive, Posture
+from vrs.checks import number_in
+from vrs.mobile import DriveLimits
+from vrs.mobile.limiting import braking
+
+TOO_FAR = "the drive is to begin too far from where the robot is"
+"""Why a new epoch isn't followed."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenConfig:
+    """How a mobile robot's site behaves."""
+
+    period: float = 0.05
+    """Between two drives [s], in [0.001, 1]."""
+    beat: float = 0.05
+    """Between two reports [s], in [0.001, 10]."""
+    begin_within: float = 0.3
+    """So near to where it takes itself to be a drive must begin [m], in [0, 100]."""
+    watchdog: WatchdogConfig | None = None
+    """When the link counts as lost, and messages as too old; None: it holds, and no message is too old."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("period", 1e-3, 1.0), ("beat", 1e-3, 10.0), ("begin_within", 0.0, 100.0)):
+            number_in(name, getattr(self, name), low, high)
+
+
+class DrivenRobot:
+    """Follows the epochs of one operator's site. Times are by its clock, as the robot takes it to be [s]."""
+
+    def __init__(
+        self,
+        make: Callable[[Posture, float], RobotSite],
+        position: Position,
+        limits: DriveLimits,
+        *,
+        now: float,
+        world: Callable[[], float | None] = lambda: None,
+        config: DrivenConfig | None = None,
+    ) -> None:
+        """Stand, and wait for an epoch.
+
+        Args:
+            make: Makes the architecture's parts for a drive that begins at a posture, so long ago [s].
+            position: What tells where the robot is.
+            limits: That every drive keeps.
+            now: [s].
+            world: Tells what time it is where the robot drives, see `DriveReport`.
+            config: How to behave.
+        """
+        self.config = DrivenConfig() if config is None else config
+        self._make, self._position, self._limits, self._world = make, position, limits, world
+        self._site: RobotSite | None = None
+        self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
+        self.epoch, self.halted = 0, ""
+        self._began = 0.0
+        self._driven_at = self._due = now
+        self._drive = STAND
+        self._posture = position.posture()
+        self._newest: tuple[int, float, float] | None = None
+        self._refused, self._uncertainty = "", math.inf
+        self._reports = max(0, math.floor(1000.0 * now))
+
+    def join(self, epoch: int, reason: str, *, now: float) -> None:
+        """Meet an operator in the midst of an epoch: wait for the next one, and report why."""
+        self.epoch, self.halted, self._site = epoch, reason, None
+        self._due = now
+
+    def receive(
+        self, orders: DriveOrders, *, now: float, correction: float = 0.0, uncertainty: float = 0.0
+    ) -> None:
+        """Take in orders; those of an old epoch are ignored, as all are once it has stopped by itself.
+
+        Args:
+            orders: The message.
+            now: [s].
+            correction: What is to be added to its stamp [s].
+            uncertainty: Of that [s].
+        """
+        if orders.epoch > self.epoch and orders.start is not None and self.rests(now=now):
+            self._begin(orders, now)
+        if orders.epoch != self.epoch:
+            return
+        self._uncertainty = uncertainty
+        if not self._counts(orders, now, correction, uncertainty):
+            return
+        if self._newest is None or orders.number > self._newest[0]:
+            self._newest = orders.number, orders.sent_at, now
+            if orders.start is None:
+                # The drive is over: the robot stands, and keeps no place.
+                self._site = None
+        if self._site is not None and not self.halted:
+            self._site.receive(orders.packet, now=self._since(now))
+
+    def _begin(self, orders: DriveOrders, now: float) -> None:
+        """Follow a new epoch, from where the robot stands."""
+        start, here = orders.start, self._position.posture()
+        assert start is not None
+        if math.hypot(start.x - here.x, start.y - here.y) > self.config.begin_within:
+            self._refused = TOO_FAR
+            return
+        if self._watchdog is not None and not self._armed(self._watchdog, orders.epoch, now):
+            return
+        self.epoch, self.halted, self._newest = orders.epoch, "", None
+        self._began = orders.began
+        self._site = self._make(start, self._since(now))
+
+    def _armed(self, watchdog: Watchdog, epoch: int, now: float) -> bool:
+        """Whether the watchdog lets a new epoch begin; the one before has ended with the robot at rest."""
+        self._watch(now)
+        if watchdog.state is WatchdogState.RUNNING:
+            watchdog.disarm(now=now)
+            watchdog.advance(now=now)
+            watchdog.stopped(watchdog.number, now=now)
+        return watchdog.arm(epoch, now=now).counts
+
+    def _counts(self, orders: DriveOrders, now: float, correction: float, uncertainty: float) -> bool:
+        """Whether the watchdog lets a message count."""
+        if self._watchdog is None:
+            return True
+        stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
+        verdict = self._watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
+        if verdict not in (Verdict.HALTED, Verdict.STALE_EPOCH, Verdict.UNKNOWN_EPOCH):
+            self._refused = "" if verdict.counts else f"the newest message was refused: {verdict.value}"
+        return verdict.counts
+
+    def _since(self, now: float) -> float:
+        """Time of the epoch [s]: the clocks may differ by as much as they are uncertain."""
+        return max(0.0, now - self._began)
+
+    def _watch(self, now: float) -> None:
+        """Let the watchdog do what is due by now."""
+        if self._watchdog is None:
+            return
+        if any(isinstance(action, BeginStop) for action in self._watchdog.advance(now=now)):
+            last = f" ({self._refused})" if self._refused else ""
+            self._halt(f"nothing fresh came from the operator: link loss{last}", now)
+        if self.halted and self.rests(now=now):
+            self._watchdog.stopped(self._watchdog.number, now=now)
+
+    def advance(self, *, now: float) -> tuple[DriveReport, ...]:
+        """Do what is due by now [s], and say what is to be sent."""
+        self._watch(now)
+        if now < self._due:
+            return ()
+        self._due = now + self.config.beat
+        return (self._report(now),)
+
+    def next_deadline(self) -> float:
+        """When there's something to do [s]."""
+        watch = None if self._watchdog is None else self._watchdog.next_deadline()
+        return self._due if watch is None else min(self._due, watch)
+
+    def drive(self, *, now: float) -> Drive:
+        """What to drive for the next period, from now [s] on."""
+        self._watch(now)
+        if self._site is not None and not self.halted:
+            self._drive = self._site.drive(now=self._since(now))
+            self._posture = self._site.posture
+        else:
+            steps = braking(self._drive, self.config.period, self._limits)
+            self._drive = Drive(*steps[0]) if steps else STAND
+            self._posture = self._position.posture()
+        self._driven_at = now
+        return self._drive
+
+    def rests(self, *, now: float) -> bool:  # noqa: ARG002 - a follower's
+        """Whether the robot is at rest."""
+        return is_still(self._drive)
+
+    def halt(self, reason: str, *, now: float) -> None:
+        """Stop along the arc that it's on, and wait for a new epoch."""
+        if self._watchdog is not None and self._watchdog.state is WatchdogState.RUNNING:
+            self._watchdog.stop(StopReason.FAULT, now=now)
+        self._halt(reason, now)
+
+    def _halt(self, reason: str, now: float) -> None:
+        if not self.halted:
+            self.halted, self._due = reason, now
+
+    def _report(self, now: float) -> DriveReport:
+        self._reports += 1
+        site = None if self.halted else self._site
+        player = site.controller if site is not None and isinstance(site.controller, Player) else None
+        return DriveReport(
+            epoch=self.epoch,
+            number=self._reports,
+            sent_at=now,
+            measured_at=self._driven_at,
+            posture=self._posture,
+            drive=self._drive,
+            echo=self._newest,
+            halted=self.halted,
+            refused=self._refused,
+            report=None if site is None else site.report(now=self._since(now)),
+            play=None if player is None else player.reference.t_play,
+            D=None if player is None else player.D,
+            starved=player is not None and player.reference.starved,
+            uncertainty=self._uncertainty if math.isfinite(self._uncertainty) else None,
+            world=self._world(),
+        )

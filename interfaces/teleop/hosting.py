@@ -1,0 +1,261 @@
+"""What every robot's end of a connection does: which operator it follows, and whose clock it goes by.
+
+The robot's own clock is mapped to the operator's session time by probes; the map stays as it is while one operator
+is followed, for a map that is slewed would make the robot faster than was certified. What is left is a matter of
+the adaptive offset, which needs no clocks at all, and of the age gate, which is told.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+from interfaces.link.clock_sync import ClockSync
+from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
+from interfaces.stream.control import Ping, Pong
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
+
+MET = "the robot's site has just met this operator's"
+"""Why a robot halts that is met."""
+OTHER = "another operator's site came"
+"""Why a robot halts whose operator hasn't been heard while another came."""
+_LIMIT = 16
+"""Messages that wait for the clocks to be compared."""
+
+
+class Epochal(Protocol):
+    """A message of an operator's site."""
+
+    @property
+    def epoch(self) -> int:
+        """Of the operator's."""
+
+
+O = TypeVar("O", bound=Epochal)  # noqa: E741 - orders
+R = TypeVar("R")
+O_contra = TypeVar("O_contra", contravariant=True)
+R_co = TypeVar("R_co", covariant=True)
+
+
+class Follower(Protocol[O_contra, R_co]):
+    """A robot's site: what carries out the orders of one operator. Times are the operator's [s]."""
+
+    def join(self, epoch: int, reason: str, *, now: float) -> None:
+        """Meet an operator in the midst of an epoch: wait for the next one."""
+
+    def receive(self, orders: O_contra, *, now: float, correction: float, uncertainty: float) -> None:
+        """Take in orders; what they were stamped is to be corrected, and the clocks are so uncertain [s]."""
+
+    def advance(self, *, now: float) -> tuple[R_co, ...]:
+        """Do what is due, and say what is to be sent."""
+
+    def next_deadline(self) -> float:
+        """When there's something to do."""
+
+    def rests(self, *, now: float) -> bool:
+        """Whether the robot is to stand still."""
+
+    def halt(self, reason: str, *, now: float) -> None:
+        """Stop, and wait for a new epoch."""
+
+
+S = TypeVar("S", bound=Follower)  # type: ignore[type-arg]
+
+
+@dataclass(frozen=True, slots=True)
+class HostConfig:
+    """How a robot's end of a connection behaves."""
+
+    lead: float = 0.02
+    """How far ahead of the clock everything is decided [s], in [0, 1]."""
+    probes: ProbeConfig = field(default_factory=lambda: ProbeConfig(period=0.1))
+    """How the operator's clock is compared with."""
+    compared: int = 8
+    """Round trips that have come before the operator is followed, in [1, 1000]."""
+    patience: float = 3.0
+    """After so long [s] from the first round trip fewer are enough, in [0, 60]."""
+    silence: float = 2.0
+    """An operator who hasn't been heard for so long [s] makes room for another, in [0.1, 60]."""
+
+    def __post_init__(self) -> None:
+        ranges = {"lead": (0.0, 1.0), "compared": (1, 1000), "patience": (0.0, 60.0), "silence": (0.1, 60.0)}
+        for name, (low, high) in ranges.items():
+            number_in(name, getattr(self, name), low, high)
+
+
+class Host(ABC, Generic[S, O, R]):
+    """Follows one operator at a time. Times are of the robot's own clock, unless they're said to be the site's.
+
+    An operator is a session: the same one may come back after a break of the connection, and goes on as the
+    watchdog lets it. Another one is followed when the one before hasn't been heard for a while; the robot halts
+    first.
+    """
+
+    def __init__(self, config: HostConfig, *, now: float, seed: int = 0) -> None:
+        """Stand at rest, and wait for an operator.
+
+        Args:
+            config: How to behave.
+            now: By the robot's clock [s].
+            seed: Random number in [0, 2**32), new for each life of the robot: echoes of an earlier one don't count.
+        """
+        self._hosting, self._seed = config, seed
+        self.session = ""
+        """The operator that is followed; empty before the first."""
+        self.site: S | None = None
+        """Its site; None until the clocks have been compared."""
+        self.offset = 0.0
+        """The site's time less the robot's clock [s], the lead aside."""
+        self._next = ""
+        self._heard = -math.inf
+        self._sync = ClockSync()
+        self._trips: RoundTripEstimator | None = None
+        self._count, self._first = 0, math.inf
+        self._waiting: list[O] = []
+        self._unsent: list[R | Ping] = []
+        self._now = now
+
+    @abstractmethod
+    def _make(self, t: float) -> S:
+        """The robot's site, from the operator's time t [s] on, where the robot stands."""
+
+    @abstractmethod
+    def _left(self, site: S, now: float) -> None:
+        """The operator is left, with the robot at rest."""
+
+    def hello(self, session: str, *, now: float) -> str:
+        """Let an operator's site in.
+
+        Args:
+            session: Random text that names its life.
+            now: By the robot's clock [s].
+
+        Returns:
+            Why it can't be; empty if it's followed from now on.
+
+        Raises:
+            InvalidValueError: If the session is no text of 1 to 64 characters.
+        """
+        if not isinstance(session, str) or not 1 <= len(session) <= 64:
+            raise InvalidValueError("session", session, "1 to 64 characters")
+        if session != self.session and now - self._heard < self._hosting.silence:
+            return "another operator's site is connected"
+        self._heard = now
+        if session == self.session:
+            self._next = ""
+        else:
+            self._next = session
+            self.halt(OTHER, now=now)
+        self._catch_up(now)
+        return ""
+
+    def _catch_up(self, now: float) -> None:
+        """Do what is due by now; what is to be sent waits for the next `advance`."""
+        self._unsent = [*self.advance(now=now)]
+
+    def _begin(self, now: float) -> None:
+        """Turn to the next operator: nothing of the one before counts any more."""
+        if self.site is not None:
+            self._left(self.site, now)
+        self.session, self._next, self.site = self._next, "", None
+        self._sync = ClockSync()
+        self._seed = (self._seed + 1) % 2**32
+        self._trips = RoundTripEstimator(self._seed, self._hosting.probes, start=now)
+        self._count, self._first = 0, math.inf
+        self._waiting.clear()
+
+    def site_time(self, t: float) -> float:
+        """The site's time when the robot's clock reads t [s]: what's decided then is for the body's t + lead."""
+        return t + self.offset + self._hosting.lead
+
+    def receive(self, message: O | Pong, *, now: float) -> None:
+        """Take in a message of the operator that is followed."""
+        self._heard = now
+        self._catch_up(now)
+        if self._next or not self.session:
+            return
+        if isinstance(message, Pong):
+            self._compare(message, now)
+        elif self.site is None:
+            self._waiting = [*self._waiting[-_LIMIT + 1 :], message]
+            self._meet(now)
+        else:
+            self._hear(message, now)
+
+    def _compare(self, pong: Pong, now: float) -> None:
+        assert self._trips is not None
+        echo = Echo(self._seed, pong.number - 1, pong.t, pong.received, pong.answered)
+        trip = self._trips.receive(echo, now=now)
+        if isinstance(trip, RoundTrip):
+            self._sync.receive(trip)
+            self._count += 1
+            self._first = min(self._first, now)
+            self._meet(now)
+
+    def _meet(self, now: float) -> None:
+        """Begin to follow an operator of whom a message is there, once the clocks have been compared."""
+        enough = self._count >= self._hosting.compared or now - self._first >= self._hosting.patience
+        estimate = self._sync.estimate(now)
+        if self.site is not None or not self._waiting or not enough or estimate is None:
+            return
+        self.offset = estimate.offset
+        t, epoch = self.site_time(now), self._waiting[-1].epoch
+        self.site = self._make(t)
+        self.site.join(epoch, MET, now=t)
+        for orders in self._waiting:
+            self._hear(orders, now)
+        self._waiting.clear()
+
+    def _hear(self, orders: O, now: float) -> None:
+        assert self.site is not None
+        estimate = self._sync.estimate(now)
+        assert estimate is not None
+        # What the operator stamped at a time of its own clock, the site's clock read then.
+        correction = self.offset - estimate.offset + self._hosting.lead
+        self.site.receive(orders, now=self.site_time(now), correction=correction, uncertainty=estimate.uncertainty)
+
+    def advance(self, *, now: float) -> tuple[R | Ping, ...]:
+        """Do what is due by now [s], and say what is to be sent to the operator."""
+        messages, self._unsent = self._unsent, []
+        if self.site is not None:
+            messages += self.site.advance(now=self.site_time(now))
+        if self._next and (self.site is None or self._stands(now)):
+            messages.clear()
+            self._begin(now)
+        probe = None if self._trips is None else self._trips.to_send(now=now)
+        if probe is not None:
+            messages.append(Ping(probe.sequence + 1, probe.sent))
+        self._now = now
+        return tuple(messages)
+
+    def next_deadline(self) -> float:
+        """When there's something to do, by the robot's clock [s]; infinite while nobody is there."""
+        times = [math.inf]
+        if self.site is not None:
+            times.append(self.site.next_deadline() - self.offset - self._hosting.lead)
+        if self._trips is not None:
+            times.append(self._trips.next_deadline())
+        if self._next and self.site is not None:
+            times.append(self._now + 0.01)
+        if self._unsent:
+            times.append(self._now)
+        return min(times)
+
+    def _stands(self, now: float) -> bool:
+        """Whether the body's references rest already at the robot's time now."""
+        assert self.site is not None
+        return self.site.rests(now=now + self.offset)
+
+    def halt(self, reason: str, *, now: float) -> None:
+        """Stop, and wait for a new epoch."""
+        if self.site is not None:
+            self.site.halt(reason, now=self.site_time(now))
+
+    @property
+    def uncertainty(self) -> float:
+        """Bound on the error of what is taken for the operator's clock [s]; infinite if nothing is known."""
+        estimate = self._sync.estimate(self._now)
+        return math.inf if estimate is None else estimate.uncertainty

@@ -1,0 +1,127 @@
+"""The station of a mobile robot in a real browser: driving it, stopping it, watching it, losing it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from axe_core_python.sync_playwright import Axe
+
+from tests.interfaces.live_rig import Child, child
+from tests.interfaces.station.opened import Page, paged, station
+
+SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--delay", "constant:0.05", "--port", "0")
+"""Its robot waits for a machine that is busy."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Child]:
+    with child(*SERVE) as running:
+        yield running
+
+
+@pytest.fixture
+def page(browser: Any, server: Child) -> Iterator[Page]:
+    with paged(browser, station(server)) as opened:
+        opened.open()
+        opened.wait("Boolean(station.session.state.real)")
+        yield opened
+
+
+def postures(page: Page) -> tuple[list[float], list[float]]:
+    """Of the virtual and of the real robot."""
+    state = page.get("station.session.state")
+    return state["virtual"], state["real"]
+
+
+def gone(page: Page, since: tuple[list[float], list[float]]) -> list[float]:
+    """How far both robots went [m]."""
+    return [math.dist(now[:2], then[:2]) for now, then in zip(postures(page), since, strict=True)]
+
+
+def rest(page: Page) -> None:
+    page.wait("station.session.state.command[0] === 0 && station.session.state.command[1] === 0")
+    page.until(lambda: math.dist(*(posture[:2] for posture in postures(page))) < 0.03)
+
+
+def test_keys_and_stick_drive_both_robots_and_the_space_bar_stops_them(page: Page) -> None:
+    assert "Take control first" in page.page.locator("#drive-needs").text_content()
+    page.page.keyboard.press("ArrowUp")
+    page.take_control()
+    start = postures(page)
+    page.page.keyboard.down("ArrowUp")
+    page.until(lambda: min(gone(page, start)) > 0.2)
+    page.page.keyboard.down("KeyA")
+    page.until(lambda: page.get("station.session.state.command[1]") > 0.3)
+    page.shoot("drive")
+    page.page.keyboard.press("Space")
+    page.wait("document.getElementById('alert').textContent === 'Stopping'")
+    rest(page)
+    for key in ("KeyA", "ArrowUp"):
+        page.page.keyboard.up(key)
+    between = postures(page)
+    stick = page.page.locator(".stick").bounding_box()
+    page.page.mouse.move(stick["x"] + 52, stick["y"] + 52)
+    page.page.mouse.down()
+    page.page.mouse.move(stick["x"] + 52, stick["y"] + 90, steps=3)
+    page.until(lambda: min(gone(page, between)) > 0.1)
+    assert page.get("station.session.state.command[0]") < 0
+    page.page.mouse.up()
+    rest(page)
+    assert page.get("station.session.state.path_error") < 0.05
+
+
+def test_another_page_watches_and_takes_over_once_it_may(browser: Any, server: Child, page: Page) -> None:
+    page.take_control()
+    with paged(browser, station(server)) as other:
+        other.open()
+        other.wait("document.getElementById('control-pill').textContent.includes('has control')")
+        before = postures(other)
+        other.page.keyboard.down("KeyW")
+        other.page.wait_for_timeout(500)
+        other.page.keyboard.up("KeyW")
+        assert max(gone(other, before)) < 0.02
+        page.page.click("#give")
+        other.wait("!document.getElementById('take').hidden")
+        other.take_control()
+        button = other.page.locator("button[aria-label='Turn left']")
+        button.hover()
+        other.page.mouse.down()
+        other.until(lambda: postures(other)[1][2] > before[1][2] + 0.2)
+        other.page.mouse.up()
+        rest(other)
+        assert not page.get("station.session.holds")
+
+
+def test_the_way_is_changed_on_the_fly_and_plots_are_drawn(page: Page) -> None:
+    page.take_control()
+    page.page.click("#tab-network")
+    page.page.fill("#net-delay-forward", "constant:0.2")
+    page.page.click("#net-apply")
+    page.wait("station.session.network?.forward.delay === 'constant:0.2'")
+    page.page.click("#tab-deviation")
+    page.page.keyboard.down("ArrowUp")
+    page.wait("station.session.state.time_difference > 0.25", 30.0)
+    page.wait("document.querySelectorAll('.plot-area canvas').length >= 3")
+    page.wait("/[0-9]/.test(document.getElementById('value-time-difference').textContent)")
+    page.page.keyboard.up("ArrowUp")
+    page.shoot("drive-plots")
+    for scheme in ("light", "dark"):
+        page.page.emulate_media(color_scheme=scheme)
+        for tab in ("drive", "deviation", "network"):
+            page.page.click(f"#tab-{tab}")
+            found = Axe().run(page.page)["violations"]
+            grave = [fault["id"] for fault in found if fault["impact"] in ("serious", "critical")]
+            assert grave == [], (scheme, tab, grave)
+
+
+def test_a_server_that_is_gone_shows_and_a_stop_waits(server: Child, page: Page) -> None:
+    """The last one: there's no server any more."""
+    page.breaks = True
+    server.process.kill()
+    page.wait("station.session.link === 'lost'", 10.0)
+    assert "Lost" in page.page.locator("#banner").text_content()
+    page.page.keyboard.press("Space")
+    page.wait("document.getElementById('stop-note').textContent.includes('no connection')")

@@ -1,0 +1,121 @@
+"""A mobile robot's hub: who may drive, what is carried out, and what clients are told."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from interfaces.messages import Order, Outcome
+from interfaces.stream import Encoding
+from interfaces.stream.access import OPEN, Access
+from interfaces.stream.client import ClientCore, Phase
+from interfaces.stream.control import Problem
+from interfaces.stream.driving import DriveServlet, DriveSite
+from interfaces.stream.hub import Hub, HubConfig
+from interfaces.stream.mobile import Postures
+from interfaces.stream.session import Session
+from robots.onboard.driving import Drive, Posture
+from robots.onboard.lease import Ended, Grant, Lease
+from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from vrs import DriveCommand, Stop
+from vrs.commands import PositionQuery
+
+
+class Robot:
+    """What a lease does to a robot: nothing."""
+
+    def began(self, grant: Grant, *, now: float) -> None: ...
+
+    def ended(self, ended: Ended, *, now: float) -> None: ...
+
+    def resume(self, epoch: int, *, now: float) -> str:
+        return ""
+
+
+def met() -> Rig:
+    rig = Rig()
+    rig.begin()
+    return rig
+
+
+def ordered(servlet: DriveServlet, number: int, command: Any, now: float) -> Outcome:
+    servlet.receive(Order(number, command, 1), now=now)
+    (outcome,) = servlet.advance(now=now)
+    assert isinstance(outcome, Outcome)
+    return outcome
+
+
+def test_what_is_ordered_is_driven_and_nothing_else() -> None:
+    rig = met()
+    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: "")
+    now = rig.now
+    assert ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), now).refusal == ""
+    rig.run(0.2)
+    assert rig.operator.site.before.v > 0
+    assert "leave out execute_at" in ordered(servlet, 2, DriveCommand(0.3, 0.0, 0.3, execute_at=5.0), now).refusal
+    assert "drive and stop" in ordered(servlet, 3, PositionQuery(), now).refusal
+    assert ordered(servlet, 4, None, now).refusal
+    assert ordered(servlet, 6, Stop(), now).refusal == ""
+    assert "before a stop" in ordered(servlet, 5, DriveCommand(0.3, 0.0, 0.3), now).refusal
+    assert "stopped" in ordered(servlet, 7, DriveCommand(0.3, 0.0, 0.3), now).refusal
+    rig.run(1.0)
+    assert rig.operator.stands
+
+
+def test_who_isnt_admitted_drives_nothing() -> None:
+    rig = met()
+    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: "no lease: acquire it first")
+    assert "no lease" in ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), rig.now).refusal
+    rig.run(0.5)
+    assert rig.operator.stands
+
+
+@pytest.fixture
+def hub() -> Hub:
+    site = DriveSite(met().operator, MODEL, room="Empty room")
+    return Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), welcome=site.welcome)
+
+
+def said(session: Session, *messages: dict[str, Any], now: float = 5.0) -> list[dict[str, Any]]:
+    """What a client hears that says something."""
+    for message in messages:
+        session.receive(json.dumps(message), now=now)
+    session._desk.advance(now=now)  # type: ignore[attr-defined]
+    return [json.loads(data) for data in session.advance(now=now)]
+
+
+HELLO = {"type": "hello", "protocol": 1, "role": "operator", "name": "Ada"}
+
+
+def test_a_client_is_told_what_it_may_ask_for_and_where_both_robots_are(hub: Hub) -> None:
+    session = hub.open(Encoding.JSON, now=5.0)
+    (welcome,) = said(session, HELLO)
+    assert welcome["type"] == "mobile-welcome"
+    assert welcome["limits"]["v_max"] == MODEL.limits.v_max
+    assert (welcome["period"], welcome["holds"], welcome["room"]) == (0.1, 0.3, "Empty room")
+    here = Posture(1.0, 2.0, 0.5)
+    hub.show(Postures(1, 5.0, here, Drive(0.0, 0.0), here))
+    (told,) = said(session, now=5.1)
+    assert (told["type"], told["virtual"]) == ("postures", [1.0, 2.0, 0.5])
+    answers = said(session, {"type": "follow", "number": 1, "form": "segments"}, now=5.2)
+    assert answers[0]["code"] == "not-allowed"
+    command = {"type": "drive", "v": 0.1, "w": 0, "duration": 1}
+    order = {"type": "order", "number": 1, "epoch": "1", "command": command}
+    assert "no lease" in said(session, order, now=5.3)[0]["refusal"]
+    lease = said(session, {"type": "acquire", "number": 1}, now=5.4)[0]
+    order |= {"number": 2, "epoch": lease["epoch"]}
+    assert "refusal" not in said(session, order, now=5.5)[0]
+
+
+def test_a_client_for_arms_is_told_that_there_is_none(hub: Hub) -> None:
+    core, session = ClientCore(), hub.open(Encoding.MSGPACK, now=5.0)
+    core.connected(now=0.0)
+    for data in core.advance(now=0.0):
+        session.receive(data, now=5.0)
+    for data in session.advance(now=5.0):
+        core.receive(data, now=0.0)
+    assert core.phase is Phase.CLOSED
+    assert isinstance(core.problem, Problem)
+    assert "mobile robot ipr" in core.problem.text

@@ -1,0 +1,103 @@
+"""Both sites of a mobile robot in virtual time, with an emulated link and a body between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.teleop.architectures import Constants, RobotSite, controller
+from interfaces.teleop.driving import DriveLine, DrivenConfig, DrivenHost, DrivenRobot, DrivingOperator
+from interfaces.teleop.hosting import HostConfig
+from robots import ipr
+from robots.ipr.bare import BareBody
+from robots.ipr.parameters import IPR_LIMITS
+from robots.ipr.position import FusedPosition
+from robots.onboard import WatchdogConfig
+from robots.onboard.driving import Posture
+
+TURN = 0.01
+CONTROL = 5
+"""Turns of a control period."""
+MODEL = ipr.model()
+
+
+class Rig:
+    """Session time goes on by `run`; the robot's clock is `AHEAD` of it."""
+
+    AHEAD = 123.25
+
+    def __init__(self, delay: str = "constant:0.1", *, hold: bool = False, architecture: str = "timeline") -> None:
+        self.k = 0
+        self.body = BareBody("ipr", (1.0, 2.0, 0.5), rng=3)
+        self.position = FusedPosition(self.body)
+        self.architecture = architecture
+        watchdog = None if hold else WatchdogConfig(max_uncertainty=1.0)
+        self.config = DrivenConfig(watchdog=watchdog)
+        self.operator = DrivingOperator(MODEL, Posture(0.0, 0.0, 0.0), now=0.0)
+        way = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
+        self.line = DriveLine(self.operator, way, np.random.default_rng(1))
+        self.line.connected = True
+        self.host = DrivenHost(self._site, HostConfig(lead=0.0), now=self.AHEAD, seed=1)
+        assert self.host.hello("me", now=self.AHEAD) == ""
+        self.drives: list[tuple[float, float]] = []
+        """What the body was told, a control period each."""
+
+    def _site(self, t: float) -> DrivenRobot:
+        return DrivenRobot(self._made, self.position, IPR_LIMITS, now=t, config=self.config)
+
+    def _made(self, start: Posture, since: float) -> RobotSite:
+        assert since >= 0.0
+        return RobotSite(
+            controller(self.architecture, start, Constants()), self.position, IPR_LIMITS, period=CONTROL * TURN
+        )
+
+    @property
+    def now(self) -> float:
+        return self.k * TURN
+
+    @property
+    def robot(self) -> DrivenRobot:
+        assert self.host.site is not None
+        return self.host.site
+
+    @property
+    def truth(self) -> tuple[float, float, float]:
+        return self.body.truth
+
+    def run(self, seconds: float, each: Callable[[float], object] = lambda _: None) -> None:
+        """Let so much time pass; `each` is called with the session time before every turn."""
+        for _ in range(round(seconds / TURN)):
+            now, own = self.now, self.now + self.AHEAD
+            each(now)
+            for message in self.line.advance(now=now):
+                self.host.receive(message, now=own)
+            if self.k % CONTROL == 0:
+                drive = self.host.drive(now=own)
+                self.drives.append(drive)
+                self.body.drive(drive.v, drive.w, round(CONTROL * TURN / self.body.reality.dt))
+            for answer in self.host.advance(now=own):
+                if self.line.connected:
+                    self.line.receive(answer, now=now)
+            self.k += 1
+
+    def begin(self) -> None:
+        """Meet, and begin a drive."""
+        self.run(3.5)
+        assert self.operator.resume(now=self.now) == ""
+        self.run(0.5)
+        assert not self.robot.halted
+
+    def wish(self, v: float, w: float) -> Callable[[float], None]:
+        """What wishes that, turn by turn."""
+
+        def each(now: float) -> None:
+            assert self.operator.wish(v, w, issued_at=now, now=now) == ""
+
+        return each
+
+    def apart(self) -> float:
+        """How far the real robot is from the virtual one [m]."""
+        return math.dist(self.truth[:2], self.operator.virtual(self.now)[:2])
