@@ -40,10 +40,12 @@ $(BENCH_STAMP): $(STAMP)
 	@touch $@
 
 # A million random edits of every kind, each held to every law; VRS_SOAK_EDITS and VRS_SOAK_SEED change what is drawn.
+# A million packets of RSP over ten bad links, against a model; a million fuzzed datagrams for each core.
 soak: export VRS_SOAK_EDITS ?= 1000000
 soak: $(DEV_STAMP)
 	$(PY) tests/vrs/test_soak.py
 	$(PY) -m pytest tests/vrs/test_machine.py
+	VRS_SOAK_PACKETS=100000 VRS_SOAK_DATAGRAMS=500000 $(PY) -m pytest tests/interfaces/rsp/test_exchange.py tests/interfaces/rsp/test_fuzz.py
 
 # The wheel, in an empty environment outside the checkout, does the main job.
 wheel: $(DEV_STAMP)

@@ -19,6 +19,7 @@ from interfaces.cli.link import link
 from interfaces.cli.replay import replay
 from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
+from interfaces.cli.rsp import rsp
 from interfaces.cli.run import run
 from interfaces.cli.serve import serve
 from interfaces.software import software
@@ -47,6 +48,7 @@ app.command()(reproduce)
 app.command()(robot)
 app.command()(run)
 app.command()(serve)
+app.add_typer(rsp)
 
 
 def _version(value: bool) -> None:

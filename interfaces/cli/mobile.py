@@ -44,7 +44,11 @@ Architecture: TypeAlias = Annotated[
 ]
 RoomName: TypeAlias = Annotated[
     str,
-    typer.Option("--room", metavar="NAME|FILE", help="Of an ipr, where it drives: a room's name, or a .room file."),
+    typer.Option(
+        "--room",
+        metavar="NAME|FILE",
+        help="Of an ipr or with --rsp, where it drives: a room's name, or a .room file.",
+    ),
 ]
 
 

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="doulgeri, han2001, or all for every paper.")],
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="doulgeri, han2001, kim2006, or all for every paper.")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where PAPER.json and the figures go.")],
     seed: Annotated[
         int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="Seed of everything random.")
@@ -32,7 +34,7 @@ def reproduce(
             min=2,
             max=3600,
             metavar="S",
-            help="Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001.",
+            help="Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001, 30 for kim2006.",
         ),
     ] = None,
     workers: Annotated[

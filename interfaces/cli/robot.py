@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,6 +16,7 @@ from interfaces.cli.mobile import (
     Architecture,
     RobotName,
     RoomName,
+    room_of,
     run_mobile,
     without,
 )
@@ -27,6 +29,18 @@ if TYPE_CHECKING:
 
 
 def robot(
+    rsp: Annotated[
+        str | None,
+        typer.Option(
+            "--rsp",
+            metavar="HOST:PORT",
+            help="Be a thin client instead, CUBO, that is driven by RSP over UDP here.",
+        ),
+    ] = None,
+    rsp_model: Annotated[
+        Path | None,
+        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than CUBO's own."),
+    ] = None,
     listen: Annotated[
         str,
         typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
@@ -79,6 +93,13 @@ def robot(
     ] = False,
 ) -> None:
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
+    if rsp is not None:
+        from interfaces.cli.thin_client import thin_client
+
+        thin_client(rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
+        return
+    if rsp_model is not None:
+        raise InvalidValueError("--model", str(rsp_model), "given with --rsp only")
     import uvloop
 
     from interfaces.link.proxy import parse_address

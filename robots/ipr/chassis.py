@@ -40,6 +40,36 @@ class Lump:
 
 
 @dataclass(frozen=True, slots=True)
+class Limb:
+    """A homogeneous box on a revolute joint of the chassis, with a servo: an arm, a head that tilts."""
+
+    name: str
+    joint: Point
+    """Where its axis is, in the robot's frame [m]."""
+    axis: Point
+    """Of the joint, a unit vector in the robot's frame."""
+    size: Point
+    """Lengths along x, y, z at angle 0 [m]."""
+    centre: Point
+    """Of the box, from the joint at angle 0 [m]."""
+    mass: float
+    """[kg]."""
+    low: float
+    """Least angle [rad]."""
+    high: float
+    """Greatest angle [rad]."""
+    speed: float
+    """Of its servo at most [rad/s]."""
+    torque: float
+    """Of its servo at most [N m]."""
+
+    def inertia(self) -> list[float]:
+        """Principal inertias about the box's centre [kg m²]."""
+        x, y, z = (s * s for s in self.size)
+        return [self.mass * sums / 12 for sums in (y + z, x + z, x + y)]
+
+
+@dataclass(frozen=True, slots=True)
 class Chassis:
     """One robot's body; lengths [m], masses [kg]."""
 
@@ -86,11 +116,13 @@ class Chassis:
     sonar_height: float
     sonar_reach: tuple[float, float] = (0.1, 3.0)
     """Nearest and farthest distance that a sonar tells [m]."""
+    limbs: tuple[Limb, ...] = ()
+    """What turns on it, beside wheels and casters; their joints come after those."""
 
     @property
     def mass(self) -> float:
         """All of it [kg]."""
-        moving = 2 * self.wheel_mass + len(self.casters) * self.caster_mass
+        moving = 2 * self.wheel_mass + len(self.casters) * self.caster_mass + sum(limb.mass for limb in self.limbs)
         return sum(lump.mass for lump in self.lumps) + moving
 
     @property

@@ -39,7 +39,8 @@ CLOTH: Final = (0.30, 0.36, 0.52)
 SKIN: Final = (0.86, 0.68, 0.56)
 
 
-def _box(low: ArrayLike, high: ArrayLike) -> Any:
+def box(low: ArrayLike, high: ArrayLike) -> Any:
+    """Make a box from its lowest to its highest corner [m]."""
     import trimesh
 
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -48,7 +49,7 @@ def _box(low: ArrayLike, high: ArrayLike) -> Any:
     return trimesh.creation.box(extents=high - low, transform=pose)
 
 
-def _rounded(bounds: tuple[float, float, float, float], low: float, high: float, corner: float, edge: float) -> Any:
+def rounded(bounds: tuple[float, float, float, float], low: float, high: float, corner: float, edge: float) -> Any:
     """Make an upright block over (x low, x high, y low, y high), corners round, top and bottom edges broken."""
     x0, x1, y0, y1 = bounds
     middle, a, b = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2, (y1 - y0) / 2
@@ -63,12 +64,10 @@ def _ipr_body() -> LinkShape:
     half = body.width / 2
     build = Builder("body", WHITE)
     arch = body.wheel_base / 2 - body.wheel_width / 2 - 0.004
-    build.add(_rounded((back + 0.012, front - 0.012, -arch, arch), 0.050, 0.215, 0.03, 0.006), DARK)
-    build.add(_rounded((back, front, -half, half), 0.205, 0.385, 0.06, 0.008))
-    build.add(
-        _rounded((back + 0.006, front - 0.006, -half + 0.006, half - 0.006), 0.380, 0.400, 0.055, 0.002), BLUE
-    )
-    build.add(_rounded((back, front, -half, half), 0.395, 0.500, 0.06, 0.010))
+    build.add(rounded((back + 0.012, front - 0.012, -arch, arch), 0.050, 0.215, 0.03, 0.006), DARK)
+    build.add(rounded((back, front, -half, half), 0.205, 0.385, 0.06, 0.008))
+    build.add(rounded((back + 0.006, front - 0.006, -half + 0.006, half - 0.006), 0.380, 0.400, 0.055, 0.002), BLUE)
+    build.add(rounded((back, front, -half, half), 0.395, 0.500, 0.06, 0.010))
     middle = body.centre_x
     build.add(
         loft(
@@ -81,8 +80,8 @@ def _ipr_body() -> LinkShape:
         )
     )
     # The display's face leans back over the sloping front.
-    screen = _box((-0.006, -0.125, -0.080), (0.006, 0.125, 0.080))
-    glass = _box((0.005, -0.112, -0.067), (0.009, 0.112, 0.067))
+    screen = box((-0.006, -0.125, -0.080), (0.006, 0.125, 0.080))
+    glass = box((0.005, -0.112, -0.067), (0.009, 0.112, 0.067))
     lean = np.array([[0.78, 0.0, -0.626], [0.0, 1.0, 0.0], [0.626, 0.0, 0.78]])
     lean /= np.linalg.norm(lean, axis=0)
     pose = np.eye(4)
@@ -92,7 +91,7 @@ def _ipr_body() -> LinkShape:
         build.add(part, colour)
     build.add(lathe([(0.040, 0.640), (0.034, 0.675)], at=(middle - 0.03, 0, 0)), DARK)
     head = middle - 0.03
-    build.add(_rounded((head - 0.050, head + 0.050, -0.105, 0.105), 0.670, body.height, 0.030, 0.008))
+    build.add(rounded((head - 0.050, head + 0.050, -0.105, 0.105), 0.670, body.height, 0.030, 0.008))
     for side in (-1, 1):
         eye = (head + 0.046, side * 0.058, 0.712)
         build.add(drum(0.024, 0.0, 0.016, at=eye, axis="x", edge=0.003), DARK)
@@ -130,21 +129,21 @@ def _micro_body() -> LinkShape:
     side = MICRO.length / 2
     build = Builder("body", DARK)
     inner = MICRO.wheel_base / 2 - MICRO.wheel_width / 2 - 0.001
-    build.add(_rounded((-side, side, -inner, inner), MICRO.ground_clearance, 0.046, 0.004, 0.001), STEEL)
+    build.add(rounded((-side, side, -inner, inner), MICRO.ground_clearance, 0.046, 0.004, 0.001), STEEL)
     build.add(
-        _rounded((-side + 0.002, side - 0.002, -side + 0.002, side - 0.002), 0.045, 0.050, 0.003, 0.001), BOARD
+        rounded((-side + 0.002, side - 0.002, -side + 0.002, side - 0.002), 0.045, 0.050, 0.003, 0.001), BOARD
     )
-    build.add(_rounded((-0.025, 0.025, -0.025, 0.025), 0.049, 0.060, 0.003, 0.001), DARK)
-    build.add(_rounded((-side, side, -side, side), 0.059, MICRO.height - 0.0015, 0.004, 0.001), WHITE)
-    build.add(_rounded((-0.006, side - 0.004, -0.010, 0.010), 0.070, MICRO.height, 0.003, 0.0005), BLUE)
-    build.add(_rounded((-side + 0.004, -0.012, -0.028, 0.028), 0.070, MICRO.height, 0.003, 0.0005), NEW)
+    build.add(rounded((-0.025, 0.025, -0.025, 0.025), 0.049, 0.060, 0.003, 0.001), DARK)
+    build.add(rounded((-side, side, -side, side), 0.059, MICRO.height - 0.0015, 0.004, 0.001), WHITE)
+    build.add(rounded((-0.006, side - 0.004, -0.010, 0.010), 0.070, MICRO.height, 0.003, 0.0005), BLUE)
+    build.add(rounded((-side + 0.004, -0.012, -0.028, 0.028), 0.070, MICRO.height, 0.003, 0.0005), NEW)
     for x in (-1, 1):
         for y in (-1, 1):
             build.add(drum(0.0025, 0.048, 0.062, at=(x * 0.029, y * 0.029, 0), edge=0.0003), STEEL)
     return build.shape()
 
 
-def _wheel(name: str, body: Chassis, outside: int) -> LinkShape:
+def wheel(name: str, body: Chassis, outside: int) -> LinkShape:
     """Build a driven wheel: tyre, rim and five spokes' bolts on its outer side (+1 is left)."""
     r, w = body.wheel_radius, body.wheel_width / 2
     build = Builder(name, RUBBER)
@@ -163,7 +162,7 @@ def _wheel(name: str, body: Chassis, outside: int) -> LinkShape:
     return build.shape()
 
 
-def _caster(name: str, body: Chassis) -> LinkShape:
+def caster(name: str, body: Chassis) -> LinkShape:
     """Build a caster: a swivelling fork with its wheel, or a ball in a cup."""
     r, trail = body.caster_radius, body.caster_trail
     build = Builder(name, STEEL)
@@ -200,9 +199,9 @@ def shapes(kind: str = "ipr") -> tuple[LinkShape, ...]:
     body = chassis(kind)
     return (
         _ipr_body() if body is IPR else _micro_body(),
-        _wheel("right wheel", body, -1),
-        _wheel("left wheel", body, 1),
-        *(_caster(f"caster {k + 1}", body) for k in range(len(body.casters))),
+        wheel("right wheel", body, -1),
+        wheel("left wheel", body, 1),
+        *(caster(f"caster {k + 1}", body) for k in range(len(body.casters))),
     )
 
 
@@ -225,18 +224,19 @@ def links(kind: str, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters
     x, y, theta = as_posture("posture", posture)
     right, left = finite_array("wheels", wheels, (2,), "two finite angles [rad]").tolist()
     swivels = finite_array("casters", casters, (2,), "two finite angles [rad]").tolist()
-    X_WR = _upright(x, y, theta)
+    X_WR = upright(x, y, theta)
     poses = [X_WR]
     for angle, side in ((right, -0.5), (left, 0.5)):
         c, s = math.cos(angle), math.sin(angle)
         y, z = side * body.wheel_base, body.wheel_radius
         turned = np.array([[c, 0, s, 0], [0, 1, 0, y], [-s, 0, c, z], [0, 0, 0, 1.0]])
         poses.append(X_WR @ turned)
-    poses += [X_WR @ _upright(*at, angle) for at, angle in zip(body.casters, swivels, strict=True)]
+    poses += [X_WR @ upright(*at, angle) for at, angle in zip(body.casters, swivels, strict=True)]
     return frozen_array(np.stack(poses))
 
 
-def _upright(x: float, y: float, angle: float) -> Array:
+def upright(x: float, y: float, angle: float) -> Array:
+    """Return the pose of a frame on the floor at (x, y) [m] that is turned by an angle [rad], (4, 4)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
@@ -247,7 +247,7 @@ def room_shapes(room: Room) -> tuple[LinkShape, ...]:
     Those that come and go are there too; `Block.stands` tells when.
     """
     build = Builder("floor", GROUND)
-    build.add(_box((-0.1, -0.1, -0.02), (room.length + 0.1, room.width + 0.1, 0.0)))
+    build.add(box((-0.1, -0.1, -0.02), (room.length + 0.1, room.width + 0.1, 0.0)))
     return (build.shape(), *(_thing(thing) for thing in room.things))
 
 
@@ -260,11 +260,11 @@ def _thing(thing: Block | Column) -> LinkShape:
         return build.shape()
     a, b = thing.length / 2, thing.width / 2
     if wall:
-        body = _box((-a, -b, 0.0), (a, b, thing.height))
+        body = box((-a, -b, 0.0), (a, b, thing.height))
     else:
         edge = min(0.01, a / 4, b / 4, thing.height / 4)
-        body = _rounded((-a, a, -b, b), 0.0, thing.height, 2 * edge, edge)
-    body.apply_transform(_upright(thing.x, thing.y, thing.angle))
+        body = rounded((-a, a, -b, b), 0.0, thing.height, 2 * edge, edge)
+    body.apply_transform(upright(thing.x, thing.y, thing.angle))
     build.add(body)
     return build.shape()
 

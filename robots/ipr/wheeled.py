@@ -54,6 +54,8 @@ class _Link:
     friction: float
     resistance: float
     """Coulomb friction of the joint [N m]."""
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Centre of mass, from the joint [m]."""
 
 
 def _disc(mass: float, radius: float, width: float, rotor: float = 0.0) -> list[float]:
@@ -90,6 +92,11 @@ def _links(chassis: Chassis, reality: MobileReality, radii: tuple[float, float],
         place = (-trail, 0.0, chassis.caster_lift - r)
         axle = (0.0, 1.0, 0.0)
         links.append(_Link(half, r, place, len(links), axle, _disc(half, r, r), reality.friction, resistance))
+    links += [
+        # Held by its servo until somebody moves it.
+        _Link(limb.mass, 0.0, limb.joint, 0, limb.axis, limb.inertia(), 0.0, limb.torque, limb.centre)
+        for limb in chassis.limbs
+    ]
     return links
 
 
@@ -145,7 +152,7 @@ def load_chassis(
         linkVisualShapeIndices=[-1] * n,
         linkPositions=[list(link.position) for link in links],
         linkOrientations=[_FLAT] * n,
-        linkInertialFramePositions=[[0.0, 0.0, 0.0]] * n,
+        linkInertialFramePositions=[list(link.centre) for link in links],
         linkInertialFrameOrientations=[_FLAT] * n,
         linkParentIndices=[link.parent for link in links],
         linkJointTypes=[bullet.JOINT_FIXED if link.axis is None else bullet.JOINT_REVOLUTE for link in links],

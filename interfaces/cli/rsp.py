@@ -1,0 +1,146 @@
+"""`vrs rsp`: robot models, and the code that is generated from them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from interfaces.rsp.model import Element, RobotModel
+
+rsp = typer.Typer(name="rsp", rich_markup_mode=None)
+model = typer.Typer(name="model", rich_markup_mode=None)
+rsp.add_typer(model, help="Robot models: new, show, check.")
+
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.xmi", help="A robot model.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write it as JSON on standard output.")]
+
+
+@rsp.callback()
+def _rsp() -> None:
+    """The robot simulacrum protocol: robot models, and code generated from them."""
+
+
+@model.command()
+def new(
+    file: Annotated[Path, typer.Argument(metavar="MODEL.xmi", help="Where it goes; nothing may be there.")],
+    name: Annotated[str, typer.Option("--name", metavar="NAME", help="Of the robot: a to z, digits, _.")] = "rover",
+    model_id: Annotated[int, typer.Option("--id", metavar="N", help="Model ID, 0 to 65535.")] = 1,
+) -> None:
+    """Write a small model with one element of each kind, to begin with."""
+    from interfaces.rsp.model import example, write_model
+    from vrs.errors import FormatError
+
+    text = write_model(example(name, model_id))
+    try:
+        with file.open("xb") as target:
+            target.write(text)
+    except OSError as error:
+        raise FormatError(str(file), f"can't be written: {error.strerror}") from None
+    typer.echo(f"Wrote {file}")
+
+
+@model.command()
+def show(file: ModelFile, as_json: AsJson = False) -> None:
+    """Show a model: its device map and the payloads of its elements."""
+    from interfaces.rsp.model import read_model
+
+    facts = _facts(read_model(file))
+    if as_json:
+        typer.echo(json.dumps(facts, indent=2))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"{facts['name']}, model ID {facts['id']}, a map of {facts['map_bytes']} bytes"
+    table = Table(title=title, title_justify="left")
+    for column in ("bit", "element", "kind", "down [B]", "up [B]", "values"):
+        table.add_column(column, justify="left" if column in ("element", "kind", "values") else "right")
+    for row in facts["elements"]:
+        table.add_row(*(("" if cell is None else str(cell)).replace("[", r"\[") for cell in row.values()))
+    Console().print(table)
+
+
+@model.command()
+def check(file: ModelFile, as_json: AsJson = False) -> None:
+    """Check a model against the metamodel, and that its elements fit together."""
+    from interfaces.rsp.model import read_model
+
+    facts = _facts(read_model(file))
+    if as_json:
+        typer.echo(json.dumps({key: value for key, value in facts.items() if key != "elements"}, indent=2))
+    else:
+        typer.echo(f"{file}: {facts['name']}, {facts['count']} elements, fine")
+
+
+@rsp.command()
+def generate(
+    file: ModelFile,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", metavar="DIR", help="Where the package goes, by the model's name; here unless given."
+        ),
+    ] = Path(),
+    as_json: AsJson = False,
+) -> None:
+    """Write the middleware and the packet handlers of a robot, as a typed Python package."""
+    from interfaces.rsp.creator import write_package
+    from interfaces.rsp.model import read_model
+
+    robot = read_model(file)
+    target = write_package(robot, out)
+    files = sorted(path.name for path in target.iterdir() if path.is_file())
+    if as_json:
+        typer.echo(json.dumps({"package": str(target), "files": files}, indent=2))
+    else:
+        typer.echo(f"Wrote {target}: {', '.join(files)}")
+
+
+def _facts(robot: RobotModel) -> dict[str, Any]:
+    from interfaces.rsp.header import SIZE
+    from interfaces.rsp.layout import Layout, Way
+
+    layout = Layout(robot)
+    rows = []
+    for index, element in enumerate(robot):
+        down, up = (layout.sizes[way][index] for way in Way)
+        rows.append(
+            {
+                "bit": index,
+                "name": element.name,
+                "kind": type(element).__name__,
+                "down_bytes": "varies" if down == -1 else down,
+                "up_bytes": "varies" if up == -1 else up,
+                "values": _values(element),
+            }
+        )
+    return {
+        "name": robot.name,
+        "id": robot.id,
+        "count": layout.count,
+        "buffers": robot.buffers,
+        "header_bytes": SIZE,
+        "map_bytes": layout.map_size,
+        "longest_down_bytes": SIZE + layout.longest[Way.DOWN],
+        "longest_up_bytes": SIZE + layout.longest[Way.UP],
+        "elements": rows,
+    }
+
+
+def _values(element: Element) -> str:
+    from interfaces.rsp.model import MemoryCommand, MemoryEvent, Module, Monitor
+
+    match element:
+        case Module():
+            return " ".join(element.members)
+        case Monitor():
+            return f"of {element.effector}"
+        case MemoryCommand() | MemoryEvent():
+            return f"{element.size} bytes at most"
+        case _:
+            unit = f" × {element.scale:g} {element.unit}" if element.unit else ""
+            return f"{element.count} {element.type}{unit}"

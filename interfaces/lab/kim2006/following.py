@@ -1,0 +1,277 @@
+"""A run of section IV-B's second experiment: CUBO is led along a path over a bad link, by one of several schemes.
+
+The local system knows the path and the newest position that came; it drives at one speed, and predicts
+nothing. All schemes have the same controller, filter, watchdog, body and link; with one seed the links
+draw alike.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from interfaces.link.conditions import Conditions, LinkConditions
+from interfaces.link.link import Link
+from interfaces.link.losses import loss_model
+from interfaces.link.profiles import delay_profile
+from interfaces.rsp.model import RobotModel, read_model
+from interfaces.rsp.schemes import scheme
+from interfaces.rsp.schemes.ends import LocalEnd, Rims, RobotEnd, Seen
+from interfaces.rsp.schemes.scheme import SchemeConfig
+from robots.cubo import parameters as p
+from robots.ipr.bare import BareBody
+from robots.ipr.chassis import Senses
+from robots.ipr.position import FusedPosition
+from robots.ipr.reality import MobileReality
+from robots.ipr.robot import MobileRobot
+from vrs.checks import number_in, one_of
+from vrs.mobile import clipped, wrapped
+from vrs.model import Array
+from vrs.path_matching import match_paths
+
+TICK: Final = 0.02
+"""Between two turns of everything, the paper's T [s]."""
+SPEED: Final = 0.15
+"""Of the robot along the path [m/s]."""
+RECOVERY: Final = 0.12
+"""λ: over what way the local system leads the robot back to the path [m]."""
+BRAKING: Final = 0.06
+"""Over what way it slows down before the path's end [m]."""
+FIRE: Final = 0.5
+"""How often it gives a command [s]."""
+AFTER: Final = 5.0
+"""A run goes on for this after the path's end [s]."""
+RESEND: Final = 0.2
+"""TCP sends again after so long [s]: the least that Linux allows, in TCP's favour."""
+BODIES: Final = ("cubo", "bare")
+"""The body in PyBullet, and the same chassis without physics."""
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """What is run."""
+
+    scheme: str = "rsp"
+    delay: str = "none"
+    """Profile of either direction, as the command line spells it."""
+    loss: float = 0.0
+    """Share of packets lost either way, in [0, 1)."""
+    seed: int = 0
+    length: float = 30.0
+    """For how long the path is [s], in [2, 3600]."""
+    body: str = "cubo"
+    bandwidth: float = math.inf
+    """Of either direction [bit/s]."""
+    adaptive: bool = False
+    """Whether RSP fits T to the link."""
+
+    def __post_init__(self) -> None:
+        scheme(self.scheme)
+        one_of("body", self.body, BODIES)
+        number_in("loss", self.loss, 0.0, 0.999)
+        number_in("length", self.length, 2.0, 3600.0, unit=" s")
+
+
+class Followed(NamedTuple):
+    """What came of a run."""
+
+    path_error: float
+    """Mean distance from the path over time [m]."""
+    path_error_max: float
+    """Largest [m]."""
+    progress: float
+    """Share of the path that was reached."""
+    age: float
+    """Mean age of what the wheels did [s], over the ticks after something came."""
+    command_age: float
+    """Mean time from giving a command to its execution [s]; of those that came."""
+    commands_missing: int
+    """Commands that were never carried out."""
+    down: float
+    """Bytes to the robot a second, without the network's headers."""
+    up: float
+    """Bytes from it a second."""
+    distance: Array
+    """From the path at each step of the match, (m,) [m]."""
+    arrivals: NDArray[np.intp]
+    """Step of the match at which each cell of 1 cm that was reached was first reached, (n,)."""
+    way: Array
+    """True positions, (k, 2) [m]."""
+    path: Array
+    """The path, (k, 2) [m]."""
+
+    def error_until(self, cells: int) -> float:
+        """Mean distance from the path until so many of its cells were reached [m]."""
+        last = int(self.arrivals[min(cells, len(self.arrivals)) - 1])
+        return float(self.distance[: last + 1].mean())
+
+
+@cache
+def cubo_model() -> RobotModel:
+    """CUBO's own model."""
+    return read_model(p.MODEL_FILE)
+
+
+def course(seed: int, length: float) -> Array:
+    """A smooth path of curves of 0.4 m in radius or more, a point a tick at `SPEED`, (k, 2) [m]."""
+    rng = np.random.default_rng([seed, 7])
+    count = round(length / TICK) + 1
+    phases, rates = rng.uniform(0, math.tau, 3), np.array([0.11, 0.23, 0.41]) * rng.uniform(0.8, 1.2, 3)
+    t = TICK * np.arange(count)
+    curvature = 2.5 * np.sin(math.tau * rates[:, None] * t + phases[:, None]).mean(axis=0)
+    heading = np.concatenate(([0.0], np.cumsum(curvature[:-1] * SPEED * TICK)))
+    steps = SPEED * TICK * np.column_stack([np.cos(heading), np.sin(heading)])[:-1]
+    return np.vstack(([0.0, 0.0], np.cumsum(steps, axis=0)))
+
+
+class PathLeader:
+    """The local system's controller: the path's own curvature, and what brings the robot back.
+
+    For l beside the path, along the way s: d²l/ds² + 2/λ dl/ds + l/λ² = 0. The robot is back after a few λ, without
+    a swing, if the position is fresh. On a curve that has no error of its own, so what is measured is the link's.
+    """
+
+    def __init__(self, path: Array) -> None:
+        """Take the path; the robot begins at its start."""
+        self._path = path
+        steps = np.diff(path, axis=0)
+        self._headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        self._curvature = np.gradient(self._headings, SPEED * TICK)
+        self._at = 0
+        self._reach = round(3 * RECOVERY / (SPEED * TICK))
+
+    def rims(self, seen: Seen) -> Rims:
+        """What the wheels are to do [mm/s], from where the robot was seen."""
+        near = self._path[self._at : self._at + self._reach] - (seen.x, seen.y)
+        self._at += int(np.einsum("ij,ij->i", near, near).argmin())
+        if self._at >= len(self._path) - 2:
+            return 0, 0
+        heading, (x, y) = float(self._headings[self._at]), self._path[self._at]
+        beside = math.cos(heading) * (seen.y - y) - math.sin(heading) * (seen.x - x)
+        angle = wrapped(seen.theta - heading)
+        left = SPEED * TICK * (len(self._path) - self._at)
+        v = SPEED * max(math.cos(angle), 0.0) * min(1.0, left / BRAKING)
+        back = clipped(beside / RECOVERY, 2.0) + 2.0 * angle
+        w = clipped(SPEED * (float(self._curvature[self._at]) - back / RECOVERY), 0.5 * p.LIMITS.w_max)
+        half = 0.5 * w * p.WHEEL_BASE
+        return round(1000 * (v - half)), round(1000 * (v + half))
+
+
+def make_body(case: Following) -> MobileRobot:
+    """The real robot of a case, at the path's start."""
+    rng, reality = np.random.default_rng([case.seed, 1]), MobileReality(dt=0.004)
+    if case.body == "bare":
+        senses = Senses(sonar=None)
+        return BareBody(p.CUBO, (0.0, 0.0, 0.0), reality=reality, rng=rng, limits=p.LIMITS, senses=senses)
+    from robots.cubo.body import CuboBody
+
+    return CuboBody((0.0, 0.0, 0.0), reality=reality, rng=rng, senses=Senses(sonar=None))
+
+
+def run(case: Following) -> Followed:
+    """Run a case; the same case gives the same to the last bit.
+
+    Raises:
+        InvalidValueError: If a name or a value isn't allowed.
+        FormatError: If a trace can't be read.
+    """
+    chosen = scheme(case.scheme)
+    bytes_rng = np.random.default_rng([case.seed, 3])
+    local, robot = chosen.ends(cubo_model(), SchemeConfig(adaptive=case.adaptive), bytes_rng.bytes)
+    conditions = Conditions(
+        delay=delay_profile(case.delay),
+        loss=loss_model(str(case.loss)),
+        service=chosen.service,
+        retransmit_after=RESEND,
+        bandwidth=case.bandwidth,
+        queue_packets=200,
+    )
+    link: Link[bytes, bytes] = Link(LinkConditions.symmetric(conditions), np.random.default_rng([case.seed, 2]))
+    with make_body(case) as body:
+        return _Run(case, local, robot, link, body, chosen.header).whole()
+
+
+class _Run:
+    """A run while it goes on."""
+
+    def __init__(
+        self,
+        case: Following,
+        local: LocalEnd,
+        robot: RobotEnd,
+        link: Link[bytes, bytes],
+        body: MobileRobot,
+        header: int,
+    ) -> None:
+        self._case, self._local, self._robot, self._link, self._body = case, local, robot, link, body
+        self._header = header
+        self._path = course(case.seed, case.length)
+        self._leader = PathLeader(self._path)
+        self._position = FusedPosition(body)
+        self._steps = round(TICK / body.reality.dt)
+        self._given: list[float] = []
+        self._ages: list[float] = []
+        self._fired: dict[int, float] = {}
+        self._down = self._up = 0
+
+    def whole(self) -> Followed:
+        """From the start until some time after the path's end."""
+        ticks = round((self._case.length + AFTER) / TICK)
+        way = []
+        for k in range(ticks):
+            way.append(self._body.truth[:2])
+            self._tick(k)
+        return self._made(np.array(way))
+
+    def _tick(self, k: int) -> None:
+        now, local, robot, link = k * TICK, self._local, self._robot, self._link
+        for arrived in link.forward.receive(now):
+            robot.receive(arrived.payload, now=now)
+        for answer in link.backward.receive(now):
+            local.receive(answer.payload, now=now)
+        if local.seen is not None:
+            local.write(self._leader.rims(local.seen), now=now)
+        if k % round(FIRE / TICK) == 0 and now < self._case.length:
+            self._given.append(now)
+            local.fire(now=now)
+        for data in local.to_send(now=now):
+            self._down += len(data)
+            link.forward.send(data, now, len(data) + self._header)
+        left, right = robot.drive(now=now)
+        for number in robot.fired():
+            self._fired.setdefault(number, now)
+        if robot.stamp is not None:
+            self._ages.append(now - robot.stamp)
+        posture = self._position.posture()
+        robot.measure(Seen(*posture))
+        for data in robot.to_send(now=now):
+            self._up += len(data)
+            link.backward.send(data, now, len(data) + self._header)
+        v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / p.WHEEL_BASE
+        self._body.drive(clipped(v, p.LIMITS.v_max), clipped(w, p.LIMITS.w_max), self._steps)
+
+    def _made(self, way: Array) -> Followed:
+        leader = np.vstack([self._path, np.repeat(self._path[-1:], len(way) - len(self._path), axis=0)])
+        match = match_paths(TICK * np.arange(len(way)), leader, way, v_max=SPEED)
+        ages = [at - self._given[number] for number, at in self._fired.items() if number < len(self._given)]
+        seconds = len(way) * TICK
+        reached = max(len(match.t_follower) - 1, 0) / max(len(match.s) - 1, 1)
+        return Followed(
+            path_error=float(match.distance.mean()),
+            path_error_max=float(match.distance.max()),
+            progress=float(reached),
+            age=float(np.mean(self._ages)) if self._ages else math.inf,
+            command_age=float(np.mean(ages)) if ages else math.inf,
+            commands_missing=len(self._given) - len(ages),
+            down=self._down / seconds,
+            up=self._up / seconds,
+            distance=match.distance,
+            arrivals=np.searchsorted(match.t, match.t_follower - 1e-9),
+            way=way,
+            path=self._path,
+        )

@@ -1,0 +1,1 @@
+"""RSP, the robot simulacrum protocol."""

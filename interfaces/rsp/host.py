@@ -1,0 +1,146 @@
+"""A body at the robot's side of RSP: elements of the model move and measure what their bindings name.
+
+Whatever the model, no code is written for it. An effector without a binding, or with one that the body hasn't got,
+is a register: its monitor tells what it was told. A sensor without one says 0.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Protocol
+
+from interfaces.rsp.model.elements import Command, Effector, Event, MemoryCommand, Scalar, Sensor
+from interfaces.rsp.outputs import Cleared, Commanded, Stored
+from interfaces.rsp.robot import RobotCore
+from interfaces.rsp.session import SLACK
+from robots.cubo.parameters import FRAGMENT_TIME
+from vrs.checks import number_in
+
+Values = tuple[float, ...]
+MOST_BEHIND: Final = 0.25
+"""How much the body makes up for at most when its host was late [s]; the rest of the time it stood still."""
+
+
+class Body(Protocol):
+    """What a host needs of a body; values are in the units of its bindings."""
+
+    def move(self, binding: str, values: Values) -> None:
+        """Let something be done from now on."""
+
+    def carry_out(self, binding: str, values: Values) -> None:
+        """Do something once."""
+
+    def sound(self, data: bytes | None) -> None:
+        """Play a fragment, or silence."""
+
+    def measure(self, binding: str) -> Values | None:
+        """What a sensor says; None where there's no such binding."""
+
+    def events(self) -> list[str]:
+        """Bindings of what happened since the last call."""
+
+    def go_on(self, steps: int = 1) -> None:
+        """Go on by steps."""
+
+    @property
+    def resting(self) -> bool:
+        """Whether it stands still."""
+
+    @property
+    def step(self) -> float:
+        """Of its physics [s]."""
+
+
+class RobotHost:
+    """Runs a body and a robot's core together; it knows no socket and no clock."""
+
+    def __init__(
+        self, core: RobotCore, body: Body, moves: frozenset[str], *, period: float = 0.016, now: float = 0.0
+    ) -> None:
+        """Join a body to a core.
+
+        Args:
+            core: Of the robot's side.
+            body: Its body.
+            moves: Bindings of effectors that the body has.
+            period: Between two looks at effectors and sensors [s], in [0.001, 1]; rounded to whole steps.
+            now: When it begins [s].
+        """
+        self.core, self.body, self.model = core, body, core.model
+        self._moves = moves
+        self._steps = max(1, round(number_in("period", period, 1e-3, 1.0, unit=" s") / body.step))
+        self.stored: dict[str, bytes] = {}
+        """Newest data of each memory command, by name."""
+        self._next = self._sound = now
+        self._speakers = [i for i, e in enumerate(self.model) if isinstance(e, Effector) and e.stream]
+        self._sensors = [(i, e) for i, e in enumerate(self.model) if isinstance(e, Sensor)]
+        self._events: dict[str, list[tuple[int, Event]]] = {}
+        for index, element in enumerate(self.model):
+            if isinstance(element, Event):
+                self._events.setdefault(element.binding, []).append((index, element))
+        self._measure()
+
+    @property
+    def period(self) -> float:
+        """Between two looks [s]."""
+        return self._steps * self.body.step
+
+    def next_deadline(self) -> float:
+        """When the body is to go on [s]."""
+        return self._next
+
+    def advance(self, *, now: float) -> None:
+        """Let the body live up to now [s]."""
+        if now - self._next > MOST_BEHIND:
+            self._next = now - MOST_BEHIND
+        while self._next <= now + SLACK:
+            self._look(self._next)
+            self.body.go_on(self._steps)
+            self._next += self.period
+            self._measure()
+
+    def _look(self, now: float) -> None:
+        """Do what the core says, and play what is due."""
+        for index, values in self.core.effectors(now=now).items():
+            element = self.model.elements[index]
+            assert isinstance(element, Effector)
+            if element.binding in self._moves:
+                self.body.move(element.binding, tuple(element.scale * value for value in values))
+        if self.core.stopping and self.body.resting:
+            self.core.rested()
+        for output in self.core.take():
+            match output:
+                case Commanded(index=index, payload=payload):
+                    self._command(index, payload)
+                case Stored(index=index, data=data):
+                    self.stored[self.model.elements[index].name] = data
+                    element = self.model.elements[index]
+                    assert isinstance(element, MemoryCommand)
+                    self.body.carry_out(element.binding or element.name, (float(len(data)),))
+                case Cleared():
+                    self.body.sound(None)
+        while self._sound <= now + SLACK:
+            self._sound += FRAGMENT_TIME
+            for index in self._speakers:
+                self.body.sound(self.core.streams.take(index))
+        for binding in self.body.events():
+            for index, event in self._events.get(binding, ()):
+                self.core.occur(index, packed(event, (1.0,) * event.count))
+
+    def _command(self, index: int, payload: bytes) -> None:
+        element = self.model.elements[index]
+        assert isinstance(element, Command)
+        values = tuple(element.scale * value for value in element.format.unpack(payload))
+        self.body.carry_out(element.binding or element.name, values)
+
+    def _measure(self) -> None:
+        for index, element in self._sensors:
+            values = self.body.measure(element.binding) if element.binding else None
+            self.core.measure(index, packed(element, values or ()))
+
+
+def packed(element: Sensor | Event | Command | Effector, values: Values) -> bytes:
+    """Values in an element's unit as they are on the wire: rounded, within its type, 0 where there are too few."""
+    low, high = element.type.bounds
+    raw = [min(max(value / element.scale, low), high) for value in values[: element.count]]
+    raw += [0.0] * (element.count - len(raw))
+    return element.format.pack(*(raw if element.type is Scalar.F32 else map(round, raw)))

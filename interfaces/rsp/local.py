@@ -1,0 +1,374 @@
+"""The local system's side of RSP: the simulacrum, and the packets that keep the robot's equal to it.
+
+A state machine of values: datagrams and times in, datagrams and outputs out. It knows no socket and no clock.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from interfaces.rsp import handshake, header
+from interfaces.rsp.errors import PacketError, RspError
+from interfaces.rsp.handshake import Open
+from interfaces.rsp.header import Header, Type
+from interfaces.rsp.layout import ID, Layout, Way
+from interfaces.rsp.model.elements import (
+    Effector,
+    Event,
+    MemoryCommand,
+    MemoryEvent,
+    Module,
+    Monitor,
+    Sensor,
+)
+from interfaces.rsp.model.robot_model import RobotModel
+from interfaces.rsp.numbers import MODULUS
+from interfaces.rsp.outbox import CommandOutbox, MemoryInbox, MemoryOutbox, Outcome, Settled
+from interfaces.rsp.outputs import Began, Ended, EndReason, LocalOutput, Occurred, Refused, Stored, Told
+from interfaces.rsp.period import PeriodConfig, PeriodControl
+from interfaces.rsp.security import TAG, Keyring, Opener, Rank, Sealer
+from interfaces.rsp.session import SLACK, Drop, Dropped, Session, milliseconds
+from interfaces.rsp.streams import StreamOutbox
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
+
+_ASKED: Final = (Sensor, Monitor, Event, Module)
+"""Kinds that are requested by their bit alone."""
+_MOST_TIMES: Final = 4096
+"""Packets whose round trip may still be measured."""
+
+
+class State(enum.StrEnum):
+    """Where a local system is."""
+
+    CLOSED = "closed"
+    OPENING = "opening"
+    OPEN = "open"
+    ENDING = "ending"
+
+
+@dataclass(frozen=True, slots=True)
+class LocalConfig:
+    """How a local system sends."""
+
+    period: PeriodConfig = field(default_factory=PeriodConfig)
+    """T, and how it's fitted."""
+    retry: float = 0.25
+    """How often it asks for a session, or for its end [s], in [0.01, 10]."""
+    patience: float = 5.0
+    """After so long it gives up asking [s], in [0.1, 600]."""
+    lifetime: float = 60.0
+    """A session in which nothing came for so long is lost [s], in [1, 120]: numbers mustn't go round in a
+    silence."""
+    timeout: float = 0.1
+    """Least time before a memory command is sent again [s], in [0.001, 10]; twice the round trip where that's
+    more."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("retry", 0.01, 10.0), ("patience", 0.1, 600.0), ("lifetime", 1.0, 120.0), ("timeout", 1e-3, 10.0),
+        ):  # fmt: skip
+            number_in(name, getattr(self, name), low, high, unit=" s")
+
+
+@dataclass(slots=True)
+class _Written:
+    """An effector's values as the simulacrum has them."""
+
+    payload: bytes
+    first: int = -1
+    """Number of the first packet that had them."""
+    known: bool = False
+    """Whether the robot has them."""
+
+
+class LocalCore:
+    """The local system of one robot."""
+
+    def __init__(
+        self,
+        model: RobotModel,
+        random_bytes: Callable[[int], bytes],
+        config: LocalConfig | None = None,
+        *,
+        keys: Keyring | None = None,
+        rank: Rank = Rank.OPERATOR,
+    ) -> None:
+        """Begin closed.
+
+        Args:
+            model: Of the robot.
+            random_bytes: So many bytes that nobody can guess.
+            config: How it sends.
+            keys: Packets are sealed with these, and only sealed ones are taken; without, all is in the clear.
+            rank: As whom it opens.
+
+        Raises:
+            InvalidValueError: If the keys have none for that rank.
+        """
+        if keys is not None and rank not in keys:
+            raise InvalidValueError("rank", rank.name.lower(), "one that there's a key for")
+        self.model, self.layout = model, Layout(model)
+        self._config = LocalConfig() if config is None else config
+        self._keys, self._rank, self._random = keys, rank, random_bytes
+        self.state = State.CLOSED
+        self.dropped = dict.fromkeys(Drop, 0)
+        """Datagrams that were dropped, by reason."""
+        self.streams = StreamOutbox(model.buffers)
+        self.period = PeriodControl(self._config.period)
+        self._outputs: list[LocalOutput] = []
+        self._asked = Open(rank, False, bytes(TAG))
+        self._session: Session | None = None
+        self._next = self._until = math.inf
+        self._heard = -math.inf
+        self._active: set[int] = set()
+        self._requested: set[int] = set()
+        self._reset()
+
+    def _reset(self) -> None:
+        self._commands, self._memory, self._inbox = CommandOutbox(), MemoryOutbox(), MemoryInbox()
+        self._written: dict[int, _Written] = {}
+        self._events: dict[int, int] = {}
+        self._times: deque[tuple[int, float]] = deque(maxlen=_MOST_TIMES)
+        self._clears = 0
+        self.round_trip: float | None = None
+        """Smoothed, the robot's own period included [s]; None before the first."""
+        self.streams = StreamOutbox(self.model.buffers)
+
+    # What the simulacrum is told.
+
+    def open(self, *, now: float, takeover: bool = False) -> None:
+        """Ask for a session.
+
+        Args:
+            now: [s].
+            takeover: Whether another's session is to end for it; with keys only an admin may.
+
+        Raises:
+            RspError: If there is one, or it's asked for.
+        """
+        if self.state is not State.CLOSED:
+            raise RspError(f"the session is {self.state.value} already")
+        self._reset()
+        self._asked = Open(self._rank, takeover, self._random(TAG))
+        self.state, self._session = State.OPENING, Session(self.model.id, 0)
+        self._next, self._until = now, now + self._config.patience
+
+    def end(self, *, now: float) -> None:
+        """End the session; what isn't acknowledged by now is reported as failed."""
+        if self.state is State.OPEN:
+            self.state, self._next, self._until = State.ENDING, now, now + self._config.patience
+        elif self.state is State.OPENING:
+            self._close(EndReason.CLOSED)
+
+    def write(self, index: int, payload: bytes) -> None:
+        """Set an effector's values, as they are on the wire."""
+        written = self._written.get(index)
+        if written is None or written.payload != payload:
+            self._written[index] = _Written(payload)
+
+    def activate(self, index: int, on: bool) -> None:
+        """Let an effector's values be in every packet, or only until the robot has them."""
+        (self._active.add if on else self._active.discard)(index)
+
+    def request(self, index: int, on: bool) -> None:
+        """Ask for a sensor, a monitor, an event or a module's members from now on, or no more."""
+        (self._requested.add if on else self._requested.discard)(index)
+
+    def command(self, index: int, values: bytes) -> int:
+        """Give a command; returns its ID, by which it's settled.
+
+        Raises:
+            FullError: If too many wait.
+        """
+        return self._commands.put(index, values)
+
+    def store(self, index: int, data: bytes, *, deadline: float) -> int:
+        """Give a memory command that must be settled by a time [s]; returns its ID.
+
+        Raises:
+            FullError: If too many wait.
+        """
+        return self._memory.put(index, data, deadline)
+
+    def play(self, index: int, data: bytes) -> None:
+        """Send data to a stream.
+
+        Raises:
+            FullError: If too much waits.
+        """
+        element = self.model.elements[index]
+        assert isinstance(element, Effector)
+        self.streams.put(index, data, element.stream)
+
+    def clear(self) -> None:
+        """Drop what waits to be played, here and at the robot."""
+        self._clears = (self._clears + 1) % 256
+        self.streams.clear()
+
+    # Packets.
+
+    def receive(self, data: bytes, *, now: float) -> None:
+        """Take a datagram; whatever it holds, nothing is raised."""
+        try:
+            self._receive(data, now)
+        except PacketError:
+            self.dropped[Drop.MALFORMED] += 1
+        except Dropped as drop:
+            self.dropped[drop.reason] += 1
+
+    def to_send(self, *, now: float) -> list[bytes]:
+        """Datagrams that are due by now [s]."""
+        self._outputs += self._memory.expire(now)
+        if self.state is State.OPEN and now - self._heard >= self._config.lifetime:
+            self._close(EndReason.LOST)
+        if self.state is State.CLOSED or now < self._next - SLACK:
+            return []
+        session = self._session
+        assert session is not None
+        if self.state is not State.OPEN and now >= self._until:
+            self._close(EndReason.CLOSED if self.state is State.ENDING else EndReason.LOST)
+            return []
+        if self.state is State.OPENING:
+            self._next = now + self._config.retry
+            head = Header(self.model.id, False, Type.OPEN, 0, milliseconds(now), 0, MODULUS - 1, 0)
+            return [handshake.sent(Type.OPEN, handshake.encode_open(self._asked), head, self._keys, self._rank)]
+        if self.state is State.ENDING:
+            self._next = now + self._config.retry
+            return [session.make(Type.END, b"", now)]
+        # From the time that was due, so that T is kept; not from one long past.
+        self._next = max(self._next + self.period.T, now + 0.5 * self.period.T)
+        return [self._down(session, now)]
+
+    def next_deadline(self) -> float | None:
+        """When something is to be sent [s]; None while closed."""
+        return None if self.state is State.CLOSED else self._next
+
+    def take(self) -> list[LocalOutput]:
+        """What happened since the last call."""
+        outputs, self._outputs = self._outputs, []
+        return outputs
+
+    def _down(self, session: Session, now: float) -> bytes:
+        number = session.number
+        payloads: dict[int, bytes] = dict.fromkeys(self._requested, b"")
+        for index, written in self._written.items():
+            if written.first < 0:
+                written.first = number
+            if not written.known or index in self._active:
+                payloads[index] = written.payload
+        self._commands.fill(payloads, number)
+        self._memory.fill(payloads, now=now, timeout=max(self._config.timeout, 2 * (self.round_trip or 0.0)))
+        self._inbox.fill(payloads, number)
+        self.streams.fill(payloads, number)
+        self._times.append((number, now))
+        return session.make(Type.DOWN, self.layout.join(payloads), now, self._clears)
+
+    def _receive(self, data: bytes, now: float) -> None:
+        head = header.decode(data)
+        if head.model != self.model.id:
+            raise Dropped(Drop.MODEL)
+        if head.encrypted != (self._keys is not None):
+            raise Dropped(Drop.DOWNGRADE)
+        session = self._session
+        if session is None or head.type not in _EXPECTED[self.state]:
+            raise Dropped(Drop.UNEXPECTED)
+        if self.state is State.OPENING:
+            self._answered(head, data, now)
+            return
+        if head.session != session.id:
+            raise Dropped(Drop.SESSION)
+        body, number = session.take(head, data)
+        if head.type is Type.ENDED:
+            session.newest, self._heard = number, now
+            self._close(EndReason.CLOSED if self.state is State.ENDING else EndReason.TAKEN)
+            return
+        payloads = self.layout.split(body, Way.UP)
+        session.newest, self._heard = number, now
+        self._acknowledged(session.acknowledged(head), head, now)
+        self._told(payloads)
+
+    def _answered(self, head: Header, data: bytes, now: float) -> None:
+        """Take an answer of the handshake."""
+        body, rank = handshake.received(data, self._keys, (self._rank,))
+        if rank is None:
+            raise Dropped(Drop.AUTHENTICATION)
+        if head.type is Type.REFUSED:
+            nonce, refusal = handshake.decode_refused(body)
+            if nonce == self._asked.nonce:
+                self._outputs.append(Refused(refusal))
+                self.state, self._session = State.CLOSED, None
+            return
+        answer = handshake.decode_answer(body)
+        if answer.nonce != self._asked.nonce:
+            raise Dropped(Drop.SESSION)
+        if head.type is Type.CHALLENGE:
+            if self._asked.cookie != answer.given:
+                self._asked, self._next = self._asked._replace(cookie=answer.given), now
+            return
+        sealer = opener = None
+        if self._keys is not None:
+            down, up = self._keys.session(self._rank, answer.nonce + answer.given, head.session)
+            sealer, opener = Sealer(down), Opener(up)
+        self._session = Session(self.model.id, head.session, sealer, opener)
+        self.state, self._heard, self._next = State.OPEN, now, now
+        self._outputs.append(Began(head.session))
+
+    def _acknowledged(self, last: int, head: Header, now: float) -> None:
+        """Take what the robot has of ours."""
+        self._outputs += self._commands.acknowledge(last)
+        self._inbox.heard(last)
+        self.streams.report(head.buffers, last)
+        for written in self._written.values():
+            if not written.known and 0 <= written.first <= last:
+                written.known = True
+        while self._times and self._times[0][0] <= last:
+            number, sent = self._times.popleft()
+            if number == last:
+                seconds = now - sent
+                self.round_trip = seconds if self.round_trip is None else 0.875 * self.round_trip + 0.125 * seconds
+                self.period.round_trip(seconds, now=now)
+
+    def _told(self, payloads: dict[int, bytes]) -> None:
+        stored = []
+        for index, payload in payloads.items():
+            element = self.model.elements[index]
+            match element:
+                case MemoryCommand():
+                    self._outputs += self._memory.acknowledge(index, payload)
+                case MemoryEvent():
+                    stored.append((index, payload))
+                case Event():
+                    self._occurred(index, payload)
+                case _:
+                    self._outputs.append(Told(index, payload))
+        self._outputs += [Stored(*item) for item in self._inbox.receive(stored)] if stored else []
+
+    def _occurred(self, index: int, payload: bytes) -> None:
+        """An event comes several times; its ID says which it is."""
+        number = ID.unpack_from(payload)[0]
+        ahead = (number - self._events.get(index, MODULUS - 1)) % MODULUS
+        if 0 < ahead < MODULUS // 2:
+            self._events[index] = number
+            self._outputs.append(Occurred(index, number, payload[ID.size :]))
+
+    def _close(self, reason: EndReason) -> None:
+        session = 0 if self._session is None else self._session.id
+        self._outputs += [Settled(item.index, item.id, Outcome.FAILED) for item in self._commands.drain()]
+        self._outputs += [Settled(item.index, item.id, Outcome.FAILED) for item in self._memory.drain()]
+        self._outputs.append(Ended(session, reason))
+        self.state, self._session = State.CLOSED, None
+
+
+_EXPECTED: Final = {
+    State.CLOSED: frozenset[Type](),
+    State.OPENING: frozenset({Type.CHALLENGE, Type.OPENED, Type.REFUSED}),
+    State.OPEN: frozenset({Type.UP, Type.ENDED}),
+    State.ENDING: frozenset({Type.ENDED}),
+}
+"""What comes in each state."""

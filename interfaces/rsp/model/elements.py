@@ -1,0 +1,249 @@
+"""The eight kinds of element that a robot model is made of, as frozen values.
+
+Source: Kim, Suh, Kim, Oh, Table I.
+"""
+
+from __future__ import annotations
+
+import enum
+import keyword
+import math
+import re
+import struct
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+from interfaces.link.conditions import whole
+from vrs.checks import finite
+from vrs.errors import InvalidValueError
+
+MOST_VALUES: Final = 1024
+"""Most values of an element."""
+MOST_BYTES: Final = 16_384
+"""Most bytes of data of a stream, a memory command or a memory event."""
+LONGEST_NAME: Final = 48
+_NAME: Final = re.compile(r"[a-z](?:_?[a-z0-9])*")
+_PLAIN: Final = re.compile(r"[ !#-&(-\[\]-~]*")
+
+
+class Scalar(enum.StrEnum):
+    """What a value is on the wire, in network order."""
+
+    I8 = "i8"
+    U8 = "u8"
+    I16 = "i16"
+    U16 = "u16"
+    I32 = "i32"
+    U32 = "u32"
+    F32 = "f32"
+
+    @property
+    def code(self) -> str:
+        """As `struct` spells it."""
+        return {"i8": "b", "u8": "B", "i16": "h", "u16": "H", "i32": "i", "u32": "I", "f32": "f"}[self.value]
+
+    @property
+    def size(self) -> int:
+        """[byte]."""
+        return int(self.value[1:]) // 8
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value."""
+        bits = int(self.value[1:])
+        if self is Scalar.F32:
+            return -3.4028234663852886e38, 3.4028234663852886e38
+        return (0, 2**bits - 1) if self.value[0] == "u" else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+class Filling(enum.StrEnum):
+    """What the motion filter makes of values that are missing."""
+
+    HOLD = "hold"
+    """The last ones again."""
+    LINEAR = "linear"
+    """What lies in between, where those after them are there; else the last ones."""
+
+
+class OnLoss(enum.StrEnum):
+    """What an effector does when nothing comes from the local system any more."""
+
+    HOLD = "hold"
+    """It keeps its values, as a posture."""
+    REST = "rest"
+    """It goes back to its initial values, as wheels to standing."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    name: str
+    """Of letters a to z, digits and underscores, as in Python."""
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+
+
+def check_name(name: object) -> None:
+    """Refuse what can't be the name of an element or a robot.
+
+    Raises:
+        InvalidValueError: If it isn't one.
+    """
+    good = isinstance(name, str) and len(name) <= LONGEST_NAME and _NAME.fullmatch(name)
+    if not good or keyword.iskeyword(str(name)):
+        allowed = f"a to z, digits and single underscores, {LONGEST_NAME} at most, and no word of Python's"
+        raise InvalidValueError("name", name, allowed)
+
+
+def _plain(what: str, element: _Named, text: object) -> None:
+    """Refuse a text that isn't short and plain: it stands in generated code, too."""
+    if not isinstance(text, str) or len(text) > LONGEST_NAME or not _PLAIN.fullmatch(text):
+        allowed = f"printable ASCII without quotes and backslashes, {LONGEST_NAME} characters at most"
+        raise InvalidValueError(f"{what} of {element.name}", text, allowed)
+
+
+def _word(element: _Named, what: str, words: type[enum.StrEnum]) -> None:
+    """Make an attribute one of some words."""
+    value = getattr(element, what)
+    try:
+        object.__setattr__(element, what, words(value))
+    except ValueError:
+        raise InvalidValueError(f"{what} of {element.name}", value, f"one of {', '.join(words)}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Valued(_Named):
+    type: Scalar = Scalar.I16
+    """Of each value."""
+    count: int = 1
+    """How many values, 1 to 1024."""
+    unit: str = ""
+    """Of a value times `scale`, for readers."""
+    scale: float = 1.0
+    """What a value is multiplied by to be in `unit`; finite, not 0."""
+    binding: str = ""
+    """What of the robot's body it is, as `wheel.left`; none where nothing moves or measures."""
+
+    def __post_init__(self) -> None:
+        _Named.__post_init__(self)
+        _word(self, "type", Scalar)
+        whole(f"count of {self.name}", self.count, 1, MOST_VALUES)
+        if finite(f"scale of {self.name}", self.scale, "a finite number, not 0") == 0:
+            raise InvalidValueError(f"scale of {self.name}", self.scale, "a finite number, not 0")
+        for what, text in (("unit", self.unit), ("binding", self.binding)):
+            _plain(what, self, text)
+
+    @property
+    def format(self) -> struct.Struct:
+        """Of its values on the wire."""
+        return struct.Struct(f"!{self.count}{self.type.code}")
+
+
+@dataclass(frozen=True, slots=True)
+class Effector(_Valued):
+    """An input element: motor, LCD, LED. With a stream, what it's given is data that it plays in order."""
+
+    low: float = -math.inf
+    """Least value; that of the type unless given."""
+    high: float = math.inf
+    """Greatest value."""
+    initial: float = 0.0
+    """Its values until something comes."""
+    filling: Filling = Filling.HOLD
+    """What the motion filter does where values are missing."""
+    on_loss: OnLoss = OnLoss.HOLD
+    """What it does when the link is lost."""
+    stream: int = 0
+    """Bytes of data in a fragment, 1 to 16,384; 0 for an element with values."""
+
+    def __post_init__(self) -> None:
+        _Valued.__post_init__(self)
+        least, greatest = self.type.bounds
+        object.__setattr__(self, "low", max(_limit("low", self, self.low), least))
+        object.__setattr__(self, "high", min(_limit("high", self, self.high), greatest))
+        if not self.low <= self.initial <= self.high:
+            raise InvalidValueError(f"initial of {self.name}", self.initial, f"in [{self.low:g}, {self.high:g}]")
+        if self.type is not Scalar.F32 and self.initial != int(self.initial):
+            raise InvalidValueError(f"initial of {self.name}", self.initial, "a whole number")
+        whole(f"stream of {self.name}", self.stream, 0, MOST_BYTES)
+        _word(self, "filling", Filling)
+        _word(self, "on_loss", OnLoss)
+
+
+def _limit(what: str, element: Effector, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
+        raise InvalidValueError(f"{what} of {element.name}", value, "a number")
+    return float(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor(_Valued):
+    """An output element: proximity, luminance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Monitor(_Named):
+    """Tells the state of an effector, in a payload of the effector's size."""
+
+    effector: str
+    """Its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command(_Valued):
+    """A user's command that must be transferred: sent again and again until it's acknowledged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Module(_Named):
+    """A set of elements, switched on and off together; it has no payload."""
+
+    members: tuple[str, ...]
+    """Names of sensors, monitors and events."""
+
+    def __post_init__(self) -> None:
+        _Named.__post_init__(self)
+        object.__setattr__(self, "members", tuple(self.members))
+        if not self.members or len(set(self.members)) != len(self.members):
+            raise InvalidValueError(f"members of {self.name}", self.members, "one or more, each once")
+
+
+@dataclass(frozen=True, slots=True)
+class Event(_Valued):
+    """A kind of sensor that speaks only when its condition is met."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Stored(_Named):
+    size: int = 256
+    """Most bytes of data, 1 to 16,384."""
+    binding: str = ""
+    """What of the robot's body it is."""
+
+    def __post_init__(self) -> None:
+        _Named.__post_init__(self)
+        whole(f"size of {self.name}", self.size, 1, MOST_BYTES)
+        _plain("binding", self, self.binding)
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryCommand(_Stored):
+    """Data that the robot must get exactly once, sent once and again only where the acknowledgement fails."""
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryEvent(_Stored):
+    """The same from the robot to the local system."""
+
+
+Element: TypeAlias = Effector | Sensor | Monitor | Command | Module | Event | MemoryCommand | MemoryEvent
+KINDS: Final[tuple[type[Element], ...]] = (
+    Effector,
+    Sensor,
+    Monitor,
+    Command,
+    Module,
+    Event,
+    MemoryCommand,
+    MemoryEvent,
+)

@@ -1,0 +1,222 @@
+"""What must arrive: commands, sent until they're acknowledged, and memory items, exactly once or reported.
+
+Numbers are without end here; the wire has them modulo 65536.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from interfaces.rsp.errors import FullError
+from interfaces.rsp.layout import ID, STORED
+from interfaces.rsp.numbers import MODULUS, up_to
+
+MOST_WAITING: Final = 4096
+"""Items that wait in an outbox, and that aren't acknowledged yet."""
+
+
+class Outcome(enum.StrEnum):
+    """What became of something that must arrive."""
+
+    DONE = "done"
+    """The other side has acknowledged it."""
+    FAILED = "failed"
+    """Nothing acknowledged it by its deadline. It was carried out once at most, and won't be from now on if a later
+    one was sent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """Something that must arrive came to an end."""
+
+    index: int
+    """Of its element."""
+    id: int
+    """As it was given out."""
+    outcome: Outcome
+
+
+@dataclass(slots=True)
+class _Item:
+    index: int
+    id: int
+    payload: bytes
+    deadline: float = math.inf
+    first: int = -1
+    """Number of the first packet that had it; −1 before there was one."""
+
+
+class CommandOutbox:
+    """Commands in one order: as many under way as fit into a packet, each in every packet until it's acknowledged.
+
+    An acknowledgement is the last received number: since the command is in every packet from the first one on, a
+    number from there on says that it came.
+    """
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._waiting: deque[_Item] = deque()
+        self._flying: list[_Item] = []
+        self._next = 0
+
+    def __len__(self) -> int:
+        """Commands that aren't acknowledged."""
+        return len(self._waiting) + len(self._flying)
+
+    def put(self, index: int, values: bytes) -> int:
+        """Take a command for an element; returns its ID.
+
+        Raises:
+            FullError: If too many wait.
+        """
+        if len(self) >= MOST_WAITING:
+            raise FullError("the queue of commands", MOST_WAITING)
+        number, self._next = self._next, self._next + 1
+        self._waiting.append(_Item(index, number, ID.pack(number % MODULUS) + values))
+        return number
+
+    def fill(self, payloads: dict[int, bytes], packet: int) -> None:
+        """Add what goes into a packet of a number."""
+        taken = {item.index for item in self._flying}
+        # In order: one that finds its bit taken waits, and all behind it.
+        while self._waiting and self._waiting[0].index not in taken:
+            item = self._waiting.popleft()
+            item.first = packet
+            taken.add(item.index)
+            self._flying.append(item)
+        for item in self._flying:
+            payloads[item.index] = item.payload
+
+    def drain(self) -> list[Settled]:
+        """Give up all."""
+        left, self._flying, self._waiting = [*self._flying, *self._waiting], [], deque()
+        return [Settled(item.index, item.id, Outcome.FAILED) for item in left]
+
+    def acknowledge(self, last: int) -> list[Settled]:
+        """Take the other side's last received number."""
+        done = [item for item in self._flying if item.first <= last]
+        if done:
+            self._flying = [item for item in self._flying if item.first > last]
+        return [Settled(item.index, item.id, Outcome.DONE) for item in done]
+
+
+class MemoryOutbox:
+    """Memory items in one order: a flight of them is sent once, again where no acknowledgement comes, or given up.
+
+    What follows a flight waits until all of it is acknowledged or given up, so that nothing can come out of order.
+    """
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._waiting: deque[_Item] = deque()
+        self._flight: list[_Item] = []
+        self._next = 0
+        self._due = -math.inf
+        self._tries = 0
+
+    def __len__(self) -> int:
+        """Items that aren't settled."""
+        return len(self._waiting) + len(self._flight)
+
+    def put(self, index: int, data: bytes, deadline: float) -> int:
+        """Take an item for an element, to be settled by a time [s]; returns its ID.
+
+        Raises:
+            FullError: If too many wait.
+        """
+        if len(self) >= MOST_WAITING:
+            raise FullError("the queue of memory items", MOST_WAITING)
+        number, self._next = self._next, self._next + 1
+        payload = STORED.pack(number % MODULUS, len(data)) + data
+        self._waiting.append(_Item(index, number, payload, deadline))
+        return number
+
+    def fill(self, payloads: dict[int, bytes], *, now: float, timeout: float) -> None:
+        """Add what goes into a packet now.
+
+        Args:
+            payloads: Of the packet, by element.
+            now: [s].
+            timeout: After so long without an acknowledgement it's sent again [s]; twice as long after each time.
+        """
+        if not self._flight:
+            taken: set[int] = set()
+            while self._waiting and self._waiting[0].index not in taken:
+                item = self._waiting.popleft()
+                taken.add(item.index)
+                self._flight.append(item)
+            self._due, self._tries = now, 0
+        if self._flight and now >= self._due:
+            for item in self._flight:
+                payloads[item.index] = item.payload
+            self._due = now + timeout * 2.0 ** min(self._tries, 3)
+            self._tries += 1
+
+    def acknowledge(self, index: int, payload: bytes) -> list[Settled]:
+        """Take an acknowledgement of an element: all of its items up to an ID came."""
+        if not self._flight:
+            return []
+        upto = up_to(ID.unpack(payload)[0], self._flight[-1].id)
+        done = [item for item in self._flight if item.index == index and item.id <= upto]
+        self._flight = [item for item in self._flight if item not in done]
+        return [Settled(item.index, item.id, Outcome.DONE) for item in done]
+
+    def drain(self) -> list[Settled]:
+        """Give up all."""
+        return self.expire(math.inf)
+
+    def expire(self, now: float) -> list[Settled]:
+        """Give up what has passed its deadline by now [s]."""
+        late = [item for item in (*self._flight, *self._waiting) if item.deadline <= now]
+        if late:
+            self._flight = [item for item in self._flight if item.deadline > now]
+            self._waiting = deque(item for item in self._waiting if item.deadline > now)
+        return [Settled(item.index, item.id, Outcome.FAILED) for item in late]
+
+
+class MemoryInbox:
+    """The other end: takes each item once, in order, and says up to which it has them."""
+
+    def __init__(self) -> None:
+        """Nothing came yet."""
+        self._newest = -1
+        self._owed: dict[int, tuple[int, int]] = {}
+        """By element: the ID to be acknowledged, and the first packet that had it, −1 before there was one."""
+
+    def receive(self, payloads: list[tuple[int, bytes]]) -> list[tuple[int, int, bytes]]:
+        """Take the items of a packet; returns (element, ID, data) of the new ones in order."""
+        came = []
+        for index, payload in payloads:
+            number, _ = STORED.unpack_from(payload)
+            came.append((self._near(number), index, payload[STORED.size :]))
+        new = []
+        for number, index, data in sorted(came, key=lambda item: item[0]):
+            # One that came before is acknowledged again: whoever sends it doesn't know.
+            if number <= self._newest:
+                self._owed[index] = number, -1
+                continue
+            self._newest = number
+            self._owed[index] = number, -1
+            new.append((index, number, data))
+        return new
+
+    def _near(self, number: int) -> int:
+        ahead = (number - self._newest) % MODULUS
+        return self._newest + ahead if 0 < ahead < MODULUS // 2 else up_to(number, self._newest)
+
+    def fill(self, payloads: dict[int, bytes], packet: int) -> None:
+        """Add the acknowledgements to a packet of a number."""
+        for index, (number, first) in self._owed.items():
+            payloads[index] = ID.pack(number % MODULUS)
+            if first < 0:
+                self._owed[index] = number, packet
+
+    def heard(self, last: int) -> None:
+        """Take the other side's last received number: what it has needn't be acknowledged again."""
+        done = [index for index, (_, first) in self._owed.items() if 0 <= first <= last]
+        for index in done:
+            del self._owed[index]

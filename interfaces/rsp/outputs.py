@@ -1,0 +1,97 @@
+"""What a core tells whoever drives it."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from interfaces.rsp.handshake import Refusal
+from interfaces.rsp.outbox import Settled
+
+
+class EndReason(enum.StrEnum):
+    """Why a session ended."""
+
+    CLOSED = "closed"
+    """The local system ended it."""
+    LOST = "lost"
+    """Nothing came for a long time."""
+    TAKEN = "taken over"
+    """Another local system has the robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Began:
+    """A session began."""
+
+    session: int
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The robot gives no session."""
+
+    reason: Refusal
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A session ended."""
+
+    session: int
+    reason: EndReason
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A sensor or a monitor has a new value; its payload."""
+
+    index: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Occurred:
+    """An event's condition was met; its values as they are on the wire."""
+
+    index: int
+    id: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Commanded:
+    """A command came, to be carried out now; its values as they are on the wire."""
+
+    index: int
+    id: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A memory command or a memory event came: once, in order."""
+
+    index: int
+    id: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Cleared:
+    """The data buffer was cleared: what is being played ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Nothing came for the time of the watchdog: effectors that rest on loss do so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Something came again."""
+
+
+LocalOutput: TypeAlias = Began | Refused | Ended | Told | Occurred | Stored | Settled
+RobotOutput: TypeAlias = Began | Ended | Commanded | Stored | Cleared | Lost | Found | Settled

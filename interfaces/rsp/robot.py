@@ -1,0 +1,379 @@
+"""The robot's side of RSP: packet handler, and the motion, sensor, security and audio processors' protocol.
+
+A state machine of values, as the local system's: it knows no socket, no clock and no body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from interfaces.rsp import header
+from interfaces.rsp.door import Claim, Door
+from interfaces.rsp.errors import PacketError
+from interfaces.rsp.header import Header, Type
+from interfaces.rsp.layout import ID, Layout, Way
+from interfaces.rsp.model.elements import (
+    Command,
+    Effector,
+    MemoryCommand,
+    MemoryEvent,
+    OnLoss,
+)
+from interfaces.rsp.model.robot_model import RobotModel
+from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig, Values
+from interfaces.rsp.numbers import HALF, unwrapped
+from interfaces.rsp.outbox import MemoryInbox, MemoryOutbox
+from interfaces.rsp.outputs import Began, Cleared, Commanded, Ended, EndReason, Found, Lost, RobotOutput, Stored
+from interfaces.rsp.security import Keyring
+from interfaces.rsp.session import SLACK, Drop, Dropped
+from interfaces.rsp.streams import StreamInbox
+from interfaces.rsp.telling import Telling
+from vrs.checks import number_in
+
+_STAMPS: Final = 1 << 32
+
+
+@dataclass(frozen=True, slots=True)
+class RobotConfig:
+    """How a robot's side works."""
+
+    loss: float = 0.5
+    """T_loss [s], in [0.1, 2]: after so long without a packet what rests on loss does so."""
+    idle: float = 2.0
+    """After so long without a packet anybody may open a session instead [s], in [0.1, 60]."""
+    lifetime: float = 60.0
+    """A session in which nothing came for so long ends [s], in [1, 120]."""
+    period: float = 0.02
+    """Between its packets until it knows the local system's T, which it then keeps to [s], in [0.001, 1]."""
+    longest: float = 1.0
+    """T that it follows at most [s], in [0.001, 10]."""
+    repeats: int = 3
+    """Packets that tell of an event, 1 to 100: nobody acknowledges it."""
+    timeout: float = 0.1
+    """After so long without an acknowledgement a memory event is sent again [s], in [0.001, 10]."""
+    takeover: bool = True
+    """Whether anybody may take over by force where there are no keys; with keys only an admin may."""
+    filter: MotionFilterConfig = field(default_factory=MotionFilterConfig)
+    """How motion is played."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("loss", 0.1, 2.0), ("idle", 0.1, 60.0), ("lifetime", 1.0, 120.0), ("period", 1e-3, 1.0),
+            ("longest", 1e-3, 10.0), ("repeats", 1, 100), ("timeout", 1e-3, 10.0),
+        ):  # fmt: skip
+            number_in(name, getattr(self, name), low, high)
+
+
+class RobotCore:
+    """One robot's side."""
+
+    def __init__(
+        self,
+        model: RobotModel,
+        random_bytes: Callable[[int], bytes],
+        config: RobotConfig | None = None,
+        *,
+        keys: Keyring | None = None,
+    ) -> None:
+        """Wait for a session.
+
+        Args:
+            model: Of the robot.
+            random_bytes: So many bytes that nobody can guess.
+            config: How it works.
+            keys: Of who may open a session; everything is sealed then, and only then.
+        """
+        self.model, self.layout = model, Layout(model)
+        self._config = RobotConfig() if config is None else config
+        self._sealed = keys is not None
+        self._door = Door(model.id, random_bytes, keys, idle=self._config.idle, takeover=self._config.takeover)
+        self.dropped = dict.fromkeys(Drop, 0)
+        """Datagrams that were dropped, by reason."""
+        self.motion = MotionFilter(model, self._config.filter)
+        self.streams = StreamInbox(model.buffers)
+        self._formats = {i: e.format for i, e in enumerate(model) if isinstance(e, Effector) and not e.stream}
+        self._outputs: list[RobotOutput] = []
+        self._claim: Claim | None = None
+        self._stopping = False
+        self._telling = Telling(model, self._config.repeats)
+        self._answers: list[tuple[bytes, bytes]] = []
+        self._changed: set[int] = set()
+        """Effectors that do something else, but not because they were told to."""
+        self._reset(0.0)
+        for index in self._formats:
+            self._monitor(index)
+
+    def _reset(self, now: float) -> None:
+        """Forget a session; effectors keep what they do, but for those that rest on loss."""
+        given = {index: self.motion.given(index) for index in self._formats}
+        self.motion, self.streams = MotionFilter(self.model, self._config.filter), StreamInbox(self.model.buffers)
+        for index, values in given.items():
+            if not self._rests(index):
+                self.motion.set(index, values)
+        self._changed |= {index for index in self._formats if self.motion.given(index) != given[index]}
+        self._command = -1
+        self._inbox, self._memory = MemoryInbox(), MemoryOutbox()
+        self._telling.reset()
+        self._clears = 0
+        self._told: dict[int, Values] = {}
+        self._lost = False
+        self._heard = self._next = now
+        self._stamp: int | None = None
+        self._T = self._config.period
+
+    @property
+    def session(self) -> int | None:
+        """ID of the session in force; None without one."""
+        return None if self._claim is None else self._claim.session.id
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the robot has to come to rest before a new session's packets count: answer with `rested`."""
+        return self._stopping
+
+    # What the body says.
+
+    def measure(self, index: int, payload: bytes) -> None:
+        """Set what a sensor says, as it is on the wire."""
+        self._telling.measure(index, payload)
+
+    def occur(self, index: int, payload: bytes) -> bool:
+        """Tell of an event, its values as they are on the wire; returns whether it will be told.
+
+        It isn't if nobody asked for it, or too many wait.
+        """
+        return self._telling.occur(index, payload)
+
+    def store(self, index: int, data: bytes, *, deadline: float) -> int:
+        """Tell a memory event, to be settled by a time [s]; returns its ID.
+
+        Raises:
+            FullError: If too many wait.
+        """
+        return self._memory.put(index, data, deadline)
+
+    def rested(self) -> None:
+        """The body is at rest: a new session's packets count from now on."""
+        self._stopping = False
+
+    def effectors(self, *, now: float) -> dict[int, Values]:
+        """What effectors are to do from now on [s], of those for which it changed; the watchdog is looked at."""
+        self._watch(now)
+        forced = {index: self.motion.given(index) for index in self._changed}
+        self._changed.clear()
+        played = self.motion.play(now) if not self._lost and self._claim is not None else {}
+        changed = forced | played
+        for index in changed:
+            self._monitor(index)
+        return changed
+
+    # Packets.
+
+    def receive(self, data: bytes, address: bytes, *, now: float) -> None:
+        """Take a datagram from an address; whatever it holds, nothing is raised."""
+        try:
+            self._receive(data, address, now)
+        except PacketError:
+            self.dropped[Drop.MALFORMED] += 1
+        except Dropped as drop:
+            self.dropped[drop.reason] += 1
+
+    def to_send(self, *, now: float) -> list[tuple[bytes, bytes]]:
+        """Datagrams that are due by now [s], each with its address."""
+        self._watch(now)
+        answers, self._answers = self._answers, []
+        self._outputs += self._memory.expire(now)
+        claim = self._claim
+        if claim is None or now < self._next - SLACK:
+            return answers
+        self._next = max(self._next + self._T, now + 0.5 * self._T)
+        return [*answers, (self._up(claim, now), claim.address)]
+
+    def next_deadline(self) -> float | None:
+        """When something is to be sent [s]; None without a session."""
+        if self._answers:
+            return -math.inf
+        return None if self._claim is None else self._next
+
+    def take(self) -> list[RobotOutput]:
+        """What happened since the last call."""
+        outputs, self._outputs = self._outputs, []
+        return outputs
+
+    def _receive(self, data: bytes, address: bytes, now: float) -> None:
+        head = header.decode(data)
+        if head.model != self.model.id:
+            raise Dropped(Drop.MODEL)
+        if head.encrypted != self._sealed:
+            raise Dropped(Drop.DOWNGRADE)
+        if head.type is Type.OPEN:
+            held = None if self._claim is None else self._heard
+            self._answers += self._door.opened(head, data, address, held, now=now)
+            return
+        if head.type not in (Type.DOWN, Type.END):
+            raise Dropped(Drop.UNEXPECTED)
+        claim = self._claim
+        if claim is None or not claim.fits(head, address):
+            claim = self._door.pending
+            if claim is None or not claim.fits(head, address):
+                raise Dropped(Drop.SESSION)
+        body, number = claim.session.take(head, data)
+        if claim is not self._claim:
+            self._begin(claim, now)
+        if self._stopping:
+            raise Dropped(Drop.STOPPING)
+        if head.type is Type.END:
+            claim.session.newest = number
+            self._answers.append((claim.session.make(Type.ENDED, b"", now), claim.address))
+            self._end(EndReason.CLOSED, now)
+            return
+        payloads = self.layout.split(body, Way.DOWN)
+        told = self._values(payloads)
+        before, claim.session.newest = claim.session.newest, number
+        self._paced(head, number - before)
+        self._carry_out(claim, head, payloads, told, now)
+
+    def _begin(self, claim: Claim, now: float) -> None:
+        """A session proved to be there: it's in force, and an older one is over."""
+        old = self._claim
+        if old is not None:
+            over = old.session
+            self._answers += [(over.make(Type.ENDED, b"", now), old.address) for _ in range(3)]
+            self._end(EndReason.TAKEN, now)
+            self._stopping = True
+        self._door.pending, self._claim = None, claim
+        self._reset(now)
+        self._outputs.append(Began(claim.session.id))
+
+    def _end(self, reason: EndReason, now: float) -> None:
+        assert self._claim is not None
+        self._outputs += [*self._memory.drain(), Ended(self._claim.session.id, reason), Cleared()]
+        self._claim = None
+        self._reset(now)
+
+    def _values(self, payloads: Mapping[int, bytes]) -> dict[int, Values]:
+        """The effectors' values of a packet.
+
+        Raises:
+            PacketError: If one isn't finite or within the effector's limits; nothing of the packet counts then.
+        """
+        told = {}
+        for index, payload in payloads.items():
+            shape = self._formats.get(index)
+            if shape is not None:
+                values = shape.unpack(payload)
+                element = self.model.elements[index]
+                assert isinstance(element, Effector)
+                if not all(element.low <= value <= element.high for value in values):
+                    raise PacketError(f"values of {element.name} beyond its limits")
+                told[index] = values
+        return told
+
+    def _paced(self, head: Header, ahead: int) -> None:
+        """Keep to the local system's T: what its stamps are apart."""
+        stamp = head.stamp
+        if self._stamp is not None and 0 < ahead < HALF:
+            T = 1e-3 * ((stamp - self._stamp) % _STAMPS) / ahead
+            self._T += 0.25 * (min(max(T, 1e-3), self._config.longest) - self._T)
+        self._stamp = stamp
+
+    def _carry_out(
+        self, claim: Claim, head: Header, payloads: Mapping[int, bytes], told: Mapping[int, Values], now: float
+    ) -> None:
+        self._heard = now
+        if self._lost:
+            self._find()
+        last = claim.session.acknowledged(head)
+        self._inbox.heard(last)
+        self._telling.heard(last)
+        if head.buffers != self._clears:
+            self._clears = head.buffers
+            self.streams.clear()
+            self._outputs.append(Cleared())
+        claim.stamp = unwrapped_stamp(head.stamp, claim.stamp)
+        self.motion.receive(1e-3 * claim.stamp, told, now=now)
+        self._told |= told
+        commands, stored, asked = [], [], set()
+        for index, payload in payloads.items():
+            element = self.model.elements[index]
+            match element:
+                case Effector(stream=size) if size:
+                    self.streams.receive(index, payload)
+                case Effector():
+                    pass
+                case Command():
+                    number = unwrapped(ID.unpack_from(payload)[0], self._command)
+                    commands.append((number, index, payload[ID.size :]))
+                case MemoryCommand():
+                    stored.append((index, payload))
+                case MemoryEvent():
+                    self._outputs += self._memory.acknowledge(index, payload)
+                case _:
+                    asked.add(index)
+        self._execute(commands)
+        if stored:
+            self._outputs += [Stored(*item) for item in self._inbox.receive(stored)]
+        self._telling.ask(asked)
+
+    def _execute(self, commands: list[tuple[int, int, bytes]]) -> None:
+        """Carry out the commands that are newer than all before, in order."""
+        for number, index, values in sorted(commands):
+            if number > self._command:
+                self._command = number
+                self._outputs.append(Commanded(index, number, values))
+
+    def _up(self, claim: Claim, now: float) -> bytes:
+        number = claim.session.number
+        payloads: dict[int, bytes] = {}
+        self._telling.fill(payloads, number)
+        self._memory.fill(payloads, now=now, timeout=self._config.timeout)
+        self._inbox.fill(payloads, number)
+        return claim.session.make(Type.UP, self.layout.join(payloads), now, min(self.streams.free, 255))
+
+    def _watch(self, now: float) -> None:
+        """Rest what rests on loss, and end what is lost for good."""
+        if self._claim is None:
+            return
+        silent = now - self._heard
+        if silent >= self._config.lifetime:
+            self._end(EndReason.LOST, now)
+        elif silent >= self._config.loss and not self._lost:
+            self._lost = True
+            for index in self._formats:
+                if self._rests(index):
+                    element = self.model.elements[index]
+                    assert isinstance(element, Effector)
+                    self.motion.set(index, (element.initial,) * element.count)
+                    self._changed.add(index)
+            self._outputs.append(Lost())
+
+    def _find(self) -> None:
+        """Go on with what was told last: the local system takes it as known."""
+        self._lost = False
+        for index, values in self._told.items():
+            if self._rests(index):
+                self.motion.set(index, values)
+                self._changed.add(index)
+        self._outputs.append(Found())
+
+    def _rests(self, index: int) -> bool:
+        element = self.model.elements[index]
+        return isinstance(element, Effector) and element.on_loss is OnLoss.REST
+
+    def _monitor(self, index: int) -> None:
+        """Let the monitors of an effector say what it does."""
+        for watching in self._telling.monitors.get(index, ()):
+            effector = self.model.elements[index]
+            assert isinstance(effector, Effector)
+            values = self.motion.given(index)
+            whole = effector.type.value[0] != "f"
+            self.measure(watching, effector.format.pack(*(int(v) if whole else v for v in values)))
+
+
+def unwrapped_stamp(stamp: int, near: int) -> int:
+    """The time [ms] nearest to another one that has a stamp of 32 bits."""
+    ahead = (stamp - near) % _STAMPS
+    return near + ahead if ahead < _STAMPS // 2 else near + ahead - _STAMPS

@@ -1,0 +1,227 @@
+"""CUBO's body in PyBullet, addressed by bindings: names of what an effector moves and of what a sensor measures.
+
+It plans nothing and decides nothing: a thin client's body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from robots.bullet.rooms import Room
+from robots.cubo import parameters as p
+from robots.ipr.body import MobileBody
+from robots.ipr.chassis import Limb, Senses, SonarModel
+from robots.ipr.position import FusedPosition, TruePosition
+from robots.ipr.reality import MobileReality
+from vrs.checks import finite
+from vrs.errors import InvalidValueError
+from vrs.mobile import clipped
+from vrs.model import Array, frozen_array
+
+Values = tuple[float, ...]
+BUTTONS: Final = ("service", "message")
+MOVES: Final = ("wheel.left", "wheel.right", "wheels", "arm.left", "arm.right", "tilt", "lip", "screen", "speaker")
+"""Bindings of effectors. Wheels: speeds at the rim [m/s], `wheels` right and left. Arms and tilt: an angle [rad],
+and a speed [rad/s] if a second value is there and not 0. Lip and screen show what they're given; the speaker plays
+fragments."""
+MEASURES: Final = (
+    "position", "encoders", "proximity", "bumper", "gyro", "battery", "wheels", "arm.left", "arm.right", "tilt",
+)  # fmt: skip
+"""Bindings of sensors: (x, y, θ) [m, m, rad]; counts right, left; distances [m], 8 around from straight ahead, the
+reach where nothing is; 1 if something is touched; ω [rad/s]; [V]; rim speeds right, left [m/s]; angles [rad]."""
+EVENTS: Final = ("bumper", *(f"button.{name}" for name in BUTTONS))
+"""Bindings of events; each has the value 1."""
+COMMANDS: Final = ("ir", "say", "stop")
+"""Bindings of commands: the infrared remote control sends a code, a phrase is said, arms and wheels stop."""
+_LIMBS: Final = {"arm.right": 0, "arm.left": 1, "tilt": 2}
+_MOST_KEPT: Final = 256
+"""Of what was said, sent and played."""
+
+
+class CuboBody(MobileBody):
+    """A CUBO in a room of its own; use it as a context manager."""
+
+    def __init__(
+        self,
+        posture: ArrayLike | None = None,
+        *,
+        room: Room | str | None = None,
+        reality: MobileReality | None = None,
+        rng: np.random.Generator | int = 0,
+        senses: Senses | None = None,
+        exact: bool = False,
+    ) -> None:
+        """Put a robot into a room, at rest.
+
+        Args:
+            posture: (x, y, θ) [m, m, rad]; where the room says, unless given.
+            room: A room, or the name of one that comes with the package; only a floor, unless given.
+            reality: How real it is; everything, unless given.
+            rng: What slips and noise are drawn from, or a seed.
+            senses: What it senses with; proximity, unless given, and what tells it where it is.
+            exact: Whether it knows its posture exactly, instead of by odometry and an overhead camera.
+
+        Raises:
+            InvalidValueError: If a value is out of range, or the robot would stand in something.
+        """
+        self.shown: dict[str, Values] = {}
+        """What lip and screen show."""
+        self.done: deque[tuple[float, str, Values]] = deque(maxlen=_MOST_KEPT)
+        """Commands that were carried out: when [s], which, with what."""
+        self.played = 0
+        """Bytes of sound that were played."""
+        self._rims = [0.0, 0.0]
+        self._energy = p.CAPACITY
+        self._events: deque[str] = deque(maxlen=_MOST_KEPT)
+        self._touched = False
+        self._sounding = 0.0
+        senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
+        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses)
+        self._position = TruePosition(self) if exact else FusedPosition(self)
+        self._posture = self._position.posture()
+
+    def move(self, binding: str, values: Values) -> None:
+        """Let something be done from now on.
+
+        Args:
+            binding: One of `MOVES`, but for the speaker.
+            values: As `MOVES` says; beyond what the servos can, they do what they can.
+
+        Raises:
+            InvalidValueError: If there's no such binding, or a value is missing or isn't finite.
+        """
+        values = tuple(finite(binding, value) for value in values)
+        least = 2 if binding == "wheels" else 1
+        if binding not in MOVES or binding == "speaker" or len(values) < least:
+            raise InvalidValueError("binding", (binding, values), f"one of {', '.join(MOVES)}, with its values")
+        if binding == "wheels":
+            self._rims = [values[0], values[1]]
+        elif binding.startswith("wheel."):
+            self._rims[binding == "wheel.left"] = values[0]
+        elif binding in _LIMBS:
+            self._swing(p.CUBO.limbs[_LIMBS[binding]], _LIMBS[binding], values)
+        else:
+            self.shown[binding] = values
+
+    def carry_out(self, binding: str, values: Values) -> None:
+        """Do something once: a binding of `COMMANDS`, or one that it doesn't know, which is only noted."""
+        self.done.append((self.time, binding, values))
+        if binding == "stop":
+            self._rims = [0.0, 0.0]
+
+    def sound(self, data: bytes | None) -> None:
+        """Play a fragment of sound, or silence where there's none."""
+        self.played += len(data or b"")
+        self._sounding = 2.0 if data else 0.0
+
+    def press(self, button: str) -> None:
+        """Press a button, `service` or `message`.
+
+        Raises:
+            InvalidValueError: If there's no such button.
+        """
+        if button not in BUTTONS:
+            raise InvalidValueError("button", button, f"one of {', '.join(BUTTONS)}")
+        self._events.append(f"button.{button}")
+
+    def measure(self, binding: str) -> Values | None:
+        """What a sensor says; None where there's no such binding."""
+        match binding:
+            case "position":
+                return tuple(self._posture)
+            case "encoders":
+                return self.encoders
+            case "proximity":
+                far = p.SONAR_REACH[1]
+                found = self.sonar
+                ranges = [far] * p.PROXIMITY if found is None else found.ranges.tolist()
+                return tuple(min(r, far) for r in ranges)
+            case "bumper":
+                return (float(bool(self.touching)),)
+            case "gyro":
+                return (self.motion[1],)
+            case "battery":
+                full, empty = p.BATTERY
+                return (empty + (full - empty) * self._energy / p.CAPACITY,)
+            case "wheels":
+                right, left = self.wheels
+                return right.speed * p.WHEEL_RADIUS, left.speed * p.WHEEL_RADIUS
+        return (self.angles()[_LIMBS[binding]],) if binding in _LIMBS else None
+
+    def events(self) -> list[str]:
+        """Bindings of what happened since the last call."""
+        found = list(self._events)
+        self._events.clear()
+        return found
+
+    def angles(self) -> Values:
+        """Angles of the right arm, the left arm and the head [rad]."""
+        joints = [self._joint(k) for k in range(len(p.CUBO.limbs))]
+        states = self._world.bullet.getJointStates(self._body, joints, physicsClientId=self._world.client)
+        return tuple(float(state[0]) for state in states)
+
+    def wheel_angles(self) -> Array:
+        """Angles that the right and the left wheel have turned by [rad], (2,)."""
+        states = self._world.bullet.getJointStates(self._body, [0, 1], physicsClientId=self._world.client)
+        return frozen_array([state[0] for state in states])
+
+    @property
+    def step(self) -> float:
+        """Of its physics [s]."""
+        return self.reality.dt
+
+    @property
+    def resting(self) -> bool:
+        """Whether it stands still."""
+        v, w = self.motion
+        return abs(v) < 2e-3 and abs(w) < 2e-2
+
+    def go_on(self, steps: int = 1) -> None:
+        """Go on by steps of `reality.dt`.
+
+        Raises:
+            LostError: If it fell over.
+        """
+        right, left = self._rims
+        v, w = 0.5 * (right + left), (right - left) / p.WHEEL_BASE
+        self.drive(clipped(v, p.LIMITS.v_max), clipped(w, p.LIMITS.w_max), steps)
+        self._posture = self._position.posture()
+        seconds = steps * self.reality.dt
+        work = sum(abs(wheel.torque * wheel.speed) for wheel in self.wheels)
+        self._energy = max(0.0, self._energy - (p.IDLE_POWER + self._sounding + 2 * work) * seconds)
+        if self.touching and not self._touched:
+            self._events.append("bumper")
+        self._touched = bool(self.touching)
+
+    def _joint(self, limb: int) -> int:
+        return 2 + len(p.CUBO.casters) + limb
+
+    def _swing(self, limb: Limb, number: int, values: Values) -> None:
+        speed = (abs(values[1]) if len(values) > 1 else 0.0) or limb.speed
+        self._world.bullet.setJointMotorControl2(
+            self._body,
+            self._joint(number),
+            self._world.bullet.POSITION_CONTROL,
+            targetPosition=min(max(values[0], limb.low), limb.high),
+            positionGain=0.2,
+            velocityGain=1.0,
+            force=limb.torque,
+            maxVelocity=min(max(speed, 1e-3), limb.speed),
+            physicsClientId=self._world.client,
+        )
+
+
+def upright(angle: float, joint: tuple[float, float, float], axis: tuple[float, float, float]) -> Array:
+    """Pose of a limb in the robot's frame at an angle [rad], (4, 4)."""
+    x, y, z = axis
+    c, s = math.cos(angle), math.sin(angle)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
+    X = np.eye(4)
+    X[:3, :3] = np.eye(3) + s * K + (1 - c) * K @ K
+    X[:3, 3] = joint
+    return X

@@ -1,0 +1,266 @@
+"""Who gets in and who doesn't: spoofed, replayed, flipped, downgraded; sessions begin, are refused and taken
+over."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from interfaces.rsp import header
+from interfaces.rsp.handshake import Refusal
+from interfaces.rsp.header import Type
+from interfaces.rsp.local import LocalCore, State
+from interfaces.rsp.model import example
+from interfaces.rsp.outputs import Ended, EndReason, Refused
+from interfaces.rsp.robot import RobotConfig, RobotCore
+from interfaces.rsp.security import Keyring, Rank
+from interfaces.rsp.session import Drop
+from tests.interfaces.rsp.joined import ADDRESS, KEYS, Network, Pair
+from vrs.errors import InvalidValueError
+
+MODEL = example()
+WHEEL = MODEL.index("left_wheel")
+
+
+def pair_of(*, sealed: bool) -> Pair:
+    pair = Pair(MODEL, Network(Random(1)), sealed=sealed).opened()
+    pair.local.write(WHEEL, b"\0\x64")
+    pair.run(0.2)
+    pair.robot.effectors(now=pair.now)
+    assert pair.robot.motion.given(WHEEL) == (100.0,)
+    return pair
+
+
+def next_down(pair: Pair) -> bytes:
+    pair.local.write(WHEEL, b"\0\x32")
+    pair.now += 0.1
+    return pair.local.to_send(now=pair.now)[0]
+
+
+def state(pair: Pair) -> tuple:
+    """What a datagram that doesn't count must leave as it was."""
+    robot = pair.robot
+    session = robot._claim.session
+    return (
+        robot.motion.given(WHEEL),
+        session.newest,
+        session.number,
+        robot.session,
+        robot._heard,
+        robot.streams.free,
+    )
+
+
+@pytest.mark.parametrize("sealed", [False, True])
+def test_a_spoofed_session_is_dropped_and_counted(sealed: bool) -> None:
+    pair = pair_of(sealed=sealed)
+    data, before = next_down(pair), state(pair)
+    other = data[:12] + bytes([data[12] ^ 1]) + data[13:]
+    pair.robot.receive(other, ADDRESS, now=pair.now)
+    pair.robot.receive(data, b"elsewhere", now=pair.now)
+    assert pair.robot.dropped[Drop.SESSION] == 2
+    assert state(pair) == before
+
+
+def test_every_flipped_bit_of_a_sealed_packet_is_dropped_and_counted() -> None:
+    pair = pair_of(sealed=True)
+    data, before = next_down(pair), state(pair)
+    assert len(data) == 20 + 24 + 2 + 2
+    for bit in range(8 * len(data)):
+        flipped = bytearray(data)
+        flipped[bit // 8] ^= 1 << bit % 8
+        pair.robot.receive(bytes(flipped), ADDRESS, now=pair.now)
+    assert state(pair) == before
+    assert sum(pair.robot.dropped.values()) == 8 * len(data)
+    assert pair.robot.dropped[Drop.AUTHENTICATION] > 8 * 24
+    pair.robot.receive(data, ADDRESS, now=pair.now)
+    assert state(pair) != before
+
+
+def test_a_replayed_packet_is_dropped_and_counted() -> None:
+    pair = pair_of(sealed=True)
+    data = next_down(pair)
+    pair.robot.receive(data, ADDRESS, now=pair.now)
+    before = state(pair)
+    pair.robot.receive(data, ADDRESS, now=pair.now + 0.1)
+    assert pair.robot.dropped[Drop.REPLAY] == 1
+    assert state(pair) == before
+
+
+def test_a_bit_of_the_header_downgrades_nobody() -> None:
+    sealed, plain = pair_of(sealed=True), pair_of(sealed=False)
+    head, body = next_down(plain), next_down(sealed)
+    in_clear = header.encode(header.decode(body)._replace(encrypted=False)) + head[header.SIZE :]
+    before = state(sealed)
+    sealed.robot.receive(in_clear, ADDRESS, now=sealed.now)
+    sealed.local.receive(in_clear, now=sealed.now)
+    assert sealed.robot.dropped[Drop.DOWNGRADE] == sealed.local.dropped[Drop.DOWNGRADE] == 1
+    plain.robot.receive(body, ADDRESS, now=plain.now)
+    assert plain.robot.dropped[Drop.DOWNGRADE] == 1
+    assert state(sealed) == before
+
+
+def test_a_replayed_opening_takes_nothing_over() -> None:
+    pair = Pair(MODEL, Network(Random(1)), sealed=True)
+    sent: list[bytes] = []
+    usual = pair.network.send
+    pair.network.send = lambda to, data, now: (sent.append(data) if to == "robot" else None, usual(to, data, now))[
+        1
+    ]
+    pair.opened()
+    pair.run(3.0)
+    opening = [data for data in sent if header.decode(data).type is Type.OPEN]
+    pair.network.closed = True
+    pair.run(2.5)
+    before = pair.robot.session
+    for data in opening:
+        pair.robot.receive(data, ADDRESS, now=pair.now)
+    for data in sent:
+        pair.robot.receive(data, ADDRESS, now=pair.now)
+    assert pair.robot.session == before
+    # The one whose session it is goes on.
+    pair.network.closed = False
+    pair.network.flight.clear()
+    pair.local.write(WHEEL, b"\0\x0a")
+    pair.run(0.3)
+    pair.robot.effectors(now=pair.now)
+    assert pair.robot.motion.given(WHEEL) == (10.0,)
+
+
+@pytest.mark.parametrize("sealed", [False, True])
+def test_no_answer_is_longer_than_its_question_and_asking_leaves_nothing(sealed: bool) -> None:
+    random, keys = Random(1), KEYS if sealed else None
+    robot = RobotCore(MODEL, random.randbytes, keys=keys)
+    for k in range(300):
+        local = LocalCore(MODEL, random.randbytes, keys=keys)
+        local.open(now=0.1 * k)
+        (asked,) = local.to_send(now=0.1 * k)
+        robot.receive(asked, k.to_bytes(2, "big"), now=0.1 * k)
+        for answer, _ in robot.to_send(now=0.1 * k):
+            assert len(answer) <= len(asked)
+            assert header.decode(answer).type is Type.CHALLENGE
+    assert robot.session is None
+    assert robot._door.pending is None
+
+
+def test_too_many_requests_are_dropped() -> None:
+    random = Random(1)
+    robot = RobotCore(MODEL, random.randbytes)
+    local = LocalCore(MODEL, random.randbytes)
+    local.open(now=0.0)
+    (asked,) = local.to_send(now=0.0)
+    for _ in range(1000):
+        robot.receive(asked, ADDRESS, now=0.0)
+    assert len(robot.to_send(now=0.0)) == 100
+
+
+def second(pair: Pair, *, rank: Rank = Rank.OPERATOR, keys: Keyring | None = None, takeover: bool) -> LocalCore:
+    """Another local system asks, from another address, for half a second."""
+    other = LocalCore(MODEL, Random(99).randbytes, keys=keys, rank=rank)
+    other.open(now=pair.now, takeover=takeover)
+    for _ in range(50):
+        for data in other.to_send(now=pair.now):
+            pair.robot.receive(data, b"second", now=pair.now)
+        for data in pair.local.to_send(now=pair.now):
+            pair.robot.receive(data, ADDRESS, now=pair.now)
+        for data, address in pair.robot.to_send(now=pair.now):
+            if address == b"second":
+                other.receive(data, now=pair.now)
+            else:
+                pair.local.receive(data, now=pair.now)
+        pair.now += 0.01
+    pair.told += pair.local.take()
+    return other
+
+
+@pytest.mark.parametrize(
+    ("sealed", "rank", "takeover", "refusal"),
+    [
+        (False, Rank.OPERATOR, False, Refusal.BUSY),
+        (True, Rank.OPERATOR, False, Refusal.BUSY),
+        (True, Rank.ADMIN, False, Refusal.BUSY),
+        (True, Rank.OPERATOR, True, Refusal.FORBIDDEN),
+    ],
+)
+def test_a_session_in_use_is_refused(sealed: bool, rank: Rank, takeover: bool, refusal: Refusal) -> None:
+    pair = pair_of(sealed=sealed)
+    other = second(pair, rank=rank, keys=KEYS if sealed else None, takeover=takeover)
+    assert other.take() == [Refused(refusal)]
+    assert pair.local.state is State.OPEN
+
+
+@pytest.mark.parametrize("sealed", [False, True])
+def test_a_takeover_passes_through_a_stop(sealed: bool) -> None:
+    pair = pair_of(sealed=sealed)
+    other = second(pair, rank=Rank.ADMIN if sealed else Rank.OPERATOR, keys=KEYS if sealed else None, takeover=True)
+    assert other.state is State.OPEN
+    assert [o.reason for o in pair.told if isinstance(o, Ended)] == [EndReason.TAKEN]
+    assert pair.robot.session == other._session.id
+    assert pair.robot.stopping
+    assert pair.robot.effectors(now=pair.now)[WHEEL] == (0.0,)
+    other.write(WHEEL, b"\0\x0a")
+
+    def exchange() -> None:
+        for _ in range(20):
+            for data in other.to_send(now=pair.now):
+                pair.robot.receive(data, b"second", now=pair.now)
+            pair.now += 0.01
+        pair.robot.effectors(now=pair.now)
+
+    exchange()
+    assert pair.robot.motion.given(WHEEL) == (0.0,)
+    assert pair.robot.dropped[Drop.STOPPING] > 0
+    pair.robot.rested()
+    exchange()
+    assert pair.robot.motion.given(WHEEL) == (10.0,)
+
+
+def test_where_nobody_may_nobody_takes_over_in_the_clear() -> None:
+    pair = Pair(MODEL, Network(Random(1)), robot=RobotConfig(takeover=False)).opened()
+    assert second(pair, takeover=True).take() == [Refused(Refusal.FORBIDDEN)]
+
+
+def test_an_idle_session_gives_way() -> None:
+    pair = pair_of(sealed=True)
+    pair.network.closed = True
+    pair.run(2.1)
+    pair.local.end(now=pair.now)
+    pair.local.state = State.CLOSED
+    assert second(pair, keys=KEYS, takeover=False).state is State.OPEN
+
+
+def test_another_key_or_rank_opens_nothing() -> None:
+    pair = pair_of(sealed=True)
+    for keys, rank in (
+        (Keyring({Rank.OPERATOR: b"x" * 32}), Rank.OPERATOR),
+        (Keyring({Rank.ADMIN: b"o" * 32}), Rank.ADMIN),
+    ):
+        assert second(pair, keys=keys, rank=rank, takeover=True).take() == []
+    assert pair.robot.dropped[Drop.AUTHENTICATION] > 0
+    assert pair.local.state is State.OPEN
+
+
+def test_keys_are_checked() -> None:
+    for secrets in ({}, {Rank.OPERATOR: b"short"}):
+        with pytest.raises(InvalidValueError):
+            Keyring(secrets)
+    with pytest.raises(InvalidValueError, match="rank"):
+        LocalCore(MODEL, bytes, keys=Keyring({Rank.OPERATOR: b"o" * 32}), rank=Rank.ADMIN)
+    assert "oooo" not in repr(KEYS)
+
+
+def test_keys_of_a_session_are_its_own() -> None:
+    made = {KEYS.session(Rank.OPERATOR, nonces, session) for nonces in (b"a" * 32, b"b" * 32) for session in (1, 2)}
+    assert len({key for pair in made for key in pair}) == 8
+
+
+def test_the_derivation_is_hkdf() -> None:
+    from cryptography.hazmat.primitives.hashes import SHA256
+    from cryptography.hazmat.primitives.kdf.hkdf import HKDF
+
+    from interfaces.rsp.security import _derived
+
+    for length in (16, 32, 64, 70):
+        theirs = HKDF(SHA256(), length, b"salt", b"info").derive(b"secret" * 9)
+        assert _derived(b"secret" * 9, b"salt", b"info", length) == theirs

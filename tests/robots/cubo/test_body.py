@@ -1,0 +1,187 @@
+"""CUBO's body: sizes and masses of the paper, and that it does and measures what its bindings say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robots.cubo import parameters as p
+from robots.cubo.body import COMMANDS, EVENTS, MEASURES, MOVES, CuboBody
+from robots.cubo.shapes import links, shapes
+from robots.ipr.reality import MobileReality
+from robots.ipr.wheeled import DRIVES
+from vrs.errors import InvalidValueError
+
+IDEAL = replace(MobileReality.ideal(), ramps=True)
+
+
+def test_it_is_as_large_and_heavy_as_the_paper_says() -> None:
+    assert p.CUBO.mass == pytest.approx(2.0)
+    low, high = bounds()
+    assert high - low == pytest.approx([0.200, 0.218, 0.309], abs=2e-3)
+    assert low[2] == pytest.approx(0.0, abs=1e-3)
+
+
+def bounds(limbs: tuple[float, ...] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
+    corners = [
+        shape.vertices @ X[:3, :3].T + X[:3, 3]
+        for shape, X in zip(shapes(), links((0, 0, 0), (0.3, 1.0), limbs), strict=True)
+    ]
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def test_every_shape_is_closed_and_faces_outwards() -> None:
+    import trimesh
+
+    assert [shape.name for shape in shapes()] == [
+        "body", "right wheel", "left wheel", "caster", "right arm", "left arm", "head",
+    ]  # fmt: skip
+    for shape in shapes():
+        for part in trimesh.Trimesh(shape.vertices, shape.faces, process=False).split(only_watertight=False):
+            assert part.is_watertight, shape.name
+            assert part.volume > 0, shape.name
+    assert sum(len(shape.faces) for shape in shapes()) < 20_000
+
+
+def test_arms_swing_forward_and_the_head_nods() -> None:
+    still, raised = links((0, 0, 0)), links((0, 0, 0), limbs=(1.5, 1.5, 0.3))
+    hand = np.array([0.0, 0.0, -0.06, 1.0])
+    for k in (4, 5):
+        assert (raised[k] @ hand)[0] > (still[k] @ hand)[0] + 0.05
+    face = np.array([0.07, 0.0, 0.05, 1.0])
+    assert (raised[6] @ face)[2] < (still[6] @ face)[2]
+
+
+def test_what_pybullet_has_is_what_the_parameters_say() -> None:
+    with CuboBody() as body:
+        bullet, client = body._world.bullet, body._world.client
+        mass = sum(bullet.getDynamicsInfo(body._body, j, physicsClientId=client)[0] for j in range(-1, 6))
+        assert mass == pytest.approx(2.0, rel=1e-6)
+        for number, limb in enumerate(p.CUBO.limbs):
+            info = bullet.getDynamicsInfo(body._body, 3 + number, physicsClientId=client)
+            assert info[0] == pytest.approx(limb.mass)
+            assert info[2] == pytest.approx(limb.inertia(), rel=1e-6)
+            assert info[3] == pytest.approx(limb.centre, abs=1e-9)
+        loads = [wheel.load for wheel in body.wheels]
+        assert loads[0] == pytest.approx(loads[1], rel=0.01)
+        assert 0.7 * 2.0 * 9.81 < sum(loads) < 2.0 * 9.81
+        assert tuple(DRIVES) == (0, 1)
+
+
+def test_it_drives_where_the_rims_say() -> None:
+    with CuboBody((0, 0, 0), reality=IDEAL, exact=True) as body:
+        body.move("wheels", (0.2, 0.2))
+        body.go_on(120)
+        start = body.truth[0]
+        for _ in range(48):
+            body.go_on(5)
+        assert body.truth == pytest.approx((start + 0.2, 0.0, 0.0), abs=1e-3)
+        assert body.measure("position") == pytest.approx(body.truth)
+        body.move("wheel.left", (-0.1,))
+        body.move("wheel.right", (0.1,))
+        for _ in range(48):
+            body.go_on(5)
+        assert body.truth[2] == pytest.approx(0.2 / p.WHEEL_BASE, rel=0.08)
+        assert body.measure("gyro") == pytest.approx((0.2 / p.WHEEL_BASE,), rel=0.03)
+        assert body.measure("wheels") == pytest.approx((0.1, -0.1), abs=5e-3)
+        body.move("wheels", (9.0, 9.0))
+        body.go_on(240)
+        assert body.motion[0] == pytest.approx(p.LIMITS.v_max, rel=0.01)
+
+
+def test_it_brakes_from_full_speed_without_a_nod() -> None:
+    with CuboBody() as body:
+        body.move("wheels", (0.4, 0.4))
+        body.go_on(240)
+        body.move("wheels", (-0.4, -0.4))
+        for _ in range(60):
+            body.go_on(4)
+            assert body.tilt < 0.01
+
+
+def test_arms_and_head_go_where_they_are_told_as_fast_as_they_are_told() -> None:
+    with CuboBody() as body:
+        body.move("arm.left", (1.2, 1.0))
+        body.move("arm.right", (9.0,))
+        body.move("tilt", (-9.0, 0.0))
+        body.go_on(120)
+        assert body.measure("arm.left")[0] == pytest.approx(0.5, abs=0.05)
+        body.go_on(360)
+        assert body.angles() == pytest.approx((p.CUBO.limbs[0].high, 1.2, p.CUBO.limbs[2].low), abs=0.02)
+        assert body.tilt < 0.02
+
+
+def test_limbs_hold_their_posture_while_it_drives() -> None:
+    with CuboBody() as body:
+        body.move("wheels", (0.3, 0.1))
+        for _ in range(20):
+            body.go_on(24)
+            assert max(map(abs, body.angles())) < 0.02
+
+
+def test_it_senses_a_wall_touches_it_and_says_so() -> None:
+    with CuboBody(room="furnished") as body:
+        body.move("wheels", (0.3, 0.3))
+        nearest, happened = 1.0, []
+        for _ in range(400):
+            body.go_on(12)
+            nearest = min(nearest, body.measure("proximity")[0])
+            happened += body.events()
+        assert nearest < 0.06
+        assert happened == ["bumper"]
+        assert body.measure("bumper") == (1.0,)
+
+
+def test_the_battery_runs_down_faster_under_load() -> None:
+    with CuboBody() as body:
+        full = body.measure("battery")[0]
+        body.go_on(480)
+        idle = full - body.measure("battery")[0]
+        assert full == pytest.approx(p.BATTERY[0])
+        body.sound(b"music")
+        body.go_on(480)
+        assert full - idle - body.measure("battery")[0] > idle * 1.1
+        assert body.played == 5
+
+
+def test_commands_buttons_and_bindings() -> None:
+    with CuboBody() as body:
+        body.carry_out("ir", (7.0,))
+        body.carry_out("whatever", ())
+        assert [(name, values) for _, name, values in body.done] == [("ir", (7.0,)), ("whatever", ())]
+        body.move("wheels", (0.1, 0.1))
+        body.carry_out("stop", ())
+        body.go_on(120)
+        assert body.resting
+        body.press("message")
+        assert body.events() == ["button.message"]
+        assert body.events() == []
+        for call in (
+            lambda: body.press("bell"),
+            lambda: body.move("leg", (1.0,)),
+            lambda: body.move("speaker", (1.0,)),
+            lambda: body.move("wheels", (1.0,)),
+            lambda: body.move("tilt", (math.nan,)),
+        ):
+            with pytest.raises(InvalidValueError):
+                call()
+        assert all(body.measure(binding) is not None for binding in MEASURES)
+        assert body.measure("nothing") is None
+        assert {"bumper", "button.service"} <= set(EVENTS)
+        assert "ir" in COMMANDS
+        assert "tilt" in MOVES
+
+
+def test_the_same_seed_gives_the_same_to_the_last_bit() -> None:
+    found = []
+    for _ in range(2):
+        with CuboBody(rng=4) as body:
+            body.move("wheels", (0.2, 0.15))
+            body.move("arm.left", (1.0,))
+            body.go_on(480)
+            found.append((body.truth, body.angles(), body.measure("position"), body.encoders))
+    assert found[0] == found[1]
