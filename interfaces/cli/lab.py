@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from interfaces.cli.demo import prepare
+from interfaces.cli.localization import LOCALIZATION, localize, refuse
 
 if TYPE_CHECKING:
     from interfaces.lab.pool import Calls, Made
@@ -15,6 +17,12 @@ if TYPE_CHECKING:
 
 def lab(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where runs.csv, summary.json and figures go.")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="[localization]", help="How well the robot knows where it is, instead of the architectures."
+        ),
+    ] = "",
     architecture: Annotated[
         list[str] | None,
         typer.Option(
@@ -38,11 +46,36 @@ def lab(
             help="figure-eight, corridor, slalom, docking, mixed, or inputs:FILE.csv; repeatable.",
         ),
     ] = None,
-    runs: Annotated[int, typer.Option("--runs", min=1, max=10_000, metavar="K", help="Seeds of each.")] = 5,
+    position: Annotated[
+        str,
+        typer.Option(
+            "--position", metavar="P", help="What tells the robot where it is: fused, laser, odometry, truth."
+        ),
+    ] = "fused",
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs",
+            min=1,
+            max=10_000,
+            metavar="K",
+            help="Seeds of each, 5 unless given; rooms, 30, of localization.",
+        ),
+    ] = None,
+    starts: Annotated[
+        int, typer.Option("--starts", min=1, max=10_000, metavar="K", help="Of localization: starts anywhere.")
+    ] = 200,
     seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="The first seed.")] = 0,
     length: Annotated[
-        float, typer.Option("--length", min=2, max=3600, metavar="S", help="For how long the operator drives [s].")
-    ] = 120.0,
+        float | None,
+        typer.Option(
+            "--length",
+            min=2,
+            max=3600,
+            metavar="S",
+            help="For how long the operator drives [s]; 120, of localization 60.",
+        ),
+    ] = None,
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
     ] = 2,
@@ -56,27 +89,39 @@ def lab(
     as_json: Annotated[bool, typer.Option("--json", help="Write the summary on standard output too.")] = False,
 ) -> None:
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
+    from vrs.checks import one_of
+
+    if what and one_of("experiment", what, (LOCALIZATION,)):
+        others = {
+            "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
+            "--operator": operator, "--attribution": attribution, "--record": record,
+        }  # fmt: skip
+        refuse(others)
+        localize(out, seed, runs, length, starts, workers, as_json=as_json)
+        return
+    runs, length = runs or 5, length or 120.0
     from interfaces.lab.driving.attribution import attributed
     from interfaces.lab.driving.operators import operator as make
     from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
     from interfaces.lab.driving.pictures import drawn, pictures
     from interfaces.lab.driving.recorded import Kept, measure_recorded, paths
-    from interfaces.lab.driving.run import ROBOTS
+    from interfaces.lab.driving.run import POSITIONS, ROBOTS
     from interfaces.lab.driving.sweep import cases
     from interfaces.link.profiles import delay_profile
     from interfaces.teleop.architectures import ARCHITECTURES, Transport
-    from vrs.checks import one_of
 
     architectures = [one_of("architecture", a, ARCHITECTURES) for a in architecture or ["III", "timeline"]]
     transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]
     delays, robots = delay or ["thu"], [one_of("robot", r, ROBOTS) for r in robot or ["ipr"]]
-    operators = operator or ["mixed"]
+    operators, position = operator or ["mixed"], one_of("position", position, POSITIONS)
     for profile in delays:
         delay_profile(profile)
     for who in operators:
         make(who, seed, 0.1)
     prepare(out)
-    chosen = cases(architectures, transports, delays, robots, operators, range(seed, seed + runs), length)
+    seeds = range(seed, seed + runs)
+    combined = cases(architectures, transports, delays, robots, operators, seeds, length)
+    chosen = [replace(case, position=position) for case in combined]
     files = paths(chosen, out) if record else [None] * len(chosen)
     calls = [(measure_recorded, given) for given in zip(chosen, drawn(chosen), files, strict=True)]
     measured: list[Kept] = _worked(calls, "runs", workers)
@@ -87,7 +132,8 @@ def lab(
         causes = attributions(chosen, _worked(taken, "causes", workers))
     settings = {
         "architectures": architectures, "transports": [t.value for t in transports], "delays": delays,
-        "robots": robots, "operators": operators, "runs": runs, "seed": seed, "length_s": length,
+        "robots": robots, "operators": operators, "position": position, "runs": runs, "seed": seed,
+        "length_s": length,
     }  # fmt: skip
     found = summary(rows, settings, causes)
     write(rows, found, pictures([kept.drive for kept in measured if kept.drive is not None]), out)

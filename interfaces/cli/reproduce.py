@@ -52,15 +52,16 @@ def reproduce(
     prepare(out)
     for each in chosen:
         study = Study(seed, each.runs if runs is None else runs, each.length if length is None else length)
-        reproduction = _run(each, study, workers)
+        reproduction = measured(each, study, workers)
         path = write(reproduction, out)
         if as_json:
             typer.echo(to_json(reproduction), nl=False)
         else:
-            _show(reproduction, path)
+            show(reproduction, path)
 
 
-def _run(paper: Paper, study: Study, workers: int) -> Reproduction:
+def measured(paper: Paper, study: Study, workers: int) -> Reproduction:
+    """Measure a paper's claims, with a bar for each part."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -76,7 +77,8 @@ NARROWEST = 8
 """Characters that a column of a table needs to be read."""
 
 
-def _show(reproduction: Reproduction, path: Path) -> None:
+def show(reproduction: Reproduction, path: Path) -> None:
+    """Show the claims and tables that fit the console, and how many hold."""
     from rich.console import Console
 
     from interfaces.lab.output import rich_tables

@@ -27,7 +27,7 @@ class BareBody(MobileRobot):
         self._every_check = self._every(_CHECKS)
         self._free_until = 0
         self._free = self._truth
-        self._seen = FloorPlan(self.room, self.chassis.sonar_height)
+        self._seen: dict[float, FloorPlan] = {}
 
     @property
     def motion(self) -> tuple[float, float]:
@@ -94,5 +94,11 @@ class BareBody(MobileRobot):
     def _shafts(self) -> tuple[float, float]:
         return self._angle_right, self._angle_left
 
-    def _distances(self, origins: Array, directions: Array, reach: float) -> Array:
-        return self._seen.cast(origins, directions, self.time, reach)
+    def _put(self, posture: tuple[float, float, float]) -> None:
+        self._truth = self._free = posture
+        self._speed, self._free_until = (0.0, 0.0), 0
+
+    def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
+        if height not in self._seen:
+            self._seen[height] = FloorPlan(self.room, height)
+        return self._seen[height].cast(origins, directions, self.time, reach)

@@ -193,6 +193,13 @@ class MobileBody(MobileRobot):
 
     def _put_back(self, start: tuple[float, float, float]) -> None:
         """Shift what settling moved, so that the robot begins at its start; wheels count from there."""
+        self._move(start)
+        for j in DRIVES:
+            self._world.bullet.resetJointState(self._body, j, 0.0, physicsClientId=self._world.client)
+        self._target_right = self._target_left = 0.0
+
+    def _move(self, start: tuple[float, float, float]) -> None:
+        """Turn the robot about the vertical and shift it, so that it stands at a posture."""
         (x, y, _), R = self._pose()
         bullet, client = self._world.bullet, self._world.client
         position, turn = bullet.getBasePositionAndOrientation(self._body, physicsClientId=client)
@@ -204,12 +211,15 @@ class MobileBody(MobileRobot):
         upright = [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
         _, turned = bullet.multiplyTransforms([0.0] * 3, upright, [0.0] * 3, turn)
         bullet.resetBasePositionAndOrientation(self._body, place, turned, physicsClientId=client)
-        for j in DRIVES:
-            bullet.resetJointState(self._body, j, 0.0, physicsClientId=client)
-        self._target_right = self._target_left = 0.0
 
     def _shafts(self) -> tuple[float, float]:
         return self._angles
 
-    def _distances(self, origins: Array, directions: Array, reach: float) -> Array:
-        return self._room_bodies.cast(origins, directions, self.chassis.sonar_height, reach)
+    def _put(self, posture: tuple[float, float, float]) -> None:
+        self._move(posture)
+        bullet, client, still = self._world.bullet, self._world.client, [0.0, 0.0, 0.0]
+        bullet.resetBaseVelocity(self._body, still, still, physicsClientId=client)
+        self._truth = posture
+
+    def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
+        return self._room_bodies.cast(origins, directions, height, reach)

@@ -14,6 +14,7 @@ import numpy as np
 
 from robots.ipr import parameters as p
 from robots.ipr.model import Kind
+from robots.onboard.laser import LaserModel
 from vrs.checks import number_in, one_of
 from vrs.mobile import DriveLimits
 from vrs.model import Array, frozen_array
@@ -293,6 +294,8 @@ class Senses:
     """None switches the sonars off."""
     camera: CameraModel | None = field(default_factory=CameraModel)
     """None switches the camera off."""
+    laser: LaserModel | None = None
+    """None, which it is unless given, is a robot without a laser scanner."""
     encoder_rate: float = 20.0
     """How often encoders are read [Hz], in [1, 240]."""
 

@@ -1,4 +1,4 @@
-"""Where a mobile robot takes itself to be: odometry, corrected by the overhead camera's late postures.
+"""Where a mobile robot takes itself to be: odometry, corrected by an overhead camera's late postures or a laser.
 
 Dead reckoning is smooth and drifts; a camera doesn't drift, but is noisy and late. So the map's frame is kept as a
 transform of the odometry's: a picture is compared with where the odometry says that the robot was *when it was
@@ -11,9 +11,15 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from robots.ipr.plan_map import plan_map
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture
+from robots.onboard.gsp_map import GspMap
+from robots.onboard.line_filter import MotionConfig
+from robots.onboard.localization import LocalizationConfig
+from robots.onboard.localizer import Localizer, LocalizerConfig
 from vrs.checks import number_in
+from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
 
 _KEPT = 2.0
@@ -56,6 +62,39 @@ class OdometryPosition:
     def posture(self) -> Posture:
         """Where the robot takes itself to be now, (x, y, θ) [m, m, rad]."""
         return Posture(*self._robot.reckoned)
+
+
+class LaserPosition:
+    """Follows a robot's odometry and finds it on the map by its laser; call it once a control period."""
+
+    def __init__(self, robot: MobileRobot, known: GspMap | None = None) -> None:
+        """Take the robot; where it begins is known.
+
+        Args:
+            robot: With a laser scanner.
+            known: The map; that of its room's floor plan, as far as that is known, unless given.
+
+        Raises:
+            InvalidValueError: If it has no laser scanner.
+        """
+        laser = robot.senses.laser
+        if laser is None:
+            raise InvalidValueError("robot", "no laser scanner", "one whose senses have a laser")
+        self._robot = robot
+        known = plan_map(robot.room, laser.height) if known is None else known
+        motion = MotionConfig(base=robot.chassis.wheel_base)
+        config = LocalizerConfig(localization=LocalizationConfig(motion=motion))
+        self.localizer = Localizer(known, robot.reckoned, config=config)
+        """What follows the robot: its status, covariance, candidates."""
+
+    def posture(self) -> Posture:
+        """Where the robot takes itself to be now, (x, y, θ) [m, m, rad]."""
+        robot, localizer = self._robot, self.localizer
+        localizer.move(robot.time, robot.reckoned)
+        if robot.laser is not None:
+            localizer.see(robot.laser)
+        assert localizer.posture is not None
+        return Posture(*localizer.posture)
 
 
 class FusedPosition:

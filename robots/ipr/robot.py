@@ -18,7 +18,9 @@ from robots.ipr.chassis import Chassis, Senses, chassis
 from robots.ipr.drive_train import DriveTrain, Odometry, as_posture
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.reality import MobileReality
+from robots.ipr.scanner import LaserScanner
 from robots.ipr.sensing import Fix, OverheadCamera, SonarRing, SonarScan
+from robots.onboard.laser import LaserScan
 from vrs.checks import finite, one_of
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
@@ -90,7 +92,7 @@ class MobileRobot(ABC):
         self.senses = senses = Senses() if senses is None else senses
         start = as_posture("posture", room.start if posture is None else posture)
         rng = np.random.default_rng(rng) if isinstance(rng, int) else rng
-        drive_rng, sonar_rng, camera_rng = rng.spawn(3)
+        drive_rng, sonar_rng, camera_rng, laser_rng = rng.spawn(4)
         self._train = DriveTrain(self.chassis, reality, limits, drive_rng)
         self._odometry = Odometry(self._train, start)
         self._plan = FloorPlan(room)
@@ -101,14 +103,19 @@ class MobileRobot(ABC):
         self._camera: OverheadCamera | None = None
         self._scan: SonarScan | None = None
         self._every_encoder = self._every(senses.encoder_rate)
-        self._every_sonar = self._every_frame = 0
+        self._laser: LaserScanner | None = None
+        self._every_sonar = self._every_frame = self._every_sweep = 0
         if senses.sonar is not None:
             self._sonar = SonarRing(self.chassis, senses.sonar, sonar_rng)
             self._every_sonar = self._every(senses.sonar.rate)
         if senses.camera is not None:
             self._camera = OverheadCamera(senses.camera, camera_rng)
             self._every_frame = self._every(senses.camera.rate)
-        self._ticks = [n for n in (self._every_encoder, self._every_sonar, self._every_frame) if n]
+        if senses.laser is not None:
+            self._laser = LaserScanner(senses.laser, laser_rng)
+            self._every_sweep = self._every(senses.laser.rate)
+        every = self._every_encoder, self._every_sonar, self._every_frame, self._every_sweep
+        self._ticks = [n for n in every if n]
         self._period_steps = round(finite("period", period) / reality.dt)
         if self._period_steps < 1 or abs(self._period_steps * reality.dt - period) > 1e-9:
             raise InvalidValueError("period", period, f"a multiple of the step, {reality.dt:g} s")
@@ -165,6 +172,11 @@ class MobileRobot(ABC):
         return self._scan
 
     @property
+    def laser(self) -> LaserScan | None:
+        """Newest whole sweep of the laser scanner; None before the first, or without a scanner."""
+        return None if self._laser is None else self._laser.newest
+
+    @property
     def sonar_angles(self) -> Array:
         """Where each sonar looks [rad], (16,), in the robot's frame; empty without sonars."""
         return frozen_array([]) if self._sonar is None else self._sonar.angles
@@ -208,8 +220,25 @@ class MobileRobot(ABC):
         last = self._steps + steps
         while self._steps < last:
             n = min(last - self._steps, *(every - self._steps % every for every in self._ticks))
-            self._advance(n)
+            if self._laser is not None and self._laser.sweeping:
+                self._sweep(self._laser)
+            else:
+                self._advance(n)
             self._sense()
+
+    def carry(self, posture: ArrayLike) -> None:
+        """Put the robot somewhere else, as somebody would who lifts it: its wheels don't turn.
+
+        Raises:
+            InvalidValueError: If the robot would stand in something, or the posture isn't one.
+            WorldClosedError: If it's a closed PyBullet robot.
+        """
+        self._ready()
+        there = as_posture("posture", posture)
+        thing = self._overlap(there)
+        if thing:
+            raise InvalidValueError("posture", there, f"one where the robot stands free, not in the {thing}")
+        self._put(there)
 
     def follow(self, v: float, w: float) -> None:
         """Go on by one control period; arguments and errors as of `drive`."""
@@ -236,12 +265,16 @@ class MobileRobot(ABC):
         """Go n steps on, no sense being due before their end; counts them in `_steps`, sets `_truth`."""
 
     @abstractmethod
+    def _put(self, posture: tuple[float, float, float]) -> None:
+        """Be somewhere else, at rest."""
+
+    @abstractmethod
     def _shafts(self) -> tuple[float, float]:
         """Angles that the motors' shafts have turned by, at the wheel's side of the gear [rad]."""
 
     @abstractmethod
-    def _distances(self, origins: Array, directions: Array, reach: float) -> Array:
-        """How far rays go now [m], inf where nothing is within reach."""
+    def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
+        """How far level rays go now at a height [m], inf where nothing is within reach."""
 
     def _ready(self) -> None:
         """Raise if the robot can't be used any more."""
@@ -261,7 +294,24 @@ class MobileRobot(ABC):
             self._camera.look(self._truth, self.time)
         if self._sonar is not None and self._steps % self._every_sonar == 0:
             origins, directions = self._sonar.rays(self._truth)
-            self._scan = self._sonar.scan(self._distances(origins, directions, self._sonar.reach), self.time)
+            height = self.chassis.sonar_height
+            self._scan = self._sonar.scan(
+                self._distances(origins, directions, self._sonar.reach, height), self.time
+            )
+        if self._laser is not None and self._steps % self._every_sweep == 0:
+            self._laser.begin(self.time)
+            self._laser.go_on(self._truth, self._truth, (self.time, self.time), self._cast_laser)
+
+    def _sweep(self, laser: LaserScanner) -> None:
+        """Go one step on while the laser sweeps."""
+        before, begun = self._truth, self.time
+        self._advance(1)
+        laser.go_on(before, self._truth, (begun, self.time), self._cast_laser)
+
+    def _cast_laser(self, origins: Array, directions: Array) -> Array:
+        model = self.senses.laser
+        assert model is not None
+        return self._distances(origins, directions, model.reach, model.height)
 
     def _overlap(self, posture: tuple[float, float, float]) -> str:
         """What the body's outline overlaps at a posture."""

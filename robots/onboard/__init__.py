@@ -11,9 +11,20 @@ from robots.onboard.command_filter import (
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, FollowingMonitor, Tolerance
 from robots.onboard.free_ways import Outline
+from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
+from robots.onboard.gsp_map import GspMap, Lines, load_map, read_map, save_map
 from robots.onboard.known_trajectory import KnownTrajectory
+from robots.onboard.laser import LaserModel, LaserScan, OdometryTrack, deskewed
+from robots.onboard.laser_frame import FrameReader, decode_scan, encode_scan
 from robots.onboard.lease import Ended, Grant, Lease, LeaseConfig, LeaseEnd, LeaseRefusal, LeaseState, Pending
+from robots.onboard.line_extraction import ExtractionConfig, extract
+from robots.onboard.line_filter import LineFilter, MotionConfig
+from robots.onboard.line_matching import MatchingConfig
+from robots.onboard.localization import LocalizationConfig, Observability, Tracker
+from robots.onboard.localizer import Event, Localizer, LocalizerConfig, Status
+from robots.onboard.map_building import BuildingConfig, MapBuilder
 from robots.onboard.movers import Mover, MoversConfig, MoverTracker
+from robots.onboard.paper_localization import PaperConfig, PaperLocalizer
 from robots.onboard.path import Arc, MovingPath, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
 from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
@@ -22,6 +33,7 @@ from robots.onboard.stamps import Kind, Stamp, Verdict
 from robots.onboard.stops import StopMotion, at_rest, from_commanded, from_measured
 from robots.onboard.supervision import Supervision
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
+from robots.onboard.surveying import Surveyor
 from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
 from robots.onboard.values import Refusal, RefusalCode, ValueGuard
 from robots.onboard.watchdog import (
@@ -39,15 +51,20 @@ from robots.onboard.yielding import Yielding, YieldingConfig
 
 __all__ = [
     "AcceptedFuture",
+    "Answer",
     "Arc",
     "AvoidanceConfig",
     "BeginStop",
+    "BuildingConfig",
+    "Candidate",
     "CellChange",
     "CommandFilter",
     "CommandFilterConfig",
     "Drive",
     "Ended",
     "EnvironmentSupervisor",
+    "Event",
+    "ExtractionConfig",
     "FeedForward",
     "FieldLaw",
     "FilterEvent",
@@ -55,23 +72,40 @@ __all__ = [
     "FilterOutput",
     "FollowingAbort",
     "FollowingMonitor",
+    "Found",
+    "FrameReader",
     "GoOn",
     "Grant",
+    "GspMap",
     "Kind",
     "KnownTrajectory",
+    "LaserModel",
+    "LaserScan",
     "Lease",
     "LeaseConfig",
     "LeaseEnd",
     "LeaseRefusal",
     "LeaseState",
+    "LineFilter",
+    "Lines",
+    "LocalizationConfig",
+    "Localizer",
+    "LocalizerConfig",
     "LossPolicy",
     "Manner",
+    "MapBuilder",
+    "MatchingConfig",
+    "MotionConfig",
     "Mover",
     "MoverTracker",
     "MoversConfig",
     "MovingPath",
+    "Observability",
     "ObstacleAvoidance",
+    "OdometryTrack",
     "Outline",
+    "PaperConfig",
+    "PaperLocalizer",
     "PathFollowingConfig",
     "PathFollowingController",
     "PathGenerator",
@@ -83,15 +117,20 @@ __all__ = [
     "Reference",
     "Refusal",
     "RefusalCode",
+    "SearchConfig",
     "Servo",
     "ServoGains",
     "SonarMount",
     "Stamp",
+    "Status",
     "StopMotion",
     "StopReason",
     "Supervision",
     "SupervisorConfig",
+    "Surroundings",
+    "Surveyor",
     "Tolerance",
+    "Tracker",
     "TrackingConfig",
     "TrajectoryTracker",
     "ValueGuard",
@@ -102,6 +141,14 @@ __all__ = [
     "Yielding",
     "YieldingConfig",
     "at_rest",
+    "decode_scan",
+    "deskewed",
+    "encode_scan",
+    "extract",
     "from_commanded",
     "from_measured",
+    "load_map",
+    "locate",
+    "read_map",
+    "save_map",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Protocol, TypeAlias
 
 import numpy as np
@@ -30,10 +30,11 @@ from robots.bullet.rooms import Room
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
-from robots.ipr.position import FusedPosition, OdometryPosition, TruePosition
+from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import STAND, Posture
+from robots.onboard.laser import LaserModel
 from vrs.checks import number_in, one_of
 from vrs.comparison import PathComparison, summed_up
 from vrs.model import Array
@@ -57,6 +58,7 @@ DriveLink: TypeAlias = Link[Packet, Report]
 """What is between both sites."""
 POSITIONS: Final[dict[str, Callable[[MobileRobot], Position]]] = {
     "fused": FusedPosition,
+    "laser": LaserPosition,
     "odometry": OdometryPosition,
     "truth": TruePosition,
 }
@@ -83,7 +85,8 @@ class Case:
     room: str | Room = ""
     """Where it drives, a room or a name of `robots.ipr.robot.PLACES`; the operator's own unless given."""
     position: str = "fused"
-    """Where the real robot takes itself to be: `fused` (odometry and camera), `odometry`, or the `truth`."""
+    """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
+    of its room), `odometry`, or the `truth`."""
 
     @property
     def group(self) -> tuple[str, str, str, str, str]:
@@ -152,6 +155,11 @@ class Drive:
 def make_robot(case: Case, start: Posture, room: str | Room) -> MobileRobot:
     """The real robot of a case."""
     senses = Senses() if case.architecture in SENSING else Senses(sonar=None)
+    if case.position == "laser":
+        # The micro-robot's sits on its middle.
+        senses = replace(
+            senses, laser=LaserModel(forward=0.0, height=0.06) if case.robot == "micro" else LaserModel()
+        )
     # The seed's own streams: of the robot, of the network, of the operator.
     rng = np.random.default_rng([case.seed, 1])
     where = room or None

@@ -1,0 +1,238 @@
+"""Where a robot is that was told nothing: starts anywhere, rooms that look alike, robots that were carried off."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from interfaces.lab.claims import Cell, Claim, Findings, Study, Table
+from interfaces.lab.localization.distinctive import distinctive
+from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
+from robots.bullet.rooms import Room, read_room
+from robots.ipr.apartments import ApartmentConfig, apartment
+from robots.ipr.plan_map import plan_map
+from robots.ipr.ways import Ways
+from robots.onboard.driving import Drive
+from robots.onboard.localizer import Localizer, Status
+from vrs.mobile import wrapped
+
+STARTS = 10
+"""In an apartment, at most."""
+CLEAR = 0.42
+"""Starts are so far from things [m]: the robot's rear corners pass at 0.39 m as it turns on the spot."""
+NEAR, NEAR_TURN = 0.10, math.radians(3)
+"""A start is found if the posture is as near as that [m, rad]."""
+TURN = 0.65
+"""Speed of the turn on the spot [rad/s]."""
+PATIENCE = 16.0
+"""Longest that is waited for an answer [s]: a turn, and some more looks."""
+CARRIED = 8.0
+"""When the robot is carried off [s]."""
+NOTICED, RECOVERED = 3.0, 40.0
+"""It has to notice within [s]; and to be found again within [s]."""
+SOURCE = "issue 10, It must show"
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """One start and what was said of it."""
+
+    room: str
+    answer: str
+    """`right`, `wrong`, `ambiguous` or `none`."""
+    off: float
+    """Of the best place that was named [m]; nan if none was."""
+    turned: float
+    """The same [rad]."""
+    after: float
+    """When the answer came [s]."""
+
+
+@cache
+def _distinctive(seed: int, number: int) -> Room:
+    """The number-th apartment of a study whose map is distinctive."""
+    for k in range(100):
+        made = int(np.random.SeedSequence([seed, number, k, 7]).generate_state(1)[0])
+        room = apartment(made, ApartmentConfig(rooms=1 + number % 5))
+        if distinctive(_mapped(room)):
+            return room
+    return room
+
+
+def _mapped(room: Room) -> Room:
+    """What a line map has of a room: an unknown chair tells nothing, nor does a column."""
+    return Room(room.name, room.length, room.width, room.start, room.known().blocks)
+
+
+def measure_starts(study: Study, case: str) -> tuple[Start, ...]:
+    """Starts in a distinctive apartment; the case is its number and how many."""
+    number, count = map(int, case.split(":"))
+    room = _distinctive(study.seed, number)
+    places = Ways(room, CLEAR).places
+    rng = np.random.default_rng([study.seed, number, 11])
+    made = []
+    for k in range(count):
+        x, y = places[int(rng.integers(len(places)))].tolist()
+        made.append(
+            _start(room, number, (study.seed, number, 20 + k), (x, y, float(rng.uniform(-math.pi, math.pi))))
+        )
+    return tuple(made)
+
+
+def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float, float, float]) -> Start:
+    chosen = setting(room, number, 0.03, seed)
+    localizer = Localizer(plan_map(room))
+    with body_of(chosen, posture) as body:
+        answered = math.inf
+        while body.time < PATIENCE:
+            localizer.move(body.time, body.reckoned)
+            if body.laser is not None:
+                localizer.see(body.laser)
+            if localizer.status is Status.TRACKING:
+                answered = body.time
+                break
+            body.drive(0.0, TURN, round(CONTROL / body.reality.dt))
+        truth = body.truth
+    named = (
+        [localizer.posture] if localizer.status is Status.TRACKING else [c.posture for c in localizer.candidates]
+    )
+    offs = [(math.dist(p[:2], truth[:2]), abs(wrapped(p[2] - truth[2]))) for p in named if p is not None]
+    off, turned = min(offs, default=(math.nan, math.nan))
+    right = off <= NEAR and turned <= NEAR_TURN
+    if localizer.status is Status.TRACKING:
+        answer = "right" if right else "wrong"
+    else:
+        answer = "ambiguous" if localizer.status is Status.AMBIGUOUS else "none"
+    return Start(room.name, answer, off, turned, answered)
+
+
+def conclude_starts(study: Study, found: tuple[tuple[Start, ...], ...]) -> Findings:  # noqa: ARG001
+    """How many were found."""
+    starts = [start for group in found for start in group]
+    count = {
+        what: sum(start.answer == what for start in starts) for what in ("right", "wrong", "ambiguous", "none")
+    }
+    right, wrong = count["right"] / len(starts), count["wrong"] / len(starts)
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (group[0].room, *(sum(start.answer == what for start in group) for what in count)) for group in found
+    )
+    return Findings(
+        (
+            Claim(f"of {len(starts)} starts found [%]", SOURCE, "≥ 95", 100 * right, right >= 0.95),
+            Claim("wrong and confident [%]", SOURCE, "≤ 1", 100 * wrong, wrong <= 0.01),
+        ),
+        (Table("starts", f"starts anywhere, {STARTS} an apartment at most", ("apartment", *count), rows),),
+    )  # fmt: skip
+
+
+def symmetric(number: int) -> Room:
+    """A room that looks the same from two places, or a square one from four."""
+    length, width = ((5.0, 5.0), (6.4, 4.2), (7.5, 3.6))[number % 3]
+    corners = ("0 0", f"{length} 0", f"{length} {width}", f"0 {width}")
+    walls = "\n".join(f"wall {a} {b}" for a, b in pairwise([*corners, corners[0]]))
+    return read_room(
+        f"room 1\nname Symmetric {number}\nsize {length} {width}\nstart 1.5 1.2 40\n{walls}", "symmetric"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Twofold:
+    """What was said in a symmetric room."""
+
+    room: str
+    status: str
+    named: int
+    """Places that were named."""
+    expected: int
+    """Places that look the same."""
+    off: float
+    """Of the nearest [m]."""
+
+
+def measure_symmetric(study: Study, case: str) -> Twofold:
+    """A turn on the spot in a symmetric room."""
+    number = int(case)
+    room = symmetric(number)
+    chosen = setting(room, number, 0.03, (study.seed, number, 13))
+    localizer = Localizer(plan_map(room))
+    with body_of(chosen) as body:
+        drive(body, PATIENCE, lambda _, __: Drive(0.0, TURN), {"": localizer})
+        localizer.move(body.time, body.reckoned)
+        truth = body.truth
+    offs = [math.dist(one.posture[:2], truth[:2]) for one in localizer.candidates]
+    expected = 4 if room.length == room.width else 2
+    return Twofold(room.name, localizer.status.value, len(offs), expected, min(offs, default=math.nan))
+
+
+def conclude_symmetric(study: Study, found: tuple[Twofold, ...]) -> Findings:  # noqa: ARG001
+    """Whether it said so."""
+    good = sum(one.status == Status.AMBIGUOUS and one.named == one.expected and one.off <= NEAR for one in found)
+    rows = tuple((one.room, one.status, one.expected, one.named, 100 * one.off) for one in found)
+    columns = ("room", "answer", "places that look the same", "named", "nearest off [cm]")
+    what = f"of {len(found)} symmetric rooms called ambiguous, with all places that look the same"
+    return Findings(
+        (Claim(what, SOURCE, len(found), good, good == len(found)),),
+        (Table("symmetric", "rooms that look the same from several places", columns, rows),),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A robot that was carried off."""
+
+    room: str
+    distance: float
+    """How far [m]."""
+    noticed: float
+    """After so long [s]; inf if never."""
+    recovered: float
+    """And was found again after so long [s]."""
+    off: float
+    """At the end [m]."""
+
+
+def measure_carried(study: Study, case: str) -> Carried:
+    """Drive, be carried off, drive on; turn on the spot when the localizer wants it."""
+    number = int(case)
+    room = _distinctive(study.seed, number)
+    rng = np.random.default_rng([study.seed, number, 17])
+    chosen = setting(room, number, 0.03, (study.seed, number, 19))
+    places = Ways(room, CLEAR).places
+    with body_of(chosen) as body:
+        localizer, driver, carried = Localizer(plan_map(room), body.truth), wander(chosen), [0.0]
+
+        def pushed(t: float) -> None:
+            if abs(t - CARRIED) < CONTROL / 2:
+                far = places[np.hypot(*(places - body.truth[:2]).T) > min(2.0, 0.3 * room.length)]
+                x, y = far[int(rng.integers(len(far)))].tolist()
+                carried[0] = math.dist((x, y), body.truth[:2])
+                body.carry((x, y, float(rng.uniform(-math.pi, math.pi))))
+
+        def told(t: float, posture: tuple[float, float, float]) -> Drive:
+            return Drive(0.0, TURN) if localizer.wants_turn else driver(t, posture)
+
+        record = drive(body, CARRIED + RECOVERED, told, {"": localizer}, pushed)
+    events = [event for event in localizer.events if event.time > CARRIED]
+    noticed = next((e.time - CARRIED for e in events if e.status is not Status.TRACKING), math.inf)
+    found = [e.time - CARRIED for e in events if e.status is Status.TRACKING]
+    off = float(record.tracks[""].place[-1])
+    return Carried(room.name, carried[0], noticed, found[-1] if found else math.inf, off)
+
+
+def conclude_carried(study: Study, found: tuple[Carried, ...]) -> Findings:  # noqa: ARG001
+    """Whether it noticed, and recovered."""
+    noticed = sum(one.noticed <= NOTICED for one in found)
+    recovered = sum(one.off <= NEAR for one in found)
+    rows = tuple((one.room, one.distance, one.noticed, one.recovered, 100 * one.off) for one in found)
+    columns = ("apartment", "carried [m]", "noticed after [s]", "found after [s]", "off at the end [cm]")
+    claims = (
+        Claim(
+            f"of {len(found)} carried off, noticed within 3 s", SOURCE, len(found), noticed, noticed == len(found)
+        ),
+        Claim("and found again", SOURCE, len(found), recovered, recovered == len(found)),
+    )
+    return Findings(claims, (Table("carried", "robots that were carried off", columns, rows),))

@@ -1,0 +1,213 @@
+"""One robot in one room: it drives about, and everybody who says where it is hears the same odometry and scans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from interfaces.lab.localization.wandering import Wanderer
+from robots.bullet.rooms import Room
+from robots.ipr.apartments import ApartmentConfig, apartment
+from robots.ipr.bare import BareBody
+from robots.ipr.chassis import Senses
+from robots.ipr.reality import MobileReality
+from robots.onboard.driving import Drive
+from robots.onboard.gsp_map import GspMap, Lines
+from robots.onboard.laser import LaserModel, LaserScan
+from vrs.model import Array
+
+CONTROL = 0.05
+"""Between two drives, and two rows of what is recorded [s]."""
+STILL = 3.0
+"""So long the robot stands before a drive [s]: as long as it takes to see who is there."""
+NOISES = (0.01, 0.02)
+"""Of the ranges, in turns [m]."""
+
+
+class Listener(Protocol):
+    """Whoever says where the robot is."""
+
+    @property
+    def posture(self) -> tuple[float, float, float] | None:
+        """(x, y, θ) [m, m, rad]."""
+
+    def move(self, time: float, reading: tuple[float, float, float]) -> None:
+        """Hear the odometry."""
+
+    def see(self, scan: LaserScan) -> bool:
+        """Take in a scan, unless it came before; the same one is given until there's another."""
+
+
+class Reckoning:
+    """Dead reckoning alone."""
+
+    def __init__(self) -> None:
+        """Begin where the odometry begins."""
+        self.posture: tuple[float, float, float] | None = None
+        """What it says."""
+
+    def move(self, time: float, reading: tuple[float, float, float]) -> None:  # noqa: ARG002
+        """Hear the odometry."""
+        self.posture = reading
+
+    def see(self, scan: LaserScan) -> bool:  # noqa: ARG002
+        """Take no notice of a scan."""
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A room and a robot."""
+
+    room: Room
+    laser: LaserModel
+    reality: MobileReality
+    seed: tuple[int, ...]
+    """Of noise, slip and where it drives."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """What somebody said all along."""
+
+    errors: Array
+    """Of x, y [m] and heading [rad], (k, 3)."""
+    covariances: Array
+    """(k, 3, 3); nan if there's none."""
+
+    @property
+    def place(self) -> Array:
+        """Errors of the position [m], (k,)."""
+        return np.hypot(self.errors[:, 0], self.errors[:, 1])
+
+    @property
+    def turn(self) -> Array:
+        """Errors of the heading [rad], (k,)."""
+        return np.abs(self.errors[:, 2])
+
+    @property
+    def normalised(self) -> Array:
+        """Squared errors in their own deviations, NEES, (k,); nan without a covariance."""
+        known = np.isfinite(self.covariances).all(axis=(1, 2))
+        found = np.full(len(self.errors), np.nan)
+        e, P = self.errors[known], self.covariances[known]
+        found[known] = np.einsum("ki,ki->k", e, np.linalg.solve(P, e[:, :, None])[:, :, 0])
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Record:
+    """A drive."""
+
+    t: Array
+    """[s], (k,)."""
+    truth: Array
+    """(x, y, θ) [m, m, rad], (k, 3)."""
+    tracks: dict[str, Track]
+    """Of each listener, by name."""
+    collisions: int
+    """How often the robot or somebody ran into something."""
+
+
+def furnished(seed: int, number: int, *, rooms: int = 0) -> Room:
+    """The number-th room of a study: 0 to 4 people in turns."""
+    made = int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
+    return apartment(made, ApartmentConfig(rooms=rooms, people=number % 5))
+
+
+def worn(rng: np.random.Generator) -> MobileReality:
+    """A robot whose wheels are 1 % wrong, each larger or smaller, and that slips: 0.5 % and 1 % that wanders."""
+    right, left = (0.01 * rng.choice([-1.0, 1.0], 2)).tolist()
+    return MobileReality(
+        radius_error=(right, left), slip=(0.004, 0.006), slip_spread=0.01, slip_time=1.0, dt=1 / 60
+    )  # fmt: skip
+
+
+def setting(room: Room, number: int, sweep: float, seed: tuple[int, ...]) -> Setting:
+    """A worn robot in a room, its laser with 1 or 2 cm of noise in turns.
+
+    Args:
+        room: Where.
+        number: Of the room.
+        sweep: Of its laser [s].
+        seed: Of the robot and the drive.
+    """
+    reality = worn(np.random.default_rng([*seed, 1]))
+    return Setting(room, LaserModel(noise=NOISES[number % 2], sweep=sweep), reality, seed)
+
+
+def body_of(chosen: Setting, posture: tuple[float, float, float] | None = None) -> BareBody:
+    """The robot at a posture, where the room says unless given."""
+    senses = Senses(sonar=None, camera=None, laser=chosen.laser)
+    rng = np.random.default_rng([*chosen.seed, 2])
+    return BareBody("ipr", posture, room=chosen.room, reality=chosen.reality, rng=rng, senses=senses)
+
+
+Driver = Callable[[float, tuple[float, float, float]], Drive]
+"""What to do at a time [s] and a true posture."""
+
+
+def drive(
+    body: BareBody,
+    length: float,
+    driver: Driver,
+    listeners: Mapping[str, Listener],
+    hook: Callable[[float], None] = lambda _: None,
+) -> Record:
+    """Drive about.
+
+    Args:
+        body: The robot.
+        length: For how long [s].
+        driver: Who drives.
+        listeners: Who says where the robot is, by name.
+        hook: Called at each step with the time [s], after all have heard.
+    """
+    rows: list[tuple[float, ...]] = []
+    said: dict[str, list[tuple[Array, Array]]] = {name: [] for name in listeners}
+    steps = round(CONTROL / body.reality.dt)
+    for _ in range(round(length / CONTROL)):
+        truth = body.truth
+        for name, one in listeners.items():
+            one.move(body.time, body.reckoned)
+            if body.laser is not None:
+                one.see(body.laser)
+            said[name].append((_error(one.posture, truth), np.array(getattr(one, "covariance", _NONE))))
+        rows.append((body.time, *truth))
+        hook(body.time)
+        told = driver(body.time, truth)
+        body.drive(told.v, told.w, steps)
+    table = np.array(rows)
+    tracks = {name: Track(*(np.array(part) for part in zip(*found, strict=True))) for name, found in said.items()}
+    return Record(table[:, 0], table[:, 1:], tracks, len(body.collisions))
+
+
+_NONE = np.full((3, 3), np.nan)
+
+
+def _error(posture: tuple[float, float, float] | None, truth: tuple[float, float, float]) -> Array:
+    if posture is None:
+        return np.full(3, np.nan)
+    x, y, theta = (a - b for a, b in zip(posture, truth, strict=True))
+    return np.array([x, y, math.remainder(theta, math.tau)])
+
+
+def wander(chosen: Setting, *, still: float = 0.0, thorough: bool = False) -> Driver:
+    """Somebody who drives about in a setting's room, after so long [s]; or everywhere, if he's thorough."""
+    rng = np.random.default_rng([*chosen.seed, 3])
+    who = Wanderer(chosen.room, rng, still=still, thorough=thorough)
+    return lambda t, posture: who.drive(t, posture, CONTROL)
+
+
+def as_built(plan: GspMap, rng: np.random.Generator) -> GspMap:
+    """The plan with errors as large as it says that it has: what its doubt means."""
+    lines = plan.lines
+    errors = rng.standard_normal((len(lines), 2)) * np.sqrt(lines.variances)
+    poses = lines.poses.copy()
+    poses[:, :2] += errors[:, :1] * lines.normals
+    poses[:, 2] += errors[:, 1]
+    return GspMap.of(plan.name, Lines.of(poses, lines.spans, lines.variances, lines.counts), plan.covariance)

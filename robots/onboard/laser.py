@@ -1,0 +1,208 @@
+"""A laser scanner's model and scans, and what a scan of a moving robot looks like from one place.
+
+Beams are counted from the right (−90 deg) to the left (+90 deg) of where the robot looks. A sweep takes time: each
+beam is measured from where the robot was then. *De-skewing* puts all of them into the robot's frame at one time, by
+the odometry.
+
+Source: Kim, Han, Kim, Kim 2002, section 2.1: 0 to 180 deg, 0.25 to 1 deg, 5 Hz, at most 25 Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vrs.checks import finite, number_in
+from vrs.errors import InvalidValueError
+from vrs.model import Array, frozen_array
+
+STEPS_DEG: Final = (0.25, 0.5, 1.0)
+"""Angles between two beams that the scanner can be set to [deg]."""
+RATES: Final = (5.0, 25.0)
+"""Scans a second: what the serial port carries, and what the scanner can [Hz]."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class LaserModel:
+    """How the scanner sees, and where it sits."""
+
+    rate: float = 5.0
+    """Scans a second [Hz], 5 or 25."""
+    step_deg: float = 0.5
+    """Between two beams [deg], 0.25, 0.5 or 1."""
+    reach: float = 8.0
+    """Farthest that it sees [m], in [0.5, 8]: a frame has 13 bits for millimetres."""
+    noise: float = 0.01
+    """Standard deviation of a range [m], in [0, 0.2]."""
+    dropouts: float = 0.005
+    """Probability that a beam brings nothing, in [0, 1]."""
+    sweep: float = 0.027
+    """From the first beam to the last [s], in [0, 0.2], not longer than between two scans."""
+    forward: float = 0.1
+    """How far the scanner is ahead of the driving axle [m], in [-2, 2]."""
+    height: float = 0.3
+    """Of its plane above the floor [m], in [0.01, 2]."""
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("rate", RATES), ("step_deg", STEPS_DEG)):
+            if getattr(self, name) not in allowed:
+                raise InvalidValueError(name, getattr(self, name), f"one of {', '.join(f'{a:g}' for a in allowed)}")
+        for name, low, high in (
+            ("reach", 0.5, 8.0), ("noise", 0.0, 0.2), ("dropouts", 0.0, 1.0), ("sweep", 0.0, 0.2),
+            ("forward", -2.0, 2.0), ("height", 0.01, 2.0),
+        ):  # fmt: skip
+            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
+        number_in("sweep", self.sweep, 0.0, 1 / self.rate, unit=f" s at {self.rate:g} Hz")
+
+    @property
+    def beams(self) -> int:
+        """How many beams a scan has."""
+        return round(180.0 / self.step_deg) + 1
+
+    @property
+    def angles(self) -> Array:
+        """Where each beam looks [rad], (beams,), in the robot's frame."""
+        return beam_angles(self.beams)
+
+
+def beam_angles(count: int) -> Array:
+    """Where each of so many beams over 180 deg looks [rad], in the robot's frame."""
+    return np.linspace(-0.5 * math.pi, 0.5 * math.pi, count)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaserScan:
+    """One sweep."""
+
+    time: float
+    """Of its first beam [s]."""
+    ranges: Array
+    """[m], (beams,), from right to left; inf where nothing came back."""
+    sweep: float = 0.0
+    """From the first beam to the last [s]."""
+    forward: float = 0.0
+    """How far the scanner is ahead of the driving axle [m]."""
+
+    def __post_init__(self) -> None:
+        ranges = np.asarray(self.ranges, dtype=np.float64)
+        if ranges.ndim != 1 or len(ranges) < 2 or not (ranges >= 0).all():
+            raise InvalidValueError("ranges", ranges.shape, "two or more, from 0 [m], inf where nothing came back")
+        for name in ("time", "sweep", "forward"):
+            finite(name, getattr(self, name), "a finite number")
+
+    @property
+    def end(self) -> float:
+        """Time of the last beam [s]."""
+        return self.time + self.sweep
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """What a scan saw, in the robot's frame at one time."""
+
+    places: Array
+    """[m], (k, 2), in the order of the beams."""
+    origins: Array
+    """Where the scanner was for each [m], (k, 2)."""
+    ways: Array
+    """Directions of the beams, unit vectors, (k, 2)."""
+    beams: NDArray[np.int64]
+    """Numbers of the beams, (k,): what is missing between two wasn't seen."""
+
+    @property
+    def ranges(self) -> Array:
+        """[m], (k,)."""
+        return np.asarray(np.sum((self.places - self.origins) * self.ways, axis=1))
+
+
+class OdometryTrack:
+    """The last readings of the odometry, linear in between."""
+
+    def __init__(self, kept: float = 2.0) -> None:
+        """Keep so many seconds."""
+        self._kept = kept
+        self._times: deque[float] = deque()
+        self._postures: deque[tuple[float, float, float]] = deque()
+
+    @property
+    def newest(self) -> tuple[float, float, float] | None:
+        """The last reading, (x, y, θ) [m, m, rad]."""
+        return self._postures[-1] if self._postures else None
+
+    @property
+    def time(self) -> float:
+        """Of the last reading [s], −inf before the first."""
+        return self._times[-1] if self._times else -math.inf
+
+    @property
+    def bend(self) -> float:
+        """How much more or less the robot turned between the last two readings than before [rad]."""
+        if len(self._times) < 3:
+            return 0.0
+        t0, t1, t2 = (self._times[k] for k in (-3, -2, -1))
+        a, b, c = (self._postures[k][2] for k in (-3, -2, -1))
+        return abs((c - b) - (b - a) * (t2 - t1) / (t1 - t0))
+
+    def add(self, time: float, posture: tuple[float, float, float]) -> None:
+        """Take a reading, θ counted on past ±π; one that isn't newer than the last is no news.
+
+        Raises:
+            InvalidValueError: If a number isn't finite.
+        """
+        if not all(map(math.isfinite, (time, *posture))):
+            raise InvalidValueError("odometry", (time, *posture), "a time and three finite numbers (x, y, θ)")
+        if time <= self.time:
+            return
+        self._times.append(time)
+        self._postures.append(posture)
+        while self._times[0] < time - self._kept:
+            self._times.popleft()
+            self._postures.popleft()
+
+    def covers(self, start: float, end: float) -> bool:
+        """Whether readings reach from one time to another [s]."""
+        return bool(self._times) and self._times[0] <= start + _ROUNDING and end <= self.time + _ROUNDING
+
+    def at(self, times: Array) -> Array:
+        """Postures at times [s], (k, 3)."""
+        first = max(bisect_left(self._times, float(times.min())) - 1, 0)
+        t = np.array([self._times[k] for k in range(first, len(self._times))])
+        rows = np.array([self._postures[k] for k in range(first, len(self._times))])
+        return np.stack([np.interp(times, t, rows[:, k]) for k in range(3)], axis=-1)
+
+
+def deskewed(scan: LaserScan, odometry: OdometryTrack | None = None) -> Points:
+    """What a scan saw, in the robot's frame at the odometry's last reading.
+
+    Args:
+        scan: A sweep that the odometry covers.
+        odometry: The readings; a robot that stood still, unless given.
+
+    Returns:
+        A point for each beam that came back.
+    """
+    beams = np.flatnonzero(np.isfinite(scan.ranges))
+    count = len(scan.ranges)
+    angles = beam_angles(count)[beams]
+    ranges = scan.ranges[beams]
+    if odometry is None or odometry.newest is None:
+        x, y, turn = np.zeros(len(beams)), np.zeros(len(beams)), np.zeros(len(beams))
+    else:
+        times = scan.time + scan.sweep * beams / (count - 1)
+        now_x, now_y, now_theta = odometry.newest
+        at = odometry.at(times) if len(beams) else np.zeros((0, 3))
+        c, s = math.cos(now_theta), math.sin(now_theta)
+        dx, dy = at[:, 0] - now_x, at[:, 1] - now_y
+        x, y, turn = c * dx + s * dy, c * dy - s * dx, at[:, 2] - now_theta
+    origins = np.column_stack([x + scan.forward * np.cos(turn), y + scan.forward * np.sin(turn)])
+    ways = np.column_stack([np.cos(angles + turn), np.sin(angles + turn)])
+    places = origins + ranges[:, None] * ways
+    beams.flags.writeable = False
+    return Points(frozen_array(places), frozen_array(origins), frozen_array(ways), beams)

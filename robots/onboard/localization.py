@@ -1,0 +1,245 @@
+"""Where a robot is, from its odometry, its laser and a line map; how sure that is, and what can't be known."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from robots.onboard.gsp_map import GspMap, Lines
+from robots.onboard.laser import LaserScan, OdometryTrack, Points, deskewed
+from robots.onboard.line_extraction import Extraction, ExtractionConfig, extract
+from robots.onboard.line_filter import LineFilter, MotionConfig, Sights
+from robots.onboard.line_matching import MatchingConfig, matched
+from robots.onboard.scan_check import Evidence, evidence
+from vrs.checks import number_in
+from vrs.mobile import wrapped
+from vrs.mobile.kinematics import sinc
+from vrs.model import Array, frozen_array
+
+_BENT = 0.1
+"""Share of a change in turning by which a scan's heading may be off: the odometry's readings don't say how the
+robot turned in between. If it changes evenly it's 1/12."""
+_TOLD = 0.05
+"""Least share of a direction's doubt that a scan has to take away for anything to be learned from it."""
+_SURPRISE = 6.0
+"""Larger mean squares of corrections count as this: one scan alone may be wrong."""
+_REMEMBERED = 100
+"""Scans of which it's remembered where they were taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizationConfig:
+    """Of everything that localizes."""
+
+    extraction: ExtractionConfig = field(default_factory=ExtractionConfig)
+    """What counts as a line."""
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """How far odometry is trusted."""
+    matching: MatchingConfig = field(default_factory=MatchingConfig)
+    """Which lines are the same."""
+    across_floor: float = 0.0005
+    """What a seen line is off across beside its noise [m], in [0, 0.1]: a sweep in motion, wrong cuts."""
+    turn_floor: float = 3e-4
+    """And in direction [rad], in [0, 0.1]."""
+    fresh: float = 0.2
+    """What lines are off beside noise is another after so long a way [m], in [0, 10]; until then scans share it."""
+    fresh_turn: float = 0.15
+    """Or after so much turning [rad], in [0, 7]."""
+    slip: float = 0.1
+    """Standard deviation of a sudden slip that the motion doesn't allow for [m], in [0, 1]."""
+    slip_turn: float = 0.07
+    """And of the heading [rad], in [0, 1]."""
+    learning: float = 0.2
+    """How fast it's learned that odometry is worse than was said, a scan, in [0, 1]."""
+    most_unrest: float = 25.0
+    """Largest factor by which variances of the odometry grow so, in [1, 1000]."""
+    better: float = 0.1
+    """A slip is believed if this share of the beams is explained by it and not without, in [0, 1]."""
+    unknown: float = 0.1
+    """A standard deviation from lines alone above which a direction counts as unobservable [m], in [0.01, 10]."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("across_floor", 0.0, 0.1), ("turn_floor", 0.0, 0.1), ("fresh", 0.0, 10.0), ("fresh_turn", 0.0, 7.0),
+            ("slip", 0.0, 1.0), ("slip_turn", 0.0, 1.0),
+            ("better", 0.0, 1.0), ("learning", 0.0, 1.0), ("most_unrest", 1.0, 1000.0), ("unknown", 0.01, 10.0),
+        ):  # fmt: skip
+            number_in(name, getattr(self, name), low, high)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observability:
+    """What the lines of one scan say by themselves, without odometry and earlier scans."""
+
+    information: Array
+    """Of (x, y, θ), (3, 3): inverse of the covariance that they alone would give."""
+    unobservable: Array
+    """Unit vectors of the directions in the plane of which they say nothing, (0 to 2, 2)."""
+    heading: bool
+    """Whether they tell the heading."""
+
+
+def observability(information: Array, unknown: float) -> Observability:
+    """Say what can't be known.
+
+    Args:
+        information: Of the posture, (3, 3).
+        unknown: Standard deviation [m] above which a direction isn't known.
+    """
+    turn = float(information[2, 2])
+    if turn <= 0:
+        return Observability(frozen_array(information), frozen_array(np.eye(2)), False)
+    place = information[:2, :2] - np.outer(information[:2, 2], information[2, :2]) / turn
+    values, vectors = np.linalg.eigh(place)
+    return Observability(frozen_array(information), frozen_array(vectors[:, values < unknown**-2].T), True)
+
+
+class Tracker:
+    """Follows a robot through a known map, or one that it builds; it takes odometry and scans as they come."""
+
+    def __init__(
+        self,
+        known: GspMap,
+        posture: tuple[float, float, float],
+        covariance: Array,
+        config: LocalizationConfig | None = None,
+        *,
+        building: bool = False,
+    ) -> None:
+        """Begin at a posture that is known so well.
+
+        Args:
+            known: The map.
+            posture: (x, y, θ) [m, m, rad].
+            covariance: Of it, (3, 3).
+            config: Of everything.
+            building: Whether lines that are new go into the map, and old ones are corrected.
+        """
+        self._config = LocalizationConfig() if config is None else config
+        self.filter = LineFilter(posture, covariance, known, self._config.motion, building=building)
+        self.odometry = OdometryTrack()
+        self.noise = self._config.extraction.noise
+        """Of the ranges, as the scans show it [m]."""
+        self.sights: Sights | None = None
+        """What was recognised in the last scan."""
+        self.extraction: Extraction | None = None
+        """What lines it had."""
+        self.seen = Lines.none()
+        """The same lines, in the robot's frame, with all of their doubt."""
+        self.points: Points | None = None
+        """What it saw, in the robot's frame when it was taken in."""
+        self.seen_from = posture
+        """Where the robot was then, as was known with it, (x, y, θ) [m, m, rad]."""
+        self.evidence = Evidence(0.0, 0.0, 0.0, 1.0)
+        """How the last scan fits the map, beam by beam."""
+        self._information = np.zeros((3, 3))
+        self._scanned = -math.inf
+        self._places: deque[tuple[float, float, float]] = deque(maxlen=_REMEMBERED)
+        """Where the last scans were taken."""
+
+    @property
+    def posture(self) -> tuple[float, float, float]:
+        """Where the robot is at the last reading of the odometry, (x, y, θ) [m, m, rad]."""
+        return self.filter.posture
+
+    @property
+    def covariance(self) -> Array:
+        """Of the posture, (3, 3)."""
+        return self.filter.covariance
+
+    @property
+    def observability(self) -> Observability:
+        """What the last scan's lines say by themselves."""
+        return observability(self._information, self._config.unknown)
+
+    def move(self, time: float, reading: tuple[float, float, float]) -> None:
+        """Take a reading of the odometry, in its own frame, θ counted on; one that isn't newer is no news."""
+        track = self.odometry
+        if time <= track.time:
+            return
+        before, was = track.newest, track.time
+        track.add(time, reading)
+        if before is None:
+            return
+        way, turn = step_between(before, reading)
+        self.filter.move(way, turn, time - was)
+
+    def see(self, scan: LaserScan) -> bool:
+        """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
+        if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
+            return False
+        self._scanned = scan.time
+        self.points = points = deskewed(scan, self.odometry)
+        self.extraction = found = extract(points, self._config.extraction, self.noise)
+        if math.isfinite(found.noise):
+            self.noise += 0.1 * (min(max(found.noise, 1e-3), 0.1) - self.noise)
+        self._take(found)
+        return True
+
+    def _take(self, found: Extraction) -> None:
+        config = self._config
+        alike = self._alike(self.filter.posture)
+        floors = alike * np.array([config.across_floor**2, config.turn_floor**2])
+        seen = self.seen = replace(found.lines, variances=frozen_array(found.lines.variances + floors))
+        turned = (_BENT * self.odometry.bend) ** 2
+        sights = matched(self.filter, seen, config.matching, turned)
+        if len(seen) > len(sights.of):
+            sights = self._slipped(seen, sights)
+        self.sights = sights
+        H = self.filter.innovation(sights).H[:, :, :3]
+        self._information = np.einsum("kai,ka,kaj->ij", H, 1 / sights.lines.variances, H)
+        before, doubt = np.array(self.filter.posture), self.filter.covariance
+        self.filter.correct(sights)
+        self._learn(np.array(self.filter.posture) - before, doubt - self.filter.covariance)
+        self.seen_from = self.filter.posture
+        self.evidence = self._hold(self.filter)
+
+    def _learn(self, shift: Array, doubt: Array) -> None:
+        """Trust odometry less if corrections are larger than their covariance (3, 3) says, and more if not."""
+        scale = np.sqrt(np.maximum(np.diag(doubt), 1e-16))
+        values, vectors = np.linalg.eigh(doubt / np.outer(scale, scale))
+        told = values > _TOLD
+        if not told.any():
+            return
+        squares = (vectors.T @ (shift / scale))[told] ** 2 / values[told]
+        config, more = self._config, min(float(squares.mean()), _SURPRISE) - 1.0
+        unrest = self.filter.unrest * math.exp(config.learning * more)
+        self.filter.unrest = min(max(unrest, 1.0), config.most_unrest)
+
+    def _alike(self, here: tuple[float, float, float]) -> int:
+        """How many of the last scans were taken nearly from here, with this one."""
+        config = self._config
+        self._places.append(here)
+        x, y, theta = np.array(self._places).T
+        near = np.hypot(x - here[0], y - here[1]) < config.fresh
+        return int(np.sum(near & (np.abs(theta - here[2]) < config.fresh_turn)))
+
+    def _hold(self, held: LineFilter) -> Evidence:
+        assert self.points is not None
+        return evidence(held.lines, self.points, held.posture, self.noise)
+
+    def _slipped(self, seen: Lines, sights: Sights) -> Sights:
+        """Look farther around if more lines are recognised there, and the scan agrees with it beam by beam."""
+        config = self._config
+        wide = self.filter.widened(config.slip, config.slip_turn)
+        again = matched(wide, seen, config.matching, sights.turned)
+        if len(again.of) < 2 or again.lines.lengths.sum() < 1.3 * sights.lines.lengths.sum():
+            return sights
+        here, there = self.filter.widened(0.0, 0.0), wide.widened(0.0, 0.0)
+        here.correct(sights)
+        there.correct(again)
+        if self._hold(there).explained < self._hold(here).explained + config.better:
+            return sights
+        self.filter = wide
+        return again
+
+
+def step_between(before: tuple[float, float, float], after: tuple[float, float, float]) -> tuple[float, float]:
+    """Length [m], negative backwards, and angle [rad] of the arc between two readings of the odometry."""
+    turn = wrapped(after[2] - before[2])
+    dx, dy = after[0] - before[0], after[1] - before[1]
+    middle = before[2] + 0.5 * turn
+    return (dx * math.cos(middle) + dy * math.sin(middle)) / sinc(0.5 * turn), turn

@@ -1,0 +1,181 @@
+"""A line map from a drive: the robot finds its place in the map so far, and puts into it what is new.
+
+Posture and lines are estimated together (`LineFilter`, building), so that what the robot didn't know of its place
+when it saw a line is in that line's doubt, and lines seen from one place share their errors. A new line goes into
+the map when it was seen at one place several times over a while: who walks doesn't stay, and is too narrow. Lines
+that prove to be one are merged; there's no smoothing over the whole drive afterwards.
+
+Sources: Kim, Han, Kim, Kim 2002, section 3.1, which cites Kim and Kim 2001 for the building of the map; the joint
+estimate after Smith, Self and Cheeseman 1990.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from robots.onboard.gsp_map import GspMap, Lines
+from robots.onboard.laser import LaserScan
+from robots.onboard.line_filter import LineFilter, Sights
+from robots.onboard.localization import LocalizationConfig, Tracker
+from vrs.checks import number_in
+from vrs.mobile import wrapped
+from vrs.model import Array, frozen_array
+
+_EXACT = 1e-12
+"""Variance of a start that defines the frame [m², rad²]: numbers stay sound."""
+_WAITING = 400
+"""Sightings of new lines that are kept, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuildingConfig:
+    """What comes into a map."""
+
+    localization: LocalizationConfig = field(default_factory=LocalizationConfig)
+    """Of the robot that builds it."""
+    shortest: float = 0.5
+    """Shorter lines stay out [m], in [0.1, 10]: a person is narrower."""
+    sightings: int = 3
+    """How often a line must have been seen, in [1, 100]."""
+    lasting: float = 0.7
+    """And over how long [s], in [0, 60]."""
+    memory: float = 5.0
+    """A sighting counts for so long [s], in [0.1, 600]."""
+    turn: float = 0.06
+    """Two sightings of a new line differ by no more [rad], in [1e-3, 1]."""
+    across: float = 0.05
+    """Nor by more across [m], in [1e-3, 1]."""
+    gap: float = 0.3
+    """Lines are merged across a gap of so much [m], in [0, 5]."""
+    same: float = 9.2
+    """And if they differ by less than this, squared and in their own doubt, in [0.1, 100]."""
+    across_floor: float = 0.0005
+    """What a line of the map is off across beside what the estimate says [m], in [0, 0.1]: wrong cuts don't average
+    out."""
+    turn_floor: float = 2e-4
+    """And in direction [rad], in [0, 0.1]."""
+    most: int = 400
+    """Lines of a map, 1 to 2000; then no new ones come."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("shortest", 0.1, 10.0), ("sightings", 1, 100), ("lasting", 0.0, 60.0), ("memory", 0.1, 600.0),
+            ("turn", 1e-3, 1.0), ("across", 1e-3, 1.0), ("gap", 0.0, 5.0), ("same", 0.1, 100.0), ("most", 1, 2000),
+            ("across_floor", 0.0, 0.1), ("turn_floor", 0.0, 0.1),
+        ):  # fmt: skip
+            number_in(name, getattr(self, name), low, high)
+
+
+class MapBuilder(Tracker):
+    """Builds a map while it follows its robot."""
+
+    def __init__(
+        self,
+        posture: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        covariance: Array | None = None,
+        config: BuildingConfig | None = None,
+    ) -> None:
+        """Begin without a line.
+
+        Args:
+            posture: Where the robot is in the map's frame, (x, y, θ) [m, m, rad].
+            covariance: How well that is known, (3, 3); exactly, unless given.
+            config: What comes into the map.
+        """
+        self._building = config = BuildingConfig() if config is None else config
+        start = _EXACT * np.eye(3) if covariance is None else covariance
+        empty = GspMap.of("built", Lines.none())
+        super().__init__(empty, posture, start, config.localization, building=True)
+        self._new: deque[tuple[float, Array]] = deque(maxlen=_WAITING)
+        """When, and the pose and span of each new line that waits, (5,)."""
+
+    def see(self, scan: LaserScan) -> bool:
+        """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
+        taken = super().see(scan)
+        if taken:
+            self._grow()
+        return taken
+
+    def _grow(self) -> None:
+        """Stretch what was recognised, and take in what is new and has lasted."""
+        assert self.sights is not None
+        assert self.extraction is not None
+        self.filter.stretch(self.sights)
+        fresh = self._fresh(self.seen, self.sights)
+        placed = fresh.moved(self.posture)
+        now, config = self.odometry.time, self._building
+        while self._new and self._new[0][0] < now - config.memory:
+            self._new.popleft()
+        lasting = np.array(
+            [self._lasted(now, pose, span) for pose, span in zip(placed.poses, placed.spans, strict=True)]
+        )
+        for pose, span in zip(placed.poses, placed.spans, strict=True):
+            self._new.append((now, np.concatenate([pose, span])))
+        if len(fresh) and lasting.any() and len(self.filter.lines) + int(lasting.sum()) <= config.most:
+            self.filter.add(fresh.taken(lasting))
+            merge(self.filter, config)
+
+    def _fresh(self, seen: Lines, sights: Sights) -> Lines:
+        """Lines that aren't in the map, nor nearly."""
+        long = seen.lengths >= self._building.shortest
+        used = {tuple(pose) for pose in sights.lines.poses.tolist()}
+        new = np.array([tuple(pose) not in used for pose in seen.poses.tolist()], dtype=np.bool_)
+        return seen.taken(np.flatnonzero(long & new))
+
+    def _lasted(self, now: float, pose: Array, span: Array) -> bool:
+        """Whether a line was seen here often enough and for long enough."""
+        config = self._building
+        x, y, theta = pose.tolist()
+        c, s = math.cos(theta), math.sin(theta)
+        count, first = 1, now
+        for t, (ox, oy, other, low, high) in self._new:
+            along, off = c * (ox - x) + s * (oy - y), c * (oy - y) - s * (ox - x)
+            if abs(wrapped(other - theta)) > config.turn or abs(off) > config.across:
+                continue
+            if along + low < span[1] and along + high > span[0]:
+                count, first = count + 1, min(first, t)
+        return count >= config.sightings and now - first >= config.lasting
+
+    def built(self, name: str = "built") -> GspMap:
+        """The map so far."""
+        merge(self.filter, self._building)
+        config = self._building
+        floors = np.tile([config.across_floor**2, config.turn_floor**2], len(self.filter.lines))
+        covariance = self.filter.line_covariance + np.diag(floors)
+        lines = replace(self.filter.lines, variances=frozen_array(np.diag(covariance).reshape(-1, 2)))
+        return GspMap.of(name, lines, covariance)
+
+
+def merge(held: LineFilter, config: BuildingConfig) -> None:
+    """Merge lines of a map that is being built that are one."""
+    i = 0
+    while i < len(held.lines):
+        other = _same_as(held, i, config)
+        if other is None:
+            i += 1
+        else:
+            held.join(i, other)
+
+
+def _same_as(held: LineFilter, i: int, config: BuildingConfig) -> int | None:
+    """A later line that is the same as line i, if there's one."""
+    lines = held.lines
+    pose, span = lines.poses[i], lines.spans[i]
+    later = np.arange(i + 1, len(lines))
+    if not len(later):
+        return None
+    turn = np.remainder(lines.poses[later, 2] - pose[2] + math.pi, math.tau) - math.pi
+    delta = lines.poses[later, :2] - pose[:2]
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    along, off = delta @ (c, s), delta @ (-s, c)
+    gap = np.maximum(along + lines.spans[later, 0] - span[1], span[0] - along - lines.spans[later, 1])
+    near = (np.abs(turn) < 3 * config.turn) & (np.abs(off) < 3 * config.across) & (gap < config.gap)
+    for k in np.flatnonzero(near):
+        j = int(later[k])
+        if held.difference(i, j) < config.same:
+            return j
+    return None
