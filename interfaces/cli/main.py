@@ -16,6 +16,7 @@ from interfaces.cli.doctor import doctor
 from interfaces.cli.export import export
 from interfaces.cli.lab import lab
 from interfaces.cli.link import link
+from interfaces.cli.middleware import middleware
 from interfaces.cli.replay import replay
 from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
@@ -49,6 +50,7 @@ app.command()(robot)
 app.command()(run)
 app.command()(serve)
 app.add_typer(rsp)
+app.add_typer(middleware)
 
 
 def _version(value: bool) -> None:

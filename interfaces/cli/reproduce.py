@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="doulgeri, han2001, kim2006, or all for every paper.")
+        str, typer.Argument(metavar="PAPER", help="doulgeri, han2001, kim2006, tipsuwan, or all for every paper.")
     ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where PAPER.json and the figures go.")],
     seed: Annotated[
@@ -34,7 +34,8 @@ def reproduce(
             min=2,
             max=3600,
             metavar="S",
-            help="Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001, 30 for kim2006.",
+            help="Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001, 30 for kim2006, 15 for "
+            "tipsuwan.",
         ),
     ] = None,
     workers: Annotated[

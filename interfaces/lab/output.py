@@ -122,9 +122,9 @@ def rich_tables(reproduction: Reproduction) -> list[RichTable]:
             table.add_row(*(cell.replace("[", r"\[") for cell in cells), holds)
         made.append(table)
     for plain in found.tables:
-        table = Table(title=plain.title, title_justify="left")
+        table = Table(title=plain.title.replace("[", r"\["), title_justify="left")
         for k, name in enumerate(plain.columns):
-            table.add_column(name, justify="left" if k == 0 else "right")
+            table.add_column(name.replace("[", r"\["), justify="left" if k == 0 else "right")
         for row in plain.rows:
             table.add_row(*(_said(cell).replace("[", r"\[") for cell in row))
         made.append(table)

@@ -8,6 +8,8 @@ from robots.onboard.command_filter import (
     FilterEventKind,
     FilterOutput,
 )
+from robots.onboard.curve import Curve, CurveKind, CurvePoint
+from robots.onboard.curve_file import load_curve, read_curve
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, FollowingMonitor, Tolerance
 from robots.onboard.free_ways import Outline
@@ -28,6 +30,14 @@ from robots.onboard.paper_localization import PaperConfig, PaperLocalizer
 from robots.onboard.path import Arc, MovingPath, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
 from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
+from robots.onboard.pure_pursuit import PurePursuit, PurePursuitConfig
+from robots.onboard.quadratic_tracker import (
+    Backwards,
+    QuadraticCurveTracker,
+    QuadraticTrackerConfig,
+    parabola_drive,
+    wheel_rates,
+)
 from robots.onboard.servo import FeedForward, Servo, ServoGains
 from robots.onboard.stamps import Kind, Stamp, Verdict
 from robots.onboard.stops import StopMotion, at_rest, from_commanded, from_measured
@@ -54,12 +64,16 @@ __all__ = [
     "Answer",
     "Arc",
     "AvoidanceConfig",
+    "Backwards",
     "BeginStop",
     "BuildingConfig",
     "Candidate",
     "CellChange",
     "CommandFilter",
     "CommandFilterConfig",
+    "Curve",
+    "CurveKind",
+    "CurvePoint",
     "Drive",
     "Ended",
     "EnvironmentSupervisor",
@@ -114,6 +128,10 @@ __all__ = [
     "Pivot",
     "Posture",
     "Projection",
+    "PurePursuit",
+    "PurePursuitConfig",
+    "QuadraticCurveTracker",
+    "QuadraticTrackerConfig",
     "Reference",
     "Refusal",
     "RefusalCode",
@@ -147,8 +165,12 @@ __all__ = [
     "extract",
     "from_commanded",
     "from_measured",
+    "load_curve",
     "load_map",
     "locate",
+    "parabola_drive",
+    "read_curve",
     "read_map",
     "save_map",
+    "wheel_rates",
 ]

@@ -1,0 +1,93 @@
+"""`vrs middleware`: train a gain network, and say how good it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vrs.errors import FormatError
+
+if TYPE_CHECKING:
+    from interfaces.middleware import Errors, GainNetwork, TrainingConfig
+
+EXAMPLES = 100_000
+"""Factors and delays that a network is tested with, of each kind."""
+
+middleware = typer.Typer(name="middleware", help="The network middleware of a mobile robot: its gain network.")
+
+
+@middleware.callback()
+def _root() -> None:
+    """The network middleware of a mobile robot: its gain network."""
+
+
+@middleware.command()
+def train(
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where the network goes, as JSON.")],
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="Seed of the weights to begin with.")
+    ] = 0,
+    epsilon: Annotated[
+        float, typer.Option("--epsilon", min=1e-6, max=3, metavar="E", help="Tolerance of the measure J.")
+    ] = 0.25,
+    neurons: Annotated[int, typer.Option("--neurons", min=1, max=1000, metavar="N", help="Hidden ones.")] = 20,
+    epochs: Annotated[
+        int, typer.Option("--epochs", min=1, max=100_000, metavar="N", help="Most steps of training.")
+    ] = 2000,
+    as_json: Annotated[bool, typer.Option("--json", help="Write what was found on standard output.")] = False,
+) -> None:
+    """Train the network that says how fast a robot may go, and test it against the exact gain."""
+    from interfaces.middleware import TrainingConfig
+
+    _hold(out)
+    network = _trained(TrainingConfig(epsilon=epsilon, neurons=neurons, epochs=epochs), seed)
+    try:
+        out.write_text(network.to_json(), encoding="utf-8")
+    except OSError as error:
+        raise FormatError(str(out), f"can't hold the network: {error.strerror}") from None
+    found = _tested(network)
+    if as_json:
+        import json
+
+        errors = {kind: one._asdict() for kind, one in found.items()}
+        summary = {"file": str(out), "seed": seed, "epsilon": epsilon, "epochs": network.epochs, "errors": errors}
+        typer.echo(json.dumps(summary, indent=2))
+        return
+    for kind, one in found.items():
+        typer.echo(f"A {kind}: relative error of K p99 {one.p99:.1e}, largest {one.largest:.1e}")
+    typer.echo(f"Wrote {out} after {network.epochs} epochs")
+
+
+def _hold(out: Path) -> None:
+    """See to it that a long training isn't for nothing."""
+    if out.is_dir() or not out.absolute().parent.is_dir():
+        raise FormatError(str(out), "must be a file in a directory that exists")
+
+
+def _trained(config: TrainingConfig, seed: int) -> GainNetwork:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from interfaces.middleware import train
+
+    columns = (TextColumn("training"), BarColumn(), TextColumn("{task.fields[error]}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("training", total=config.epochs, error="")
+        return train(
+            config,
+            seed=seed,
+            progress=lambda epoch, error: bar.update(
+                task, completed=epoch, error=f"mean squared error {error:.1e}"
+            ),
+        )
+
+
+def _tested(network: GainNetwork) -> dict[str, Errors]:
+    import numpy as np
+
+    from interfaces.middleware.training import errors, examples
+
+    chosen = examples(network.ranges, EXAMPLES, np.random.default_rng([network.seed, 1]))
+    return {kind: errors(network, *given) for kind, given in chosen.items()}

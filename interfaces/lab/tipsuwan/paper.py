@@ -1,0 +1,21 @@
+"""The parts of the reproduction, in the paper's order."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from interfaces.lab.claims import Paper, Part
+from interfaces.lab.tipsuwan import extent, gain, success, wrapping
+
+PAPER: Final = Paper(
+    "tipsuwan",
+    "Tipsuwan, Chow: Model Predictive Path Tracking via Middleware for Networked Mobile Robot over IP Network",
+    (
+        Part.single("Gain", gain.work),
+        Part("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES),
+        Part("Success", success.work, success.conclude, success.CASES),
+        Part("Where it stops", extent.work, extent.conclude, extent.CASES),
+    ),
+    length=15.0,
+)
+"""As `vrs reproduce tipsuwan` runs it."""

@@ -1,0 +1,197 @@
+"""Section VII, Fig. 7: no delay, delay without and delay with the middleware, on 20 S paths over networks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from interfaces.lab.claims import Cell, Claim, Figure, Findings, Study, Table
+from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.statistics import bootstrap
+from interfaces.lab.tipsuwan.measures import EVERY, Reason, beside, measured
+from interfaces.lab.tipsuwan.run import ROBOTS, Control, Setting, Track, agent, network_of, no_delay, run
+from interfaces.lab.tipsuwan.s_paths import SLOWEST, predicted_time, s_path
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
+PATHS: Final = 20
+LEAST_SHARE: Final = 0.95
+"""Of the runs, in which everything that is claimed must be so."""
+MOST_RATIO: Final = 0.4
+"""Largest mean error with the middleware, as a share of that without."""
+SOURCE: Final = "Section VII, Fig. 7"
+CASES: Final = tuple(f"{robot} {path}" for robot in ROBOTS for path in range(PATHS))
+IDEAL: Final = "no delay"
+LABELS: Final = {
+    Control.DIRECT: "without middleware",
+    Control.EXACT: "middleware, exact gain",
+    Control.NETWORK: "middleware, network",
+    Control.PREDICTIVE: "model-predictive control",
+}
+BEHIND: Final = (Control.NETWORK, Control.EXACT)
+"""What success is asked of."""
+
+
+class Seen(NamedTuple):
+    """Figures of a run."""
+
+    arrived: bool
+    seconds: float
+    """How long it took [s]."""
+    error: float
+    """Mean distance from the path [m]."""
+    progress: float
+    """Share of the path that was made."""
+    reason: Reason
+
+
+class Found(NamedTuple):
+    """Of one robot on one path."""
+
+    t_pred: float
+    """For the longest median round trip [s]."""
+    ideal: Seen
+    """Without delay."""
+    runs: dict[Control, tuple[Seen, ...]]
+    """A run a delay seed."""
+    tracks: dict[str, Track]
+    """Those of the first path and seed, for the picture; none but there."""
+
+
+def seen(track: Track) -> Seen:
+    """Sum up a run."""
+    return Seen(track.arrived, float(track.t[-1]), *measured(track))
+
+
+def succeeds(ideal: Seen, without: Seen, behind: Seen) -> bool:
+    """Whether the claim is so: it arrives without delay, not with delay alone, and with middleware well."""
+    arrivals = ideal.arrived and behind.arrived and not without.arrived
+    return arrivals and behind.error <= MOST_RATIO * without.error
+
+
+def work(study: Study, case: str) -> Found:
+    """All controls and delay seeds of a robot on a path."""
+    robot, path = case.split()
+    setting = Setting(length=study.length)
+    curve = s_path(1000 * study.seed + int(path))
+    ideal = run(curve, agent(Control.DIRECT, curve, setting), no_delay(), study.seed, robot=robot, setting=setting)
+    runs: dict[Control, list[Seen]] = {}
+    tracks = {IDEAL: ideal}
+    for k in range(study.seed, study.seed + study.runs):
+        for control in Control:
+            track = run(
+                curve, agent(control, curve, setting, robot), network_of(k), k, robot=robot, setting=setting
+            )
+            runs.setdefault(control, []).append(seen(track))
+            tracks.setdefault(LABELS[control], track)
+    kept = tracks if path == "0" else {}
+    found = {control: tuple(them) for control, them in runs.items()}
+    return Found(predicted_time(curve, SLOWEST, setting.middleware.epsilon), seen(ideal), found, kept)
+
+
+def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
+    """Shares of success, what became of every control, and Fig. 7."""
+    found: dict[str, Found] = dict(zip(CASES, results, strict=True))
+    claims: list[Claim] = []
+    tables: list[Table] = []
+    figures: list[Figure] = []
+    for robot in ROBOTS:
+        paths = [found[case] for case in CASES if case.split()[0] == robot]
+        claims += [_claim(robot, control, paths, study.seed) for control in BEHIND]
+        tables += [_controls(robot, paths), _paths(robot, paths)]
+        tracks = found[f"{robot} 0"].tracks
+        if tracks:
+            figures.append(_figure(robot, tracks))
+    return Findings(tuple(claims), tuple(tables), tuple(figures))
+
+
+def _successes(paths: Sequence[Found], control: Control) -> list[bool]:
+    return [
+        succeeds(path.ideal, without, behind)
+        for path in paths
+        for without, behind in zip(path.runs[Control.DIRECT], path.runs[control], strict=True)
+    ]
+
+
+def _claim(robot: str, control: Control, paths: Sequence[Found], seed: int) -> Claim:
+    shares = bootstrap([float(yes) for yes in _successes(paths, control)], seed)
+    text = (
+        f"{robot}, {LABELS[control]}: no delay arrives, delay without middleware doesn't, with it does, with at "
+        f"most {MOST_RATIO:g} of its mean error: share of {PATHS} paths × networks"
+    )
+    return Claim(
+        text, SOURCE, f"{LEAST_SHARE:g} or more", shares.value, shares.value >= LEAST_SHARE, shares.interval
+    )
+
+
+def _controls(robot: str, paths: Sequence[Found]) -> Table:
+    """A row a control: arrivals, times, errors, and reasons of failure."""
+    runs = {IDEAL: [path.ideal for path in paths]}
+    runs |= {LABELS[control]: [one for path in paths for one in path.runs[control]] for control in Control}
+    without = np.mean([one.error for one in runs[LABELS[Control.DIRECT]]])
+    rows: list[tuple[Cell, ...]] = []
+    for name, them in runs.items():
+        arrived = [one.seconds for one in them if one.arrived]
+        errors = [one.error for one in them]
+        rows.append((
+            name, len(arrived) / len(them), float(np.median(arrived)) if arrived else None,
+            100 * float(np.mean(errors)), float(np.mean(errors) / without),
+            float(np.mean([one.progress for one in them])), reasons(them),
+        ))  # fmt: skip
+    columns = (
+        "control", "arrived", "after, median [s]", "mean error [cm]", "share of that without", "path made",
+        "why not",
+    )  # fmt: skip
+    return Table(f"{robot}_controls", f"{robot}: what became of the runs (link loss: hold)", columns, tuple(rows))
+
+
+def _paths(robot: str, paths: Sequence[Found]) -> Table:
+    """A row a path: its predicted time, the share of success, and how the robot without middleware failed."""
+    rows = []
+    for k, path in enumerate(paths):
+        without = path.runs[Control.DIRECT]
+        good = np.mean(_successes([path], Control.NETWORK))
+        made = float(np.mean([one.progress for one in without]))
+        slowest = max(one.seconds for one in path.runs[Control.NETWORK])
+        rows.append((k, path.t_pred, float(good), slowest, made, reasons(without)))
+    columns = ("path", "T_pred [s]", "success", "longest with [s]", "path made without", "why not")
+    return Table(f"{robot}_paths", f"{robot}: path by path", columns, tuple(rows))
+
+
+def reasons(runs: Sequence[Seen]) -> str:
+    """How many runs failed for which reason, the most frequent one first."""
+    counted = Counter(one.reason for one in runs if not one.arrived)
+    return ", ".join(f"{why} {many}" for why, many in counted.most_common())
+
+
+COLOURS: Final = {
+    IDEAL: GOOD,
+    LABELS[Control.DIRECT]: BAD,
+    LABELS[Control.EXACT]: MUTED,
+    LABELS[Control.NETWORK]: VIRTUAL,
+    LABELS[Control.PREDICTIVE]: REAL,
+}
+
+
+def _figure(robot: str, tracks: dict[str, Track]) -> Figure:
+    def paint(canvas: Canvas) -> None:
+        left, right = canvas.subplots(1, 2)
+        left.plot(*tracks[IDEAL].curve.table[1].T, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="path")
+        for name in (LABELS[Control.DIRECT], IDEAL, LABELS[Control.NETWORK], LABELS[Control.PREDICTIVE]):
+            track = tracks[name]
+            away = 100 * np.abs(beside(track)[0])
+            left.plot(*track.postures[:, :2].T, color=COLOURS[name], label=name, linewidth=1.1)
+            right.plot(EVERY * np.arange(len(away)), away, color=COLOURS[name], label=name, linewidth=1.1)
+        left.set_aspect("equal", adjustable="datalim")
+        left.set_xlabel("x [m]")
+        left.set_ylabel("y [m]")
+        right.set_xlabel("time [s]")
+        right.set_ylabel("distance from the path [cm]")
+        right.set_ylim(bottom=0)
+        legend(left, place="lower left")
+
+    return draw(f"fig7_{robot}", f"{robot}: an S path over a network, Fig. 7", paint, height=3.4)

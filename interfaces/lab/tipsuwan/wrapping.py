@@ -1,0 +1,108 @@
+"""Section VI: the middleware is put before controllers that nobody changed for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from interfaces.lab.claims import Cell, Claim, Findings, Study, Table
+from interfaces.lab.statistics import bootstrap
+from interfaces.lab.tipsuwan.run import LIFTED, ROBOTS, Control, Setting, behind, network_of, no_delay, run
+from interfaces.lab.tipsuwan.s_paths import s_path
+from interfaces.lab.tipsuwan.success import Seen, reasons, seen
+from interfaces.middleware import Controller
+from robots.onboard.curve import Curve
+from robots.onboard.path import Arc, MovingPath
+from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
+from robots.onboard.pure_pursuit import PurePursuit, PurePursuitConfig
+from robots.onboard.quadratic_tracker import QuadraticCurveTracker
+
+SPEED: Final = 1.2
+"""Of pure pursuit, and largest of the uni-vector field [m/s]."""
+PIECE: Final = 0.05
+"""Of the path of arcs that the uni-vector field follows [m]."""
+PATHS: Final = 4
+
+
+def _tracker(curve: Curve, setting: Setting) -> Controller:
+    return QuadraticCurveTracker(curve, setting.tracker).control
+
+
+def _pursuit(curve: Curve, setting: Setting) -> Controller:  # noqa: ARG001
+    return PurePursuit(curve, PurePursuitConfig(SPEED, most_turning=LIFTED.w_max)).control
+
+
+def _field(curve: Curve, setting: Setting) -> Controller:
+    """The uni-vector controller on a path of arcs along the curve."""
+    path = arcs_of(curve)
+    config = PathFollowingConfig(period=setting.agent.period, cruise=SPEED, limits=LIFTED)
+    return PathFollowingController(path, config).control
+
+
+def arcs_of(curve: Curve) -> MovingPath:
+    """A path of arcs, each as long as the next along the curve and turning by as much."""
+    count = math.ceil(curve.length / PIECE)
+    step = curve.length / count
+    places = [curve.at(k * step) for k in range(count + 1)]
+    start = places[0]
+    path = MovingPath((start.x, start.y, start.theta))
+    for place, after in pairwise(places):
+        path.append(Arc(math.remainder(after.theta - place.theta, math.tau) / step, step))
+    return path
+
+
+CONTROLLERS: Final[dict[str, Callable[[Curve, Setting], Controller]]] = {
+    "quadratic curve": _tracker,
+    "uni-vector field": _field,
+    "pure pursuit": _pursuit,
+}
+"""What makes each controller for a path."""
+CASES: Final = tuple(f"{robot}/{name}" for robot in ROBOTS for name in CONTROLLERS)
+
+
+def work(study: Study, case: str) -> dict[str, tuple[Seen, ...]]:
+    """A controller on a robot: without delay, with delay alone, and behind the middleware; a run a path each."""
+    robot, name = case.split("/")
+    setting = Setting(length=study.length)
+    found: dict[str, list[Seen]] = {}
+    for path in range(min(PATHS, study.runs)):
+        number = 1000 * study.seed + path
+        curve, network = s_path(number), network_of(number)
+        for way, control, delay in (
+            ("no delay", Control.DIRECT, no_delay()),
+            ("without", Control.DIRECT, network),
+            ("with", Control.NETWORK, network),
+        ):
+            driver = behind(control, CONTROLLERS[name](curve, setting), setting.middleware)
+            track = run(curve, driver, delay, number, robot=robot, setting=setting)
+            found.setdefault(way, []).append(seen(track))
+    return {way: tuple(runs) for way, runs in found.items()}
+
+
+def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
+    """What the middleware does for each of the controllers."""
+    found: dict[str, dict[str, tuple[Seen, ...]]] = dict(zip(CASES, results, strict=True))
+    claims = tuple(_claim(case, runs, study.seed) for case, runs in found.items())
+    rows: list[tuple[Cell, ...]] = []
+    for case, runs in found.items():
+        for way, them in runs.items():
+            arrived = float(np.mean([one.arrived for one in them]))
+            rows.append((*case.split("/"), way, arrived, _mean_error(them), reasons(them)))
+    columns = ("robot", "controller", "middleware", "arrived", "mean error [cm]", "why not")
+    return Findings(claims, (Table("wrapping", "Controllers behind the middleware", columns, tuple(rows)),))
+
+
+def _mean_error(runs: tuple[Seen, ...]) -> float:
+    return 100 * float(np.mean([one.error for one in runs]))
+
+
+def _claim(case: str, runs: dict[str, tuple[Seen, ...]], seed: int) -> Claim:
+    robot, name = case.split("/")
+    ratios = [behind.error / without.error for behind, without in zip(runs["with"], runs["without"], strict=True)]
+    ratio = bootstrap(ratios, seed)
+    text = f"{robot}, {name}: mean error with the middleware as a share of that without"
+    return Claim(text, "Section VI", "under 1", ratio.value, ratio.high < 1.0, ratio.interval)

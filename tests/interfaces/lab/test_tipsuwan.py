@@ -1,0 +1,270 @@
+"""`vrs reproduce tipsuwan` in small: runs of both robots, what is said of them, claims that follow the figures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from interfaces.lab.claims import Study
+from interfaces.lab.tipsuwan import PAPER, extent, gain, success, wrapping
+from interfaces.lab.tipsuwan.measures import Reason, measured
+from interfaces.lab.tipsuwan.predictive import PredictiveConfig
+from interfaces.lab.tipsuwan.run import (
+    ARRIVAL,
+    LIFTED,
+    MEDIANS,
+    Control,
+    Setting,
+    Track,
+    agent,
+    leg,
+    network_of,
+    no_delay,
+    run,
+)
+from interfaces.lab.tipsuwan.s_paths import MOST_CURVATURE, T_PRED, predicted_time, s_path
+from interfaces.lab.tipsuwan.success import CASES, PATHS, Found, Seen, succeeds
+from interfaces.middleware import MiddlewareConfig
+from robots.onboard.curve import Curve
+from vrs.errors import InvalidValueError
+
+SMALL = Study(seed=0, runs=2, length=15.0)
+SETTING = Setting()
+CURVE = s_path(2)
+
+
+def driven(control, delay, *, robot="kinematic", setting=SETTING, seed=1, curve=CURVE):
+    return run(curve, agent(control, curve, setting), delay, seed, robot=robot, setting=setting)
+
+
+@pytest.mark.parametrize("robot", ["kinematic", "ipr"])
+def test_the_papers_three_cases(robot):
+    ideal = driven(Control.DIRECT, no_delay(), robot=robot)
+    without = driven(Control.DIRECT, network_of(1), robot=robot)
+    behind = driven(Control.NETWORK, network_of(1), robot=robot)
+    assert succeeds(*map(success.seen, (ideal, without, behind)))
+    assert ideal.t[-1] < behind.t[-1] < without.t[-1] == pytest.approx(15.0)
+    assert measured(without).reason is Reason.LIMIT_CYCLE
+    assert 0.1 < measured(without).progress < 1.0
+    if robot == "ipr":
+        assert np.abs(behind.drives[:, 0]).max() <= LIFTED.v_max
+
+
+def test_a_run_repeats_to_the_last_bit_and_the_seed_matters():
+    first, again, other = (driven(Control.NETWORK, network_of(1), seed=seed) for seed in (1, 1, 2))
+    assert np.array_equal(first.postures, again.postures)
+    assert len(first.t) != len(other.t) or not np.array_equal(first.postures, other.postures)
+
+
+def test_the_exact_gain_and_the_networks_drive_alike():
+    exact, network = (driven(control, network_of(3)) for control in (Control.EXACT, Control.NETWORK))
+    k = min(len(exact.t), len(network.t)) - 1
+    assert math.dist(exact.postures[k, :2], network.postures[k, :2]) < 0.05
+
+
+def test_the_predictive_controller_arrives_sooner():
+    predictive, behind = (driven(control, network_of(1)) for control in (Control.PREDICTIVE, Control.EXACT))
+    assert predictive.arrived
+    assert predictive.t[-1] < 0.8 * behind.t[-1]
+    assert measured(predictive).error < 0.03
+
+
+def test_no_drive_breaks_the_tolerance():
+    track = driven(Control.NETWORK, leg(0.3))
+    v, w = track.drives.T
+    # The mean of ten round trips isn't below the shortest: that's 2 (0.15 − 0.01) s.
+    shortest = 2 * 0.14
+    J = shortest * np.hypot(v * np.sinc(w * shortest / math.tau), w)
+    assert J.max() <= 0.25 * (1 + 1e-9)
+    assert J.max() > 0.2
+
+
+def test_half_a_middleware_is_worse_than_a_whole_one():
+    whole = driven(Control.EXACT, network_of(1))
+    for predicts in (True, False):
+        config = MiddlewareConfig(predicts=predicts, schedules=not predicts)
+        half = driven(Control.EXACT, network_of(1), setting=Setting(middleware=config))
+        assert measured(half).error > 1.3 * measured(whole).error or not half.arrived
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_s_is_what_was_fixed(seed):
+    curve = s_path(seed)
+    t_pred = predicted_time(curve, 0.23, 0.25)
+    assert T_PRED[0] - 1e-6 <= t_pred <= T_PRED[1] + 1e-6
+    assert curve.table[2].max() <= MOST_CURVATURE
+    assert curve.at(0.0)[:2] == (0.0, 1.0)
+    bends = [curve.at(s).curvature for s in np.linspace(0, curve.length, 400)]
+    assert min(bends) < -0.3
+    assert max(bends) > 0.3
+
+
+def test_a_short_path_is_a_flat_s():
+    curve = s_path(0, 4.0, tau=0.6)
+    assert predicted_time(curve, 0.6, 0.25) == pytest.approx(4.0, rel=1e-3)
+    assert curve.length < 1.7
+    assert curve.table[2].max() <= MOST_CURVATURE
+
+
+def test_the_predicted_time_is_the_integral():
+    radius = 2.0
+    arc = Curve([(radius * math.sin(t), radius * (1 - math.cos(t))) for t in np.linspace(0, 3, 200)])
+    exact = 0.23 / 0.25 * math.hypot(1, 1 / radius) * 3 * radius
+    assert predicted_time(arc, 0.23, 0.25) == pytest.approx(exact, rel=1e-3)
+    assert predicted_time(s_path(0, 5.0, tau=0.1), 0.1, 0.25) == pytest.approx(5.0, rel=1e-3)
+
+
+def test_the_network_has_the_medians_that_were_fixed():
+    for seed in range(3):
+        profile = network_of(seed)
+        assert MEDIANS[0] <= 2 * profile.quantile(0.5) <= MEDIANS[1]
+        rng = np.random.default_rng(seed)
+        there, back = profile.source(rng), profile.source(rng)
+        trips = [there.draw(2.0 * k) + back.draw(2.0 * k) for k in range(4000)]
+        # The sum of two skewed extras has a median above the sum of theirs.
+        assert MEDIANS[0] <= np.median(trips) <= MEDIANS[1] + 0.01
+        assert min(trips) > 2 * profile.quantile(0.5) - 0.02
+
+
+def track(x, y, theta=0.0, v=0.0, *, curve=None, arrived=False):
+    t = 0.01 * np.arange(1501)
+    columns = [np.broadcast_to(np.asarray(values, dtype=float), t.shape) for values in (x, y, theta, v)]
+    drives = np.stack([columns[3], np.zeros_like(t)], -1)
+    return Track(curve or Curve([(0, 0), (10, 0)]), t, np.stack(columns[:3], -1), drives, arrived)
+
+
+def test_reasons_are_told_apart():
+    t = 0.01 * np.arange(1501)
+    assert measured(track(t / 2, 0.0)).reason is Reason.SLOW
+    assert measured(track(1.0, 0.3)).reason is Reason.STUCK
+    assert measured(track(t / 5, 0.1 * np.sin(4 * t))).reason is Reason.LIMIT_CYCLE
+    assert measured(track(2.0, 0.1, v=np.sign(np.sin(4 * t)))).reason is Reason.LIMIT_CYCLE
+    assert measured(track(1 + np.cos(2 * t), np.sin(2 * t), 2 * t)).reason is Reason.CIRCLING
+    assert measured(track(10.0, 0.0, arrived=True)).reason is Reason.ARRIVED
+
+
+def test_errors_and_progress_are_measured():
+    t = 0.01 * np.arange(1501)
+    found = track(t / 3, 0.2)
+    assert measured(found).error == pytest.approx(0.2)
+    assert measured(found).progress == pytest.approx(0.5, abs=0.01)
+    # What is crossed isn't made: the other leg of a hairpin is another part of the path.
+    hairpin = Curve([(0, 0), (4, 0), (4.5, 0.5), (4, 1), (0, 1)])
+    crossed = track(np.minimum(t / 2, 2.0), np.clip(t - 6, 0, 1), curve=hairpin)
+    assert measured(crossed).progress == pytest.approx(2.0 / hairpin.length, abs=0.05)
+    assert measured(track(0.0, 0.0, arrived=True)).progress == 1.0
+
+
+GOOD = {
+    "ideal": Seen(True, 5.0, 0.01, 1.0, Reason.ARRIVED),
+    "without": Seen(False, 15.0, 0.1, 0.8, Reason.LIMIT_CYCLE),
+    "behind": Seen(True, 11.0, 0.02, 1.0, Reason.ARRIVED),
+}
+
+
+@pytest.mark.parametrize(("who", "instead"), [
+    ("ideal", GOOD["without"]), ("without", GOOD["behind"]), ("behind", GOOD["without"]),
+    ("behind", GOOD["behind"]._replace(error=0.041)),
+])  # fmt: skip
+def test_success_is_all_of_it(who, instead):
+    assert succeeds(ideal=GOOD["ideal"], without=GOOD["without"], behind=GOOD["behind"])
+    assert not succeeds(**(GOOD | {who: instead}))
+
+
+def concluded(bad):
+    """Claims where so many of the runs of each path fail without delay."""
+    found = []
+    for k, _ in enumerate(CASES):
+        behind = tuple(GOOD["behind"] if n >= bad and k % PATHS < 10 else GOOD["without"] for n in range(10))
+        if bad == 0:
+            behind = (GOOD["behind"],) * 10
+        runs = dict.fromkeys(Control, behind) | {Control.DIRECT: (GOOD["without"],) * 10}
+        found.append(Found(8.5, GOOD["ideal"], runs, {}))
+    return success.conclude(SMALL, tuple(found))
+
+
+def test_claims_hold_as_the_figures_say():
+    assert all(claim.holds and claim.measured == 1.0 for claim in concluded(0).claims)
+    findings = concluded(1)
+    assert len(findings.claims) == 4
+    assert not any(claim.holds for claim in findings.claims)
+    assert findings.claims[0].measured == pytest.approx(0.45)
+    table = next(table for table in findings.tables if table.name == "ipr_paths")
+    assert table.rows[0][-1] == "limit cycle 10"
+
+
+def test_a_case_is_run_by_all_controls():
+    found = success.work(Study(seed=0, runs=2, length=2.0), "kinematic 0")
+    assert {control: len(runs) for control, runs in found.runs.items()} == dict.fromkeys(Control, 2)
+    assert set(found.tracks) == {success.IDEAL, *success.LABELS.values()}
+    figure = success._figure("kinematic", found.tracks)
+    assert figure.svg.startswith("<?xml")
+
+
+def test_the_map_has_a_letter_a_run_and_says_why():
+    found = extent.work(Study(seed=0, runs=2, length=3.0), "T_pred 4")
+    assert list(found) == list(extent.TAUS)
+    assert {len(letters) for letters in found.values()} == {1}
+    assert {letter for letters in found.values() for letter in letters} <= set(extent.WHY)
+    assert extent.said(("·", "·", "w", "m")) == "50 w"
+    assert extent.said(("·", "·")) == "100"
+    results = tuple(found for _ in extent.CASES)
+    made = extent.conclude(SMALL, results)
+    assert [len(table.rows) for table in made.tables] == [len(values) for values in extent.AXES.values()]
+    assert made.figures[0].svg.startswith("<?xml")
+
+
+def test_other_controllers_go_behind_it():
+    results = []
+    for case in wrapping.CASES:
+        if case.startswith("kinematic"):
+            results.append(wrapping.work(Study(seed=0, runs=2, length=15.0), case))
+        else:
+            results.append(results[-1])
+    found = wrapping.conclude(SMALL, tuple(results))
+    assert all(claim.holds for claim in found.claims)
+    assert len(found.tables[0].rows) == 3 * len(wrapping.CASES)
+
+
+def test_the_arcs_of_a_curve_lie_along_it():
+    path = wrapping.arcs_of(CURVE)
+    end = CURVE.at(CURVE.length)
+    assert path.length == pytest.approx(CURVE.length)
+    assert math.dist(path.end[:2], (end.x, end.y)) < 0.02
+
+
+def test_the_gains_claims_hold(monkeypatch):
+    monkeypatch.setattr(gain, "EXAMPLES", 5000)
+    monkeypatch.setattr(gain, "GUARDED", 20_000)
+    monkeypatch.setattr(gain, "RAW", gain.RAW.__class__(formulation="raw", epochs=10, factors=51))
+    found = gain.work(SMALL, "")
+    assert [claim.claim for claim in found.claims if not claim.holds] == []
+    assert len(found.claims) == 10
+    raw = [row for row in found.tables[0].rows if row[0].startswith("the paper's")]
+    assert all(row[4] > 0.1 for row in raw)
+    assert found.timings[0].holds
+
+
+def test_the_paper_is_in_the_list():
+    assert PAPER.name == "tipsuwan"
+    assert (PAPER.runs, PAPER.length) == (10, 15.0)
+    assert ARRIVAL == 0.05
+    tracker = SETTING.tracker
+    assert (tracker.alpha, tracker.s_max, tracker.beta, SETTING.middleware.epsilon) == (2.0, 0.3, 0.1, 0.25)
+    assert (SETTING.middleware.probing.period, SETTING.agent.period) == (0.005, 0.01)
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Setting(length=0.0), "length must be"),
+    (lambda: leg(0.01), "median must be"),
+    (lambda: leg(0.2, -1.0), "correlation time must be"),
+    (lambda: PredictiveConfig(period=0.2), "period must be"),
+    (lambda: PredictiveConfig(horizon=0), "horizon must be"),
+    (lambda: PredictiveConfig(effort=(0.0, 0.1)), "effort must be"),
+    (lambda: driven(Control.DIRECT, no_delay(), robot="r2d2"), "one of kinematic, ipr"),
+])  # fmt: skip
+def test_impossible_settings_are_refused(make, said):
+    with pytest.raises(InvalidValueError, match=said):
+        make()
