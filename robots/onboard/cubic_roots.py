@@ -6,8 +6,12 @@ import math
 
 _TINY = 1e-12
 """A leading coefficient smaller than this share of the largest counts as 0."""
+_NEAR = 1e-4
+"""The closed form isn't off by more than this, as a share of the roots' size: further away is another root."""
 _TWINS = 1e-9
 """Two roots that aren't real by no more than this, as a share of the third one's square, count as one."""
+_ROUNDED = 1e-14
+"""And those by no more than this times the cube of all roots' mean over the third one: rounding does as much."""
 
 
 def real_roots(a: float, b: float, c: float, d: float) -> list[float]:
@@ -24,12 +28,13 @@ def real_roots(a: float, b: float, c: float, d: float) -> list[float]:
     shift = b / 3
     p, q = c - b * shift, 2 * shift**3 - shift * c + d
     t = _farthest(p, q)
-    root = _polished(t - shift, b, c, d)
+    near = _NEAR * (abs(t) + abs(shift))
+    root = _polished(t - shift, near, b, c, d)
     inside = -3 * t * t - 4 * p
-    if inside < -_TWINS * t * t:
+    if inside < -_TWINS * t * t - _ROUNDED * abs(shift) ** 3 / max(abs(t), 1e-300):
         return [root]
     half = 0.5 * math.sqrt(max(inside, 0.0))
-    return [root, *(_polished(-0.5 * t + side - shift, b, c, d) for side in (half, -half))]
+    return [root, *(_polished(-0.5 * t + side - shift, near, b, c, d) for side in (half, -half))]
 
 
 def _farthest(p: float, q: float) -> float:
@@ -46,12 +51,13 @@ def _farthest(p: float, q: float) -> float:
     return math.copysign(2 * size * math.cos(math.acos(min(abs(half) / cube, 1.0)) / 3), -half)
 
 
-def _polished(x: float, b: float, c: float, d: float) -> float:
-    """A step of Newton's method nearer to a root, if it is one: the closed form cancels."""
+def _polished(x: float, near: float, b: float, c: float, d: float) -> float:
+    """A step of Newton's method nearer to a root, if it is one and near by: the closed form cancels."""
     slope = (3 * x + 2 * b) * x + c
     value = ((x + b) * x + c) * x + d
     moved = x - value / slope if slope else x
-    return moved if abs(((moved + b) * moved + c) * moved + d) < abs(value) else x
+    nearer = abs(((moved + b) * moved + c) * moved + d) < abs(value)
+    return moved if nearer and abs(moved - x) <= near else x
 
 
 def _quadratic_roots(a: float, b: float, c: float, largest: float) -> list[float]:

@@ -48,6 +48,7 @@ def test_as_many_as_numpy_finds(coefficients):
         ((1.0, 0.0, 0.0, 0.0), [0.0]),
         ((0.0, 1.0, 0.0, 0.0), [0.0]),
         ((2.0, 0.0, 0.0, -16.0), [2.0]),
+        ((1.0, 1.0, 1e-135, 1e-135), [-1.0, 0.0]),
     ],
 )
 def test_lesser_degrees_and_triple_roots(coefficients, roots):
