@@ -46,7 +46,7 @@ rows.push([station.session.now, Math.atan2(elements[1], elements[0])]); requestA
 requestAnimationFrame(look); }"""
 _TASKS = """() => { window.held = []; new PerformanceObserver((list) => { for (const entry of list.getEntries())
 for (const { duration, sourceURL, invoker } of entry.scripts) held.push([duration, sourceURL, invoker]);
-}).observe({ type: 'long-animation-frame', buffered: false }); }"""
+}).observe({ type: 'long-animation-frame', buffered: true }); }"""
 
 
 @contextlib.contextmanager

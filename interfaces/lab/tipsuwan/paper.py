@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from interfaces.lab.claims import Paper, Part
-from interfaces.lab.tipsuwan import extent, gain, success, wrapping
+from interfaces.lab.tipsuwan import extent, gain, shorter, success, wrapping
 
 PAPER: Final = Paper(
     "tipsuwan",
@@ -14,6 +14,7 @@ PAPER: Final = Paper(
         Part.single("Gain", gain.work),
         Part("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES),
         Part("Success", success.work, success.conclude, success.CASES),
+        Part("Shorter paths", shorter.work, shorter.conclude, shorter.CASES),
         Part("Where it stops", extent.work, extent.conclude, extent.CASES),
     ),
     length=15.0,

@@ -17,6 +17,8 @@ MOST_CURVATURE: Final = 6.0
 T_PRED: Final = (8.0, 9.0)
 """Of the random paths [s]: at most 9, so that the middleware has the time; not much less, as a robot without it
 gets to the end of a short path in 15 s, too, swinging (the map has the shorter ones)."""
+SHORTER: Final = (6.0, 9.0)
+"""Of random paths of which many are shorter [s]."""
 SLOWEST: Final = 0.23
 """Round trip that counts in T_pred [s]: the longest median."""
 _FLATTER: Final = 0.95
@@ -36,19 +38,27 @@ def predicted_time(curve: Curve, tau: float, epsilon: float) -> float:
     return tau / epsilon * float(np.sum(np.diff(s) * 0.5 * (root[1:] + root[:-1])))
 
 
-def s_path(seed: int, t_pred: float | None = None, *, tau: float = SLOWEST, epsilon: float = 0.25) -> Curve:
+def s_path(
+    seed: int,
+    t_pred: float | None = None,
+    *,
+    within: tuple[float, float] = T_PRED,
+    tau: float = SLOWEST,
+    epsilon: float = 0.25,
+) -> Curve:
     """Draw an S: two bends, one to either side, as a cubic spline from (0, 1) on.
 
     Shapes that bend more than 6 /m are drawn anew, flatter and flatter: a short path holds no deep S.
 
     Args:
         seed: Of the shape.
-        t_pred: Its predicted time, which sets its size [s]; drawn from 8 to 9 s, unless given.
+        t_pred: Its predicted time, which sets its size [s]; drawn, unless given.
+        within: From where it's drawn, least and most [s].
         tau: Round trip of that time [s].
         epsilon: Tolerance ε of that time.
     """
     rng = np.random.default_rng([seed, 13])
-    wanted = float(rng.uniform(*T_PRED)) if t_pred is None else t_pred
+    wanted = float(rng.uniform(*within)) if t_pred is None else t_pred
     depth = 1.0
     while True:
         curve = _sized(_shape(rng, depth), wanted, tau, epsilon)

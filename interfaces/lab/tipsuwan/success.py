@@ -13,10 +13,12 @@ from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw, l
 from interfaces.lab.statistics import bootstrap
 from interfaces.lab.tipsuwan.measures import EVERY, Reason, beside, measured
 from interfaces.lab.tipsuwan.run import ROBOTS, Control, Setting, Track, agent, network_of, no_delay, run
-from interfaces.lab.tipsuwan.s_paths import SLOWEST, predicted_time, s_path
+from interfaces.lab.tipsuwan.s_paths import SLOWEST, T_PRED, predicted_time, s_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
+
+    from robots.onboard.curve import Curve
 
 PATHS: Final = 20
 LEAST_SHARE: Final = 0.95
@@ -76,21 +78,25 @@ def succeeds(ideal: Seen, without: Seen, behind: Seen) -> bool:
 def work(study: Study, case: str) -> Found:
     """All controls and delay seeds of a robot on a path."""
     robot, path = case.split()
+    found = ran(study, robot, s_path(1000 * study.seed + int(path)), tuple(Control))
+    return found if path == "0" else found._replace(tracks={})
+
+
+def ran(study: Study, robot: str, curve: Curve, controls: Sequence[Control]) -> Found:
+    """Some controls and all delay seeds of a robot on a path."""
     setting = Setting(length=study.length)
-    curve = s_path(1000 * study.seed + int(path))
     ideal = run(curve, agent(Control.DIRECT, curve, setting), no_delay(), study.seed, robot=robot, setting=setting)
     runs: dict[Control, list[Seen]] = {}
     tracks = {IDEAL: ideal}
     for k in range(study.seed, study.seed + study.runs):
-        for control in Control:
+        for control in controls:
             track = run(
                 curve, agent(control, curve, setting, robot), network_of(k), k, robot=robot, setting=setting
             )
             runs.setdefault(control, []).append(seen(track))
             tracks.setdefault(LABELS[control], track)
-    kept = tracks if path == "0" else {}
     found = {control: tuple(them) for control, them in runs.items()}
-    return Found(predicted_time(curve, SLOWEST, setting.middleware.epsilon), seen(ideal), found, kept)
+    return Found(predicted_time(curve, SLOWEST, setting.middleware.epsilon), seen(ideal), found, tracks)
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
@@ -101,8 +107,8 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     figures: list[Figure] = []
     for robot in ROBOTS:
         paths = [found[case] for case in CASES if case.split()[0] == robot]
-        claims += [_claim(robot, control, paths, study.seed) for control in BEHIND]
-        tables += [_controls(robot, paths), _paths(robot, paths)]
+        claims += [claim(robot, control, paths, T_PRED, study.seed) for control in BEHIND]
+        tables += [controls(robot, paths), _paths(robot, paths)]
         tracks = found[f"{robot} 0"].tracks
         if tracks:
             figures.append(_figure(robot, tracks))
@@ -117,28 +123,31 @@ def _successes(paths: Sequence[Found], control: Control) -> list[bool]:
     ]
 
 
-def _claim(robot: str, control: Control, paths: Sequence[Found], seed: int) -> Claim:
+def claim(robot: str, control: Control, paths: Sequence[Found], within: tuple[float, float], seed: int) -> Claim:
+    """Whether enough of the runs succeed."""
     shares = bootstrap([float(yes) for yes in _successes(paths, control)], seed)
     text = (
         f"{robot}, {LABELS[control]}: no delay arrives, delay without middleware doesn't, with it does, with at "
-        f"most {MOST_RATIO:g} of its mean error: share of {PATHS} paths × networks"
+        f"most {MOST_RATIO:g} of its mean error: share of {PATHS} paths × networks, T_pred {within[0]:g} to "
+        f"{within[1]:g} s"
     )
     return Claim(
         text, SOURCE, f"{LEAST_SHARE:g} or more", shares.value, shares.value >= LEAST_SHARE, shares.interval
     )
 
 
-def _controls(robot: str, paths: Sequence[Found]) -> Table:
+def controls(robot: str, paths: Sequence[Found], name: str = "controls", title: str = "") -> Table:
     """A row a control: arrivals, times, errors, and reasons of failure."""
     runs = {IDEAL: [path.ideal for path in paths]}
-    runs |= {LABELS[control]: [one for path in paths for one in path.runs[control]] for control in Control}
+    for control in paths[0].runs:
+        runs[LABELS[control]] = [one for path in paths for one in path.runs[control]]
     without = np.mean([one.error for one in runs[LABELS[Control.DIRECT]]])
     rows: list[tuple[Cell, ...]] = []
-    for name, them in runs.items():
+    for label, them in runs.items():
         arrived = [one.seconds for one in them if one.arrived]
         errors = [one.error for one in them]
         rows.append((
-            name, len(arrived) / len(them), float(np.median(arrived)) if arrived else None,
+            label, len(arrived) / len(them), float(np.median(arrived)) if arrived else None,
             100 * float(np.mean(errors)), float(np.mean(errors) / without),
             float(np.mean([one.progress for one in them])), reasons(them),
         ))  # fmt: skip
@@ -146,7 +155,8 @@ def _controls(robot: str, paths: Sequence[Found]) -> Table:
         "control", "arrived", "after, median [s]", "mean error [cm]", "share of that without", "path made",
         "why not",
     )  # fmt: skip
-    return Table(f"{robot}_controls", f"{robot}: what became of the runs (link loss: hold)", columns, tuple(rows))
+    said = f"{robot}: what became of the runs{title} (link loss: hold)"
+    return Table(f"{robot}_{name}", said, columns, tuple(rows))
 
 
 def _paths(robot: str, paths: Sequence[Found]) -> Table:

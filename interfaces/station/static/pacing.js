@@ -2,6 +2,8 @@
 
 /** Pixels of the drawing for one of the page, the finest first. */
 const RATIOS = [1, 0.75, 0.5, 0.35];
+/** Of them, where there's no graphics card: there a change holds the page up longer than any frame. */
+const SOFTWARE_LEVEL = 1;
 /** A frame that takes longer than this is slow, and so many of them in a row are too slow [ms]. */
 const SLOW = 70;
 const TOO_MANY = 3;
@@ -12,9 +14,13 @@ const MANY = 60;
 const SHARE = 0.5;
 
 export class Pacing {
-  /** @param {object} viewer MeshCat's; its `render` is replaced */
-  constructor(viewer) {
+  /**
+   * @param {object} viewer MeshCat's; its `render` is replaced
+   * @param {boolean} software whether it's drawn without a graphics card
+   */
+  constructor(viewer, software) {
     this.viewer = viewer;
+    this.adapts = !software;
     this.level = 0;
     this.slow = 0;
     this.quick = 0;
@@ -22,7 +28,7 @@ export class Pacing {
     this.drawnAt = -Infinity;
     const draw = viewer.render.bind(viewer);
     viewer.render = () => this.pass(draw);
-    this.set(0);
+    this.set(software ? SOFTWARE_LEVEL : 0);
   }
 
   set(level) {
@@ -41,6 +47,7 @@ export class Pacing {
 
   measure(cost) {
     this.cost = cost;
+    if (!this.adapts) return;
     this.slow = cost > SLOW ? this.slow + 1 : 0;
     this.quick = cost < QUICK ? this.quick + 1 : 0;
     if (this.slow >= TOO_MANY && this.level < RATIOS.length - 1) this.change(1);

@@ -65,6 +65,10 @@ const station = new Station(root, config);
 window.station = station;
 const { panels } = config;
 const modules = await Promise.all(panels.map((panel) => import(`./${panel.name}.js`)));
-panels.forEach((panel, k) => modules[k].mount(station, document.getElementById(`panel-${panel.name}`)));
+for (const [k, panel] of panels.entries()) {
+  // A task each: in one, all of them would hold the page up.
+  await new Promise((resolve) => setTimeout(resolve));
+  modules[k].mount(station, document.getElementById(`panel-${panel.name}`));
+}
 root.dataset.ready = "";
 station.dispatchEvent(new Event("ready"));

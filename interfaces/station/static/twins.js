@@ -16,7 +16,7 @@ export class StationScene extends window.VrsScene {
       else handle(command);
     };
     this.handle = handle;
-    this.pacing = new Pacing(this.viewer);
+    this.pacing = new Pacing(this.viewer, window.VrsScene.software);
   }
 
   /** How much further away than on the page of the view alone the camera stands: the arm stretched up fits too. */

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from interfaces.lab.claims import Study
-from interfaces.lab.tipsuwan import PAPER, extent, gain, success, wrapping
+from interfaces.lab.tipsuwan import PAPER, extent, gain, shorter, success, wrapping
 from interfaces.lab.tipsuwan.measures import Reason, measured
 from interfaces.lab.tipsuwan.predictive import PredictiveConfig
 from interfaces.lab.tipsuwan.run import (
@@ -24,7 +24,7 @@ from interfaces.lab.tipsuwan.run import (
     no_delay,
     run,
 )
-from interfaces.lab.tipsuwan.s_paths import MOST_CURVATURE, T_PRED, predicted_time, s_path
+from interfaces.lab.tipsuwan.s_paths import MOST_CURVATURE, SHORTER, T_PRED, predicted_time, s_path
 from interfaces.lab.tipsuwan.success import CASES, PATHS, Found, Seen, succeeds
 from interfaces.middleware import MiddlewareConfig
 from robots.onboard.curve import Curve
@@ -193,6 +193,18 @@ def test_claims_hold_as_the_figures_say():
     assert findings.claims[0].measured == pytest.approx(0.45)
     table = next(table for table in findings.tables if table.name == "ipr_paths")
     assert table.rows[0][-1] == "limit cycle 10"
+
+
+def test_shorter_paths_are_claimed_as_they_are():
+    assert 6.0 <= predicted_time(s_path(4, within=SHORTER), 0.23, 0.25) <= 9.0
+    runs = {Control.DIRECT: (GOOD["without"],) * 10, Control.NETWORK: (GOOD["behind"],) * 10}
+    paths = [Found(7.0, GOOD["ideal"], runs, {})] * PATHS
+    arriving = [Found(6.1, GOOD["ideal"], runs | {Control.DIRECT: (GOOD["behind"],) * 10}, {})] * 2
+    assert shorter.conclude(SMALL, tuple(paths)).claims[0].holds
+    findings = shorter.conclude(SMALL, tuple(paths[2:] + arriving))
+    assert findings.claims[0].measured == pytest.approx(0.9)
+    assert not findings.claims[0].holds
+    assert [row[0] for row in findings.tables[0].rows][1:] == ["without middleware", "middleware, network"]
 
 
 def test_a_case_is_run_by_all_controls():
