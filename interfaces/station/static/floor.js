@@ -14,10 +14,10 @@ const LEGEND = [
   ["driven", "Driven", "where both were"],
 ];
 
-/** A room is seen whole, which an arm's reach needn't be. */
+/** A robot in its room: the server says how far away all of that is seen. */
 class FloorScene extends StationScene {
   get further() {
-    return 1.42;
+    return 1.0;
   }
 }
 
