@@ -1,6 +1,7 @@
 // Driving: by buttons that are held, by keys, by the stick on the page and by a gamepad; and how both robots are.
-import { h, isTyping, mark, write } from "./dom.js";
+import { h, icon, isTyping, write } from "./dom.js";
 import { figure } from "./graphs.js";
+import { held, needs, Speed } from "./handling.js";
 import { mountPad } from "./pad.js";
 import { steering } from "./steer.js";
 
@@ -29,21 +30,13 @@ export function mount(station, box) {
   /** Keys that are down, by what they ask for. */
   const down = new Map();
 
-  const speed = h("input", { id: "speed", type: "range", min: 5, max: 100, step: 5 });
-  speed.value = localStorage.getItem(SPEED) ?? "60";
-  const speedText = h("output", { for: "speed" });
-  const showSpeed = () => {
-    localStorage.setItem(SPEED, speed.value);
-    write(speedText, `${speed.value} %`);
-  };
-  speed.addEventListener("input", showSpeed);
-  showSpeed();
+  const speed = new Speed(SPEED, "60");
 
   /** The drive that shares of the full speeds stand for; null before the limits are known. */
   function drive(forward, left) {
     const { welcome } = session;
     if (!welcome) return null;
-    const share = Number(speed.value) / 100;
+    const { share } = speed;
     const { v_max, w_max } = welcome.limits;
     const within = (part) => Math.max(-1, Math.min(1, part));
     return { type: "drive", v: within(forward) * share * v_max, w: within(left) * share * w_max, duration: welcome.holds };
@@ -58,9 +51,8 @@ export function mount(station, box) {
     return drive(...sum);
   };
 
-  const needs = h("p.needs", { id: "drive-needs" });
   const cross = h("div.cross", { role: "group", "aria-label": "Drive" },
-    ...BUTTONS.map((entry) => (entry ? held(...entry) : h("span", { "aria-hidden": "true" }))));
+    ...BUTTONS.map((entry) => (entry ? button(...entry) : h("span", { "aria-hidden": "true" }))));
   const pad = h("div.pad-row");
   const facts = h("dl.facts.drive-facts");
   const cells = {};
@@ -77,37 +69,19 @@ export function mount(station, box) {
     cells[name] = h("dd", { id: `drive-${name}` }, "–");
     facts.append(h("dt", { title }, label), cells[name]);
   }
-  box.append(needs,
-    h("div.row.speed", {}, h("label", { for: "speed" }, "Speed"), speed, speedText),
+  box.append(needs(station, box, "drive-needs"),
+    speed.row,
     h("div.drive-by", {}, cross, pad),
     h("p.hint", {}, "Arrow keys or W A S D drive, two at once make a curve; the space bar stops."),
     facts);
   mountPad(station, pad, steer, { twist: ([forward, left]) => drive(forward, left) }, WORDS);
 
-  function held(label, symbol, [forward, left]) {
-    const button = h("button.held", { type: "button", "aria-label": label, title: label, "aria-pressed": "false" },
-      h("i.material-icons", { "aria-hidden": "true" }, symbol));
-    const up = () => mark(button, "aria-pressed", "false");
-    const start = () => mark(button, "aria-pressed", String(steer.hold("button", () => drive(forward, left), up)));
-    const end = () => {
-      if (button.getAttribute("aria-pressed") !== "true") return;
-      up();
-      steer.release("button");
-    };
-    button.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
-      button.setPointerCapture(event.pointerId);
-      start();
-    });
-    for (const type of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(type, end);
-    button.addEventListener("keydown", (event) => event.key === "Enter" && !event.repeat && start());
-    button.addEventListener("keyup", (event) => event.key === "Enter" && end());
-    button.addEventListener("contextmenu", (event) => event.preventDefault());
-    return button;
+  function button(label, symbol, [forward, left]) {
+    return held(steer, "button", { "aria-label": label, title: label }, icon(symbol), () => drive(forward, left));
   }
 
   // Arrow keys drive again once the mouse has let go of what takes them too.
-  speed.addEventListener("pointerup", () => speed.blur());
+  speed.slider.addEventListener("pointerup", () => speed.slider.blur());
   station.layout.list.addEventListener("click", (event) => event.detail && document.activeElement.blur());
 
   window.addEventListener("keydown", (event) => {
@@ -123,16 +97,6 @@ export function mount(station, box) {
   window.addEventListener("keyup", (event) => {
     if (down.delete(event.code) && down.size === 0) steer.release("keys");
   });
-
-  function show() {
-    const ready = session.holds && session.link === "live";
-    box.toggleAttribute("data-idle", !ready);
-    const { lease } = session;
-    const why = session.link !== "live" ? "No connection." : session.mayCommand ? "" : "You are here to watch.";
-    const wait = lease.state === "held" ? `${lease.holder} has control.` : "Take control first, in the bar above.";
-    write(needs, ready ? "" : why || wait);
-    needs.hidden = ready;
-  }
 
   function tell() {
     const { state, welcome } = session;
@@ -150,7 +114,6 @@ export function mount(station, box) {
   }
 
   setInterval(tell, PERIOD);
-  for (const type of ["lease", "link", "welcome"]) station.on(type, show);
   // What was refused is said: the robot may be coming to rest, or wait.
   let said = "";
   station.on("outcome", ({ command, outcome }) => {
@@ -158,5 +121,4 @@ export function mount(station, box) {
     if (text && text !== said) station.announce(text, { urgent: true });
     said = text;
   });
-  show();
 }

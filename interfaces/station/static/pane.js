@@ -1,7 +1,8 @@
 // The 3D view: both robots, the committed path, what is shown and how far it can be trusted, and the past.
-import { clockText, h, icon, mark, write } from "./dom.js";
+import { clockText, h, write } from "./dom.js";
 import { History } from "./history.js";
 import { StationScene } from "./twins.js";
+import { Viewport } from "./viewport.js";
 
 const PERIOD = 80;
 /** How long a falsified frame is spoken of [s]. */
@@ -12,10 +13,6 @@ const BADGES = {
   falsified: ["report", "Falsified", "A command changed what had been shown"],
   none: ["help", "Nothing known", "Nothing has come from the server yet, or nothing comes any more"],
 };
-const OLD = {
-  stale: ["hourglass_empty", "Stale: what you see is old"],
-  lost: ["wifi_off", "Lost: what you see is old. Trying again"],
-};
 const LEGEND = [
   ["virtual", "Virtual", "ghost, as commanded"],
   ["real", "Real", "solid, as measured"],
@@ -24,20 +21,11 @@ const LEGEND = [
 
 export function mount(station, box) {
   const session = station.session;
-  const pane = h("div.pane", { id: "pane", role: "img", "aria-label": "Both robots in 3D" });
-  const labels = h("div.labels", { "aria-hidden": "true" });
-  const badgeIcon = icon("help");
-  const badgeText = h("span");
-  const badge = h("span.badge", { id: "badge", role: "status" }, badgeIcon, badgeText);
-  const banner = h("div.banner", { id: "banner", hidden: true });
-  const legend = h("ul.legend");
-  const home = h("button.quiet", { type: "button", id: "home", title: "Reset the view", "aria-label": "Reset the view" },
-    icon("center_focus_strong"));
   const ahead = h("span.ahead", { "aria-hidden": "true" });
-  box.append(pane, labels, legend, h("div.corner", {}, badge, ahead), home, banner);
+  const viewport = new Viewport(station, box, LEGEND, StationScene, ahead);
+  const { pane, scene } = viewport;
 
   const history = new History(station);
-  let scene = null;
   let falsifiedAt = -Infinity;
   let falsifiedBy = null;
   let newest = -Infinity;
@@ -46,7 +34,7 @@ export function mount(station, box) {
 
   const shared = (station.shared.pane = {
     pane,
-    get scene() { return scene; },
+    scene,
     /** Joints of the virtual robot as the picture shows them; null where nothing is known. */
     get shown() {
       const t = cursor ?? session.now;
@@ -64,31 +52,6 @@ export function mount(station, box) {
       say();
     },
   });
-
-  for (const [name, title, note] of LEGEND) {
-    const button = h("button", { type: "button", "aria-pressed": "true", title: note, "data-path": name },
-      h("i.key.key-" + name), title);
-    button.addEventListener("click", () => scene && mark(button, "aria-pressed", String(scene.toggle(name))));
-    legend.append(h("li", {}, button));
-  }
-  home.addEventListener("click", () => scene?.home());
-
-  try {
-    scene = new StationScene(pane, labels, () => {});
-  } catch {
-    pane.replaceChildren(h("p.no-3d", {}, "No 3D view: this browser offers no WebGL."));
-    legend.hidden = home.hidden = true;
-  }
-  if (scene) {
-    const connection = new window.VrsLink("/meshcat", ["vrs.meshcat.1"], {
-      take: (data) => scene.take(data),
-      state: () => {},
-    });
-    station.addEventListener("theme", (event) => scene.paint(event.detail));
-    station.addEventListener("unlocked", () => connection.connect());
-    scene.paint(station.shared.theme?.dark ?? document.documentElement.dataset.theme === "dark");
-    connection.connect();
-  }
 
   /** Put both robots where they were. */
   function dress() {
@@ -124,27 +87,13 @@ export function mount(station, box) {
   function say() {
     const status = standing();
     const [symbol, word, meaning] = BADGES[status];
-    mark(badge, "data-status", status);
-    write(badgeIcon, symbol);
     const by = status === "falsified" && falsifiedBy !== null ? ` by #${falsifiedBy}` : "";
-    write(badgeText, word + by + (cursor === null ? "" : ` · ${clockText(cursor)}`));
-    badge.title = meaning;
+    viewport.stand(status, symbol, word + by + (cursor === null ? "" : ` · ${clockText(cursor)}`));
+    viewport.badge.title = meaning;
     const live = session.link === "live";
     const left = live && cursor === null && scene ? scene.ahead : null;
     write(ahead, left === null ? "" : `real robot at rest in ${left.toFixed(1)} s`);
-    const shown = OLD[session.link];
-    banner.hidden = !shown && cursor === null;
-    mark(box, "data-link", session.link);
-    mark(banner, "data-kind", shown ? session.link : "past");
-    if (shown) fill(...shown);
-    else if (cursor !== null) fill("history", "You look at another time; the robot goes on");
-  }
-
-  let filled = "";
-  function fill(symbol, text) {
-    if (filled === text) return;
-    filled = text;
-    banner.replaceChildren(icon(symbol), h("span", {}, text));
+    viewport.cover(cursor === null ? null : ["history", "You look at another time; the robot goes on"]);
   }
 
   setInterval(() => {
