@@ -120,11 +120,13 @@ class Ledger(Generic[_TrackT]):
         for change in self._changes[bisect_left(self._versions, entry[0].version + 1) :]:
             if change.version >= version:
                 break
-            if end > change.at + ARRIVED:
-                if change.dropped is None or command_id in change.dropped or start < change.since:
-                    break
-                if change.moved is not None:
-                    start, end = change.moved(start), change.moved(end)
+            if end <= change.at + ARRIVED:
+                end = min(end, change.at)
+                continue
+            if change.dropped is None or command_id in change.dropped or start < change.since:
+                break
+            if change.moved is not None:
+                start, end = change.moved(start), change.moved(end)
         return end <= t + ARRIVED
 
     def before(self, command_id: int, version: int) -> Receipt | None:
@@ -355,7 +357,8 @@ def _after(receipt: Receipt, change: Change) -> Receipt:
         return receipt
     still = receipt.is_still
     if end < change.at if still else end <= change.at + ARRIVED:
-        return receipt
+        # It was cut by so little that it has arrived; a later change of pace mustn't part end and cut.
+        return receipt if still or end <= change.at else replace(receipt, end=change.at)
     gone = change.dropped is None or receipt.command_id in change.dropped or start < change.since
     if gone or (still and change.stills):
         return replace(receipt, superseded_by=change.by, version=change.version)

@@ -248,3 +248,18 @@ def test_what_an_undo_brakes_smoothly_a_stop_brakes_smoothly_though_the_undone_m
     before = engine.timeline.sample(np.nextafter(knots, 0.0), derivative=2)
     assert np.abs(before - engine.timeline.sample(np.array(knots), derivative=2)).max() <= 1e-9
     check(engine)
+
+
+@pytest.mark.parametrize("gap", [5e-10, 9e-10])
+def test_a_move_cut_by_less_than_rounding_has_arrived_at_any_pace(gap):
+    """Slower it isn't cut by more than rounding: who is superseded next is told from the moves that are there."""
+    engine = Engine(MODEL, q=A, clock=None)
+    first = engine.execute(to(B, 0.5))
+    second = engine.execute(to(C, first.end - gap))
+    assert engine.receipt(first.command_id).stands
+    engine.scale_time(0.5)
+    cut = engine.receipt(second.command_id).execute_at
+    assert engine.receipt(first.command_id).end == cut
+    last = engine.execute(to(D, cut, insertion=Insertion.REPLACE))
+    assert last.superseded == (second.command_id,)
+    assert engine.receipt(first.command_id).stands
