@@ -157,12 +157,6 @@ class Timeline(Track[PolynomialSegment]):
 
     def _find(self, t: float) -> tuple[float, float, Array]:
         """Start of the segment at a time, or of the hold before or after all; start of the next; coefficients."""
-        if not self._first <= t < self._end:
-            if not math.isfinite(t):
-                raise NonFiniteTimeError(t)
-            if t < self._first:
-                return -_LARGEST, self._first, self._initial[None]
-            return self._end, math.inf, self._last()[None]
         places = self._places
         if places is not None:
             firsts, indexes, nodes = places
@@ -170,17 +164,24 @@ class Timeline(Track[PolynomialSegment]):
             columns = indexes[place].columns or indexes[place].wanted(nodes[place], self.dof)
             if columns is not None:
                 first, scale, starts, grid, rows = columns
-                cell = int((t - first) * scale)
                 try:
+                    cell = int((t - first) * scale)
                     i = grid[cell]
                     low, high = starts[i - 1], starts[i]
                     if high <= t:
                         i = bisect_right(starts, t, i, grid[cell + 1])
                         low, high = starts[i - 1], starts[i]
-                except IndexError:
+                except (IndexError, ValueError, OverflowError):
+                    # Before or after all, or no finite number.
                     low = high = math.nan
                 if low <= t < high:
                     return low, high, rows[i - 1]
+        if not self._first <= t < self._end:
+            if not math.isfinite(t):
+                raise NonFiniteTimeError(t)
+            if t < self._first:
+                return -_LARGEST, self._first, self._initial[None]
+            return self._end, math.inf, self._last()[None]
         # No index yet; at a node's end; where rounding led astray.
         root, height = self._root, len(self._levels)
         assert root is not None
