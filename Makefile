@@ -2,16 +2,17 @@
 PY := .venv/bin/python
 STAMP := .venv/.installed
 DEV_STAMP := .venv/.installed-dev
+DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types bench soak wheel clean
+.PHONY: demo test lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
 
 test: $(DEV_STAMP) lint types
-	$(PY) -m pytest -n 2
+	$(PY) -m pytest -n 2 --durations=5
 
 lint: $(DEV_STAMP)
 	.venv/bin/ruff check .
@@ -24,6 +25,20 @@ types: $(DEV_STAMP)
 bench: $(BENCH_STAMP)
 	$(PY) -m benchmarks --write
 
+# Every claim of every paper, and what is claimed beyond them, on one page: out/reproduce/reproduce.html.
+reproduce: $(STAMP)
+	.venv/bin/vrs lab localization --out out/reproduce/localization
+	.venv/bin/vrs reproduce all --out out/reproduce \
+		--beyond out/reproduce/localization/summary.json --beyond benchmarks/results.json
+
+# The documentation as a site, in out/site; a warning is an error.
+docs: $(DOCS_STAMP)
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --strict
+
+# Every command of README and docs that takes too long for `make test`.
+docs-check: $(DEV_STAMP)
+	VRS_DOCS_SLOW=1 $(PY) -m pytest tests/test_docs.py
+
 $(PY):
 	@sh .ci/venv
 
@@ -33,6 +48,10 @@ $(STAMP): pyproject.toml constraints.txt | $(PY)
 
 $(DEV_STAMP): $(STAMP)
 	$(PIP) -e '.[dev]'
+	@touch $@
+
+$(DOCS_STAMP): $(STAMP)
+	$(PIP) -e '.[docs]'
 	@touch $@
 
 $(BENCH_STAMP): $(STAMP)

@@ -26,7 +26,9 @@ def lab(
     architecture: Annotated[
         list[str] | None,
         typer.Option(
-            "--architecture", metavar="A", help="I, II, III, III-capped, extended or timeline; repeatable."
+            "--architecture",
+            metavar="A",
+            help="I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable.",
         ),
     ] = None,
     transport: Annotated[
@@ -43,7 +45,8 @@ def lab(
         typer.Option(
             "--operator",
             metavar="O",
-            help="figure-eight, corridor, slalom, docking, mixed, or inputs:FILE.csv; repeatable.",
+            help="figure-eight, corridor, slalom, docking, mixed, inputs:FILE.csv, or MODULE:NAME of your own; "
+            "repeatable.",
         ),
     ] = None,
     position: Annotated[
@@ -108,14 +111,17 @@ def lab(
     from interfaces.lab.driving.run import POSITIONS, ROBOTS
     from interfaces.lab.driving.sweep import cases
     from interfaces.link.profiles import delay_profile
-    from interfaces.teleop.architectures import ARCHITECTURES, Transport
+    from interfaces.teleop.architectures import Transport
+    from interfaces.teleop.architectures import architecture as makes
 
-    architectures = [one_of("architecture", a, ARCHITECTURES) for a in architecture or ["III", "timeline"]]
+    architectures = architecture or ["III", "timeline"]
     transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]
     delays, robots = delay or ["thu"], [one_of("robot", r, ROBOTS) for r in robot or ["ipr"]]
     operators, position = operator or ["mixed"], one_of("position", position, POSITIONS)
     for profile in delays:
         delay_profile(profile)
+    for name in architectures:
+        makes(name)
     for who in operators:
         make(who, seed, 0.1)
     prepare(out)

@@ -39,7 +39,8 @@ Architecture: TypeAlias = Annotated[
     typer.Option(
         "--architecture",
         metavar="NAME",
-        help="Of an ipr, what it does with the operator's path: I, II, III, III-capped, extended or timeline.",
+        help="Of an ipr, what it does with the operator's path: I, II, III, III-capped, extended, timeline, or "
+        "MODULE:NAME of your own.",
     ),
 ]
 RoomName: TypeAlias = Annotated[
@@ -200,12 +201,12 @@ def run_mobile(
     from interfaces.link.proxy import parse_address
     from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
     from interfaces.stream.control import Role
-    from interfaces.teleop.architectures import ARCHITECTURES
+    from interfaces.teleop.architectures import architecture as makes
     from interfaces.teleop.driving import DrivenConfig
     from robots.onboard import LossPolicy, WatchdogConfig
 
     address = parse_address("--listen", listen)
-    one_of("architecture", architecture, ARCHITECTURES)
+    makes(architecture)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     timeout, max_age = watchdog
     dog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)

@@ -11,6 +11,7 @@ from interfaces.cli.demo import prepare
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
+    from interfaces.report.verdicts import Verdicts
 
 
 def reproduce(
@@ -38,6 +39,15 @@ def reproduce(
             "tipsuwan.",
         ),
     ] = None,
+    beyond: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--beyond",
+            metavar="FILE",
+            help="What is claimed beyond the papers, for the page: benchmarks/results.json, or the summary.json of "
+            "vrs lab localization; repeatable.",
+        ),
+    ] = None,
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
     ] = 2,
@@ -45,20 +55,28 @@ def reproduce(
         bool, typer.Option("--json", help="Write PAPER.json on standard output too, a document a paper.")
     ] = False,
 ) -> None:
-    """Measure each claim of a paper: expected, measured, holds; and draw its figures."""
+    """Measure each claim of a paper: expected, measured, holds; with figures, and all claims on one page."""
     from interfaces.lab import Study, papers
     from interfaces.lab.output import to_json, write
+    from interfaces.report.claims import write_claims
+    from interfaces.report.verdicts import read_verdicts
 
     chosen = papers(paper)
+    more = [found for path in beyond or () for found in read_verdicts(path)]
     prepare(out)
+    written: list[Verdicts] = []
     for each in chosen:
         study = Study(seed, each.runs if runs is None else runs, each.length if length is None else length)
         reproduction = measured(each, study, workers)
         path = write(reproduction, out)
+        written.extend(read_verdicts(path))
         if as_json:
             typer.echo(to_json(reproduction), nl=False)
         else:
             show(reproduction, path)
+    page = write_claims(out, written, more)
+    if not as_json:
+        typer.echo(f"Wrote {page}: all claims on one page")
 
 
 def measured(paper: Paper, study: Study, workers: int) -> Reproduction:

@@ -130,7 +130,7 @@ def serve(
     from interfaces.runtime.offset import fixed_offset, spelled
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
-    from interfaces.teleop.architectures import ARCHITECTURES
+    from interfaces.teleop.architectures import architecture as makes
     from robots.onboard import LossPolicy
 
     one_of("robot", robot, ROBOTS)
@@ -147,7 +147,7 @@ def serve(
             "val-files": (val_files, Path()), "record": (record, None), "recordings": (recordings, RECORDINGS),
         })  # fmt: skip
         room_of(room)
-        one_of("architecture", architecture, ARCHITECTURES)
+        makes(architecture)
         serving = MobileServing(
             host, port, room, architecture, link, policy.value, max_age, seed, at, token, until_eof
         )

@@ -308,3 +308,7 @@ from interfaces.cli import main
 if __name__ == "__main__":
     main()
 """
+
+
+def test_a_short_study_has_a_command_in_every_run():
+    assert all(encoding.acts("moves", np.random.default_rng(seed), 2.0) for seed in range(40))

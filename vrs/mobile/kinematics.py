@@ -20,7 +20,7 @@ _SMALL = 1e-4
 
 
 def wrapped(angle: float) -> float:
-    """The same angle in [−π, π] [rad]."""
+    """The same angle [rad] in [−π, π]."""
     return remainder(angle, tau)
 
 

@@ -75,11 +75,10 @@ def decoded(data: bytes) -> Change:
 
 
 def acts(kind: str, rng: np.random.Generator, length: float) -> list[Act]:
-    """Commands of one kind."""
+    """Commands of one kind, one at least."""
     if kind == "moves":
-        return [
-            Act(float(t), MotionCommand(target(rng), float(t), speed=0.6)) for t in arrivals(rng, 0.5, 0.0, length)
-        ]
+        times = [float(t) for t in arrivals(rng, 0.5, 0.0, length)] or [0.0]
+        return [Act(t, MotionCommand(target(rng), t, speed=0.6)) for t in times]
     size = 0.3 * MODEL.limits.qd_max if kind == "rates" else np.repeat((0.12, 0.3), 3)
     goals = rng.uniform(-size, size, (int(2 * length) + 2, 6))
     goals[1::2] = -goals[::2][: len(goals[1::2])]

@@ -16,6 +16,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from interfaces.lab.driving.legs import Goal, Leg, Line, Pause, Turn, point_ahead, share_of, way_left
+from interfaces.plugin import checked, is_own, own
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import one_of
 from vrs.errors import FormatError
@@ -334,17 +335,22 @@ def operator(name: str, seed: int, period: float) -> Operator:
     """Make an operator.
 
     Args:
-        name: A style, `mixed`, or `inputs:FILE.csv`.
+        name: A style, `mixed`, `inputs:FILE.csv`, or `module:name` of one's own, which is called with a generator
+            and the period.
         seed: Its manner; `mixed` chooses the style by it, too.
         period: T, between its commands [s].
 
     Raises:
-        InvalidValueError: If there's none of that name.
-        FormatError: If the file can't be read.
+        InvalidValueError: If there's none of that name, or it makes something else.
+        FormatError: If the file can't be read, or the module be imported.
     """
     kind, _, file = name.partition(":")
     if kind == "inputs" and file:
         return read_inputs(Path(file))
+    if is_own(name):
+        made: Operator = own("operator", name)(np.random.default_rng(seed), period)
+        checked("operator", name, made, ("start", "room", "drive"))
+        return made
     styles = list(STYLES)
     chosen = MIXTURE[seed % len(MIXTURE)] if name == MIXED else one_of("operator", name, [*styles, MIXED])
     # A seed drives alike, whether the style was named or chosen.

@@ -22,7 +22,7 @@ from interfaces.lab.driving.surroundings import robot_surroundings
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached
-from interfaces.teleop.architectures import ARCHITECTURES, Constants, DriveOrders, RobotSite, controller
+from interfaces.teleop.architectures import Constants, DriveOrders, RobotSite, architecture, controller
 from interfaces.teleop.driving import DrivenConfig, DrivenHost, DrivenRobot
 from interfaces.teleop.hosting import HostConfig
 from interfaces.timer import Turning
@@ -32,7 +32,6 @@ from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
 from robots.ipr.position import FusedPosition
 from robots.onboard.driving import Posture
-from vrs.checks import one_of
 from vrs.clock import WallClock
 
 _REST = 3.0
@@ -46,7 +45,7 @@ class LiveMobileConfig:
     room: Room
     """Where it drives; it stands at first where the room says."""
     architecture: str = "timeline"
-    """What it does with the operator's path: a name of `ARCHITECTURES`."""
+    """What it does with the operator's path: one of `ARCHITECTURES`, or `module:name`."""
     driven: DrivenConfig = field(default_factory=lambda: DrivenConfig(period=CONTROL))
     """How its site behaves."""
     constants: Constants = field(default_factory=Constants)
@@ -57,7 +56,7 @@ class LiveMobileConfig:
     """Name and version of the program."""
 
     def __post_init__(self) -> None:
-        one_of("architecture", self.architecture, ARCHITECTURES)
+        architecture(self.architecture)
 
 
 class LiveMobileRobot:

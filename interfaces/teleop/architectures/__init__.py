@@ -4,7 +4,13 @@ Source: Han, Kim, Kim, Kim, *Internet Control Architecture for Internet-Based Pe
 and the extended one; `III-capped` and `timeline` are ours.
 """
 
-from interfaces.teleop.architectures.compositions import ARCHITECTURES, Constants, controller
+from interfaces.teleop.architectures.compositions import (
+    ARCHITECTURES,
+    Architecture,
+    Constants,
+    architecture,
+    controller,
+)
 from interfaces.teleop.architectures.controllers import (
     Controller,
     Filtered,
@@ -27,6 +33,7 @@ from interfaces.teleop.architectures.surroundings import (
 __all__ = [
     "ARCHITECTURES",
     "Aim",
+    "Architecture",
     "CellChanges",
     "Constants",
     "Controller",
@@ -48,6 +55,7 @@ __all__ = [
     "Sender",
     "Sonar",
     "Transport",
+    "architecture",
     "controller",
     "is_still",
 ]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeAlias
 
+from interfaces.plugin import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
     Controller,
     Filtered,
@@ -37,11 +38,15 @@ class Constants:
         number_in("processing", self.processing, 1e-4, self.period, unit=" s")
 
 
-def _following(law: FieldLaw) -> Callable[[Constants, Posture], Controller]:
+Architecture: TypeAlias = Callable[[Constants, Posture], Controller]
+"""Makes a controller for a robot that begins at a posture at time 0."""
+
+
+def _following(law: FieldLaw) -> Architecture:
     return lambda c, posture: Following(posture, law, c.following, period=c.period, processing=c.processing)
 
 
-ARCHITECTURES: Final[dict[str, Callable[[Constants, Posture], Controller]]] = {
+ARCHITECTURES: Final[dict[str, Architecture]] = {
     "I": lambda _, __: Immediate(),
     "II": lambda c, _: Filtered(c.period),
     "III": _following(FieldLaw.LITERAL),
@@ -49,18 +54,34 @@ ARCHITECTURES: Final[dict[str, Callable[[Constants, Posture], Controller]]] = {
     "extended": _following(FieldLaw.CAPPED),
     "timeline": lambda c, posture: Player(posture, now=0.0, config=c.player),
 }
-"""What makes each architecture's controller, for a robot that begins at a posture at time 0."""
+"""What makes each architecture's controller."""
+
+
+def architecture(name: str) -> Architecture:
+    """What makes the controllers of an architecture.
+
+    Args:
+        name: One of `ARCHITECTURES`, or `module:name` of one's own.
+
+    Raises:
+        InvalidValueError: If there's none of that name.
+        FormatError: If the module can't be imported.
+    """
+    return own("architecture", name) if is_own(name) else ARCHITECTURES[one_of("architecture", name, ARCHITECTURES)]
 
 
 def controller(name: str, posture: Posture, constants: Constants) -> Controller:
     """Make an architecture's controller.
 
     Args:
-        name: One of `ARCHITECTURES`.
+        name: As of `architecture`.
         posture: Where both robots begin.
         constants: Of all architectures.
 
     Raises:
-        InvalidValueError: If there's none of that name.
+        InvalidValueError: If there's none of that name, or it makes something else.
+        FormatError: If the module can't be imported.
     """
-    return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES)](constants, posture)
+    made = architecture(name)(constants, posture)
+    checked("architecture", name, made, ("receive", "control", "executed"))
+    return made

@@ -1,0 +1,69 @@
+"""Parts of one's own, named on the command line as `module:name`, the way entry points are spelled."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from vrs.errors import FormatError, InvalidValueError
+
+SPELLED = "MODULE:NAME"
+"""How such a part is named; the module is looked for in the working directory, too."""
+
+
+def is_own(text: str) -> bool:
+    """Whether a name is that of somebody's own part: `module:name`, both of them words of Python with dots."""
+    module, colon, name = text.partition(":")
+    return bool(colon and module and name.isidentifier() and all(part for part in module.split(".")))
+
+
+def own(kind: str, text: str) -> Callable[..., Any]:
+    """Import somebody's own part.
+
+    Args:
+        kind: What it's to be, for the messages: `architecture`, `operator`.
+        text: `module:name`; the module may lie in the working directory.
+
+    Returns:
+        What the name stands for, a callable.
+
+    Raises:
+        FormatError: If the module can't be imported; whatever it raised is in the message.
+        InvalidValueError: If it hasn't got that name, or it can't be called.
+    """
+    where, _, name = text.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    # A stranger's module may raise anything.
+    try:
+        module = importlib.import_module(where)
+    except Exception as error:
+        raise FormatError(text, f"can't be imported as {kind}: {type(error).__name__}: {error}") from error
+    made = getattr(module, name, None)
+    if not callable(made):
+        names = ", ".join(sorted(_callables(module.__dict__, where))) or "none"
+        raise InvalidValueError(f"{kind} in {where}", name, f"a function or class there ({names})")
+    found: Callable[..., Any] = made
+    return found
+
+
+def checked(kind: str, text: str, made: object, parts: tuple[str, ...]) -> None:
+    """See to it that what a stranger's function made has the parts that it needs.
+
+    Raises:
+        InvalidValueError: If one is missing.
+    """
+    missing = [part for part in parts if not hasattr(made, part)]
+    if missing:
+        raise InvalidValueError(f"{kind} {text}", type(made).__name__, f"something with {', '.join(parts)}")
+
+
+def _callables(namespace: dict[str, Any], where: str) -> list[str]:
+    return [
+        name
+        for name, value in namespace.items()
+        if callable(value) and not name.startswith("_") and getattr(value, "__module__", "") == where
+    ]

@@ -1,0 +1,153 @@
+"""The page of all claims, those of the papers and those beyond them: one HTML file and the same as JSON."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any, Final
+
+from interfaces.report.markup import table
+from interfaces.report.verdicts import Json, Verdicts
+from vrs.errors import FormatError
+
+PAGE: Final = "reproduce.html"
+DATA: Final = "reproduce.json"
+SCHEMA: Final = "vrs-claims/1"
+HEAD: Final = ("claim", "", "expected", "measured", "95 %", "source")
+"""Of the table; the verdict has no name."""
+
+
+def write_claims(out: Path, papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> Path:
+    """Write the page and its JSON into an existing directory.
+
+    Args:
+        out: The directory.
+        papers: What papers claim.
+        beyond: What is claimed beyond them.
+
+    Returns:
+        The page.
+
+    Raises:
+        FormatError: If the directory can't hold them.
+    """
+    try:
+        (out / DATA).write_text(to_json(papers, beyond), encoding="utf-8")
+        (out / PAGE).write_text(render(papers, beyond), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
+    return out / PAGE
+
+
+def to_json(papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> str:
+    """Every claim as JSON; equal findings give equal texts."""
+    document = {
+        "schema": SCHEMA,
+        "claims": sum(found.total for found in (*papers, *beyond)),
+        "hold": sum(found.held for found in (*papers, *beyond)),
+        "papers": [_plain(found) for found in papers],
+        "beyond": [_plain(found) for found in beyond],
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _plain(found: Verdicts) -> dict[str, Any]:
+    return {
+        "name": found.name,
+        "title": found.title,
+        **dict(found.facts),
+        "claims": list(found.claims),
+        "timings": list(found.timings),
+    }
+
+
+def render(papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> str:
+    """The page as one HTML text; equal findings give equal texts."""
+    everything = (*papers, *beyond)
+    total, held = sum(found.total for found in everything), sum(found.held for found in everything)
+    counts = (("claims", total), ("hold", held), ("don't", total - held), ("papers", len(papers)))
+    return Template(_asset("claims.html")).substitute(
+        title=f"{held} of {total} claims hold",
+        css=_asset("report.css"),
+        facts="".join(f"<li><span>{name}</span>{count}</li>" for name, count in counts),
+        papers=_sums(papers) + "".join(map(_section, papers)),
+        beyond=f"<h2>Beyond the papers</h2>{_sums(beyond)}{''.join(map(_section, beyond))}" if beyond else "",
+    )
+
+
+def _sums(found: Sequence[Verdicts]) -> str:
+    return f'<div class="sums">{"".join(map(_sum, found))}</div>'
+
+
+def _sum(found: Verdicts) -> str:
+    share = 100.0 * found.held / max(found.total, 1)
+    return (
+        f'<a class="card sum" href="#{escape(found.name)}"><b>{found.held}<small> of {found.total} hold</small></b>'
+        f'<i class="bar"><i style="width: {share:.1f}%"></i></i><span>{escape(found.title)}</span></a>'
+    )
+
+
+def _section(found: Verdicts) -> str:
+    whole = " whole" if found.held == found.total else ""
+    facts = "".join(f"<li><span>{escape(name)}</span>{escape(value)}</li>" for name, value in found.facts)
+    timings = f"<h4>Speed of this machine</h4>{_claims(found.timings)}" if found.timings else ""
+    return (
+        f'<section class="card{whole}" id="{escape(found.name)}"><h3>{escape(found.title)}</h3>'
+        f'<ul class="facts">{facts}</ul>{_claims(found.claims)}{timings}{_tables(found)}{_pictures(found)}'
+        "</section>"
+    )
+
+
+def _claims(claims: Iterable[Json]) -> str:
+    head = "".join(f'<th scope="col">{name}</th>' for name in HEAD)
+    return (
+        f'<div class="scroll"><table class="claims"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(map(_row, claims))}</tbody></table></div>"
+    )
+
+
+def _row(claim: Json) -> str:
+    ends = "" if claim["interval"] is None else " to ".join(map(_said, claim["interval"]))
+    cells = _said(claim["expected"]), _said(claim["measured"]), ends, claim["source"]
+    verdict = "holds" if claim["holds"] else "fails"
+    return (
+        f'<tr class="{verdict}"><th scope="row">{escape(claim["claim"])}</th>'
+        f'<td class="verdict">{"✓ holds" if claim["holds"] else "✗ doesn’t"}</td>'
+        + "".join(f"<td>{escape(cell)}</td>" for cell in cells)
+        + "</tr>"
+    )
+
+
+def _tables(found: Verdicts) -> str:
+    shown = [
+        f"<details><summary>{escape(each['title'])}</summary>"
+        f"{table(each['columns'], [[_blank(cell) for cell in row] for row in each['rows']])}</details>"
+        for each in found.tables
+    ]
+    return "".join(shown)
+
+
+def _pictures(found: Verdicts) -> str:
+    shown = []
+    for title, svg in found.figures:
+        data = base64.b64encode(svg.encode("utf-8")).decode("ascii")
+        image = f'<img alt="{escape(title)}" loading="lazy" src="data:image/svg+xml;base64,{data}">'
+        shown.append(f"<figure>{image}<figcaption>{escape(title)}</figcaption></figure>")
+    return f'<div class="pictures">{"".join(shown)}</div>' if shown else ""
+
+
+def _blank(cell: object) -> object:
+    return "" if cell is None else cell
+
+
+def _said(cell: object) -> str:
+    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+
+
+def _asset(name: str) -> str:
+    return resources.files("interfaces.report").joinpath(name).read_text(encoding="utf-8")
