@@ -16,7 +16,7 @@ PARTS = (
     "val2", "recording", "mobile", "localization", "rsp", "middleware",
 )  # fmt: skip
 """Benchmarks that give results."""
-DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station")
+DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station", "camera")
 """Benchmarks that print more about one thing."""
 
 

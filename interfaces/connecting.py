@@ -1,4 +1,4 @@
-"""`connect`: the door to a robot elsewhere. What it needs is loaded when it's called."""
+"""`connect`, `connect_mobile`: the doors to a robot elsewhere. What they need is loaded when they're called."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from interfaces.stream.connect import Connection
+    from interfaces.stream.mobile_connect import MobileConnection
 
 
 def connect(
@@ -36,3 +37,22 @@ def connect(
     from interfaces.stream.control import Role
 
     return Connection(url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout)
+
+
+def connect_mobile(
+    url: str,
+    *,
+    role: str = "operator",
+    token: str | None = None,
+    name: str = "client",
+    encoding: str = "vrs.1.msgpack",
+    timeout: float = 5.0,
+) -> MobileConnection:
+    """Reach a mobile robot that `vrs serve --robot ipr` serves; see `connect`."""
+    from interfaces.stream.codec import Encoding
+    from interfaces.stream.control import Role
+    from interfaces.stream.mobile_connect import MobileConnection
+
+    return MobileConnection(
+        url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout
+    )

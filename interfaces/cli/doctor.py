@@ -127,6 +127,21 @@ def check_version() -> Check:
         return Check("version", False, False, "not installed", "install vrs-teleop in this environment")
 
 
+def check_camera() -> Check:
+    """What sends a mobile robot's camera and voice by RTP."""
+    missing = [name for name in ("aiortc", "av") if importlib.util.find_spec(name) is None]
+    found = f"missing: {', '.join(missing)}" if missing else f"by RTP, with aiortc {metadata.version('aiortc')}"
+    mend = "install 'vrs-teleop[media]'; single pictures and text work without"
+    return Check("camera", not missing, False, found, mend)
+
+
+def check_voice() -> Check:
+    """The program that speaks."""
+    path = shutil.which("espeak-ng")
+    mend = "install the program espeak-ng; what's to be said is shown without"
+    return Check("voice", path is not None, False, path or "no espeak-ng found", mend)
+
+
 CHECKS = (
     check_version,
     check_python,
@@ -134,6 +149,8 @@ CHECKS = (
     check_packages,
     check_pybullet,
     check_browser,
+    check_camera,
+    check_voice,
     check_port,
     check_clock,
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import prepare
+from interfaces.cli.goals import GOALS, send
 from interfaces.cli.localization import LOCALIZATION, localize, refuse
 
 if TYPE_CHECKING:
@@ -20,7 +21,9 @@ def lab(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="[localization]", help="How well the robot knows where it is, instead of the architectures."
+            metavar="[localization|goals]",
+            help="How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
+            " architectures.",
         ),
     ] = "",
     architecture: Annotated[
@@ -62,7 +65,7 @@ def lab(
             min=1,
             max=10_000,
             metavar="K",
-            help="Seeds of each, 5 unless given; rooms, 30, of localization.",
+            help="Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals.",
         ),
     ] = None,
     starts: Annotated[
@@ -94,12 +97,17 @@ def lab(
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
     from vrs.checks import one_of
 
-    if what and one_of("experiment", what, (LOCALIZATION,)):
+    if what:
+        one_of("experiment", what, (LOCALIZATION, GOALS))
         others = {
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
             "--operator": operator, "--attribution": attribution, "--record": record,
         }  # fmt: skip
-        refuse(others)
+        if what == GOALS:
+            refuse(what, {**others, "--length": length})
+            send(out, seed, runs, workers, as_json=as_json)
+            return
+        refuse(what, others)
         localize(out, seed, runs, length, starts, workers, as_json=as_json)
         return
     runs, length = runs or 5, length or 120.0

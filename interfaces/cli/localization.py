@@ -16,17 +16,15 @@ LOCALIZATION: Final = "localization"
 """What the command line calls it."""
 
 
-def refuse(others: Mapping[str, object]) -> None:
-    """Raise if options are given that are of the other experiments.
+def refuse(what: str, others: Mapping[str, object]) -> None:
+    """Raise if options are given that are of other experiments than this one.
 
     Raises:
         InvalidValueError: If there's one.
     """
     given = [name for name, value in others.items() if value]
     if given:
-        raise InvalidValueError(
-            "options", " ".join(given), f"without those for {LOCALIZATION}: it has its own robots"
-        )
+        raise InvalidValueError("options", " ".join(given), f"without those for {what}: it has its own robots")
 
 
 def localize(

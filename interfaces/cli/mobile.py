@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 ROBOTS = ("puma560", "ipr")
 """Robots that can be served."""
-ARCHITECTURE, ROOM = "timeline", "empty"
+ARCHITECTURE, ROOM, OPERATOR_LOSS, JOBS = "timeline", "empty", "stop", Path("jobs.json")
 """Unless others are asked for."""
 RobotName: TypeAlias = Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560 or ipr.")]
 Architecture: TypeAlias = Annotated[
@@ -41,6 +41,22 @@ Architecture: TypeAlias = Annotated[
         metavar="NAME",
         help="Of an ipr, what it does with the operator's path: I, II, III, III-capped, extended, timeline, or "
         "MODULE:NAME of your own.",
+    ),
+]
+CAMERA = 6.0
+"""Pictures a second of a robot's camera, unless others are asked for."""
+CameraRate: TypeAlias = Annotated[
+    float,
+    typer.Option(
+        "--camera", metavar="RATE", help="Of an ipr, pictures a second of its camera, 1 to 30; 0 for no camera."
+    ),
+]
+OperatorLossName: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--operator-loss",
+        metavar="POLICY",
+        help="Of an ipr, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
     ),
 ]
 RoomName: TypeAlias = Annotated[
@@ -105,6 +121,11 @@ class MobileServing:
     """`ws://HOST:PORT/site`; None: one is started."""
     robot_token: str | None = field(repr=False)
     until_eof: bool
+    operator_loss: str = "stop"
+    jobs: Path | None = None
+    """File of the list of jobs; None: it isn't kept."""
+    camera: float = CAMERA
+    """Pictures a second; 0 for none, nor voice and screen."""
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -112,6 +133,7 @@ class MobileServing:
         return (
             "--robot", "ipr", "--room", self.room, "--architecture", self.architecture,
             "--link-loss", self.link_loss, "--max-age", f"{self.max_age:g}",
+            "--operator-loss", self.operator_loss,
         )  # fmt: skip
 
 
@@ -134,6 +156,8 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         stack.push_async_callback(abandon, robot)
         await asyncio.to_thread(_load)
 
+        from interfaces.jobs import JobFile
+        from interfaces.media import CameraConfig
         from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
         from interfaces.station.page import Station
         from interfaces.station.panels import MOBILE_PANELS
@@ -142,10 +166,13 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
 
         model = ipr.model()
         config = LiveMobileOperatorConfig(
-            model, room, "", serving.conditions, serving.robot_token, serving.seed, software()
-        )
+            model, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
+            None if serving.jobs is None else JobFile(serving.jobs),
+            camera=CameraConfig(serving.camera) if serving.camera else None,
+        )  # fmt: skip
         operator = LiveMobileOperator(config, access)
-        station = Station({"mobile": True, "name": model.name}, panels=MOBILE_PANELS)
+        panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
+        station = Station({"mobile": True, "name": model.name}, panels=panels)
         app = application([*operator.routes, *station.routes], hosts(names_of(host), port))
         await stack.enter_async_context(station.running())
         await stack.enter_async_context(sockets.serve(app, listening))
@@ -182,6 +209,7 @@ def run_mobile(
     reports: float,
     token_file: Path | None,
     until_eof: bool,
+    operator_loss: str = "stop",
 ) -> None:
     """Run a mobile robot and its site, until Ctrl-C or SIGTERM.
 
@@ -194,15 +222,18 @@ def run_mobile(
         reports: How often it says where it is [1/s].
         token_file: Its tokens.
         until_eof: Whether it ends with standard input.
+        operator_loss: What becomes of what it does by itself when the operator is lost, `stop` or `carry-on`.
     """
     import uvloop
 
+    from interfaces.jobs import OperatorLoss, RunnerConfig
     from interfaces.lab.driving.run import CONTROL
     from interfaces.link.proxy import parse_address
+    from interfaces.media import Aloud
     from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
     from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes
-    from interfaces.teleop.driving import DrivenConfig
+    from interfaces.teleop.driving import DrivenConfig, Hands
     from robots.onboard import LossPolicy, WatchdogConfig
 
     address = parse_address("--listen", listen)
@@ -212,7 +243,8 @@ def run_mobile(
     dog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
     driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
-    config = LiveMobileConfig(room_of(room), architecture, driven, server=software())
+    jobs = RunnerConfig(loss=OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss)))
+    config = LiveMobileConfig(room_of(room), architecture, driven, jobs, Hands(speaker=Aloud()), server=software())
     access = access_for(address.host, token_file, free={Role.SITE})
 
     async def main() -> None:
@@ -223,6 +255,7 @@ def run_mobile(
 
 async def _run(robot: LiveMobileRobot, host: str, port: int, *, until_eof: bool) -> None:
     """Run until a signal comes, or standard input ends."""
+    from interfaces.jobs import POLICY_SAYS
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
@@ -238,6 +271,7 @@ async def _run(robot: LiveMobileRobot, host: str, port: int, *, until_eof: bool)
         keep_quiet()
         hasten(1)
         typer.echo(f"{READY}ws://{host}:{port}/site (ipr, {robot.config.architecture})")
+        typer.echo(f"vrs: {POLICY_SAYS[robot.config.jobs.loss]}", err=True)
         sys.stdout.flush()
         if until_eof:
             end_with_input(robot.ended)

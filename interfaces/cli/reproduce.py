@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="doulgeri, han2001, kim2006, tipsuwan, or all for every paper.")
+        str,
+        typer.Argument(
+            metavar="PAPER", help="doulgeri, han2001, kim2002, kim2006, tipsuwan, or all for every paper."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where PAPER.json and the figures go.")],
     seed: Annotated[

@@ -11,9 +11,11 @@ import typer
 from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of
 from interfaces.cli.mobile import (
     ARCHITECTURE,
+    OPERATOR_LOSS,
     ROBOTS,
     ROOM,
     Architecture,
+    OperatorLossName,
     RobotName,
     RoomName,
     room_of,
@@ -62,6 +64,7 @@ def robot(
             help="halt: stop when nothing comes for --timeout, and wait for a resume; hold: wait and go on.",
         ),
     ] = "halt",
+    operator_loss: OperatorLossName = OPERATOR_LOSS,
     timeout: Annotated[
         float, typer.Option("--timeout", metavar="S", help="T_loss under halt [s], 0.1 to 2.")
     ] = 0.5,
@@ -117,10 +120,13 @@ def robot(
         })  # fmt: skip
         run_mobile(
             listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
-            reports=reports, token_file=token_file, until_eof=until_eof,
+            reports=reports, token_file=token_file, until_eof=until_eof, operator_loss=operator_loss,
         )  # fmt: skip
         return
-    without(name, {"architecture": (architecture, ARCHITECTURE), "room": (room, ROOM)})
+    without(name, {
+        "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM),
+        "operator-loss": (operator_loss, OPERATOR_LOSS),
+    })  # fmt: skip
     address = parse_address("--listen", listen)
     model = puma560.model()
     q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], BodyKind(one_of("body", body, BodyKind))

@@ -21,10 +21,15 @@ from interfaces.cli.doors import (
 )
 from interfaces.cli.mobile import (
     ARCHITECTURE,
+    CAMERA,
+    JOBS,
+    OPERATOR_LOSS,
     ROBOTS,
     ROOM,
     Architecture,
+    CameraRate,
     MobileServing,
+    OperatorLossName,
     RobotName,
     RoomName,
     room_of,
@@ -33,7 +38,7 @@ from interfaces.cli.mobile import (
 )
 from interfaces.cli.options import PROFILES, Host, Port
 from interfaces.software import software
-from vrs.checks import one_of
+from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -53,6 +58,7 @@ def serve(
     robot: RobotName = "puma560",
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
+    camera: CameraRate = CAMERA,
     delay: Annotated[
         str,
         typer.Option(
@@ -80,6 +86,10 @@ def serve(
         str,
         typer.Option("--link-loss", metavar="POLICY", help="Of the robot that this starts: halt or hold."),
     ] = "halt",
+    operator_loss: OperatorLossName = OPERATOR_LOSS,
+    jobs: Annotated[
+        Path, typer.Option("--jobs", metavar="FILE.json", help="Of an ipr, where the list of jobs is kept.")
+    ] = JOBS,
     max_age: Annotated[
         float,
         typer.Option("--max-age", metavar="S", help="Of the robot that this starts: oldest message that counts."),
@@ -121,6 +131,7 @@ def serve(
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
     import uvloop
 
+    from interfaces.jobs import OperatorLoss
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
     from interfaces.recording.live import RATE, LiveRecording
@@ -147,14 +158,22 @@ def serve(
             "val-files": (val_files, Path()), "record": (record, None), "recordings": (recordings, RECORDINGS),
         })  # fmt: skip
         room_of(room)
+        if jobs.exists() and not jobs.is_file():
+            raise InvalidValueError("jobs", str(jobs), "a file, or one that can be made")
         makes(architecture)
+        if camera:
+            number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
         serving = MobileServing(
-            host, port, room, architecture, link, policy.value, max_age, seed, at, token, until_eof
-        )
+            host, port, room, architecture, link, policy.value, max_age, seed, at, token, until_eof,
+            one_of("operator-loss", operator_loss, OperatorLoss), jobs, camera,
+        )  # fmt: skip
         _advise(advice)
         uvloop.run(serve_mobile(serving, access_for(host, token_file, free=OPEN)))
         return
-    without(robot, {"architecture": (architecture, ARCHITECTURE), "room": (room, ROOM)})
+    without(robot, {
+        "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM), "jobs": (jobs, JOBS),
+        "operator-loss": (operator_loss, OPERATOR_LOSS), "camera": (camera, CAMERA),
+    })  # fmt: skip
     behind = spelled(fixed_offset(offset, profile))
     options = ["--offset", behind, "--link-loss", policy, "--body", body, "--max-age", f"{max_age:g}"]
     recording = None

@@ -5,11 +5,12 @@ from __future__ import annotations
 from interfaces.lab.claims import Paper
 from interfaces.lab.doulgeri import PAPER as DOULGERI
 from interfaces.lab.han2001 import PAPER as HAN2001
+from interfaces.lab.kim2002 import PAPER as KIM2002
 from interfaces.lab.kim2006 import PAPER as KIM2006
 from interfaces.lab.tipsuwan import PAPER as TIPSUWAN
 from vrs.checks import one_of
 
-PAPERS: dict[str, Paper] = {paper.name: paper for paper in (DOULGERI, HAN2001, KIM2006, TIPSUWAN)}
+PAPERS: dict[str, Paper] = {paper.name: paper for paper in (DOULGERI, HAN2001, KIM2002, KIM2006, TIPSUWAN)}
 """By the name that the command line uses."""
 
 ALL = "all"

@@ -7,17 +7,18 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from interfaces.link.clock_sync import ClockSync
 from interfaces.link.round_trip import RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request
 from interfaces.ports import RemotePort, earliest
 from interfaces.stream import control
-from interfaces.stream.codec import LARGEST, Encoding, decode, encode
+from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
 from interfaces.stream.control import Notice, ProblemCode, Role
 from interfaces.stream.mobile import MobileWelcome
 from interfaces.stream.network import Impair, Network, Survey
+from interfaces.stream.tasks import TaskOrder, Tasks
 
 FROM_SERVER = 4 * LARGEST
 """Longest message of a server that is read [bytes]."""
@@ -34,16 +35,22 @@ KEPT = 1024
 UNKNOWN = "unknown: the session was lost before an answer came"
 """Refusal of an order that may have been carried out."""
 
-_COMING = Reply | Notice | MobileWelcome
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
 Asked: TypeAlias = (
-    control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | Survey | Impair
+    control.Acquire
+    | control.TakeOver
+    | control.Share
+    | control.Release
+    | control.Resume
+    | Survey
+    | Impair
+    | TaskOrder
 )
 Ask: TypeAlias = Callable[[int, int], Asked]
 """Makes a wish of its number and the epoch."""
-Replied: TypeAlias = control.Lease | control.Problem | Network
+Replied: TypeAlias = control.Lease | control.Problem | Network | Tasks
 """What answers one."""
 
 
@@ -69,6 +76,9 @@ class ClientCore:
     Where it doesn't, they are answered with the refusal `UNKNOWN`.
     """
 
+    coming: ClassVar[Any] = Reply | Notice | MobileWelcome
+    """What a server may say to it."""
+
     def __init__(
         self,
         *,
@@ -93,7 +103,7 @@ class ClientCore:
         self.phase = Phase.LOST
         self.problem: control.Problem | None = None
         """What the server said last of a message that it couldn't take."""
-        self.welcome: control.Welcome | None = None
+        self.welcome: control.Welcome | MobileWelcome | None = None
         self.lease: control.Lease | None = None
         self.state: control.State | None = None
         """The real robot."""
@@ -163,7 +173,7 @@ class ClientCore:
         if self.phase is not Phase.OPEN:
             text = "there's no connection"
             self._answers[number] = control.Problem(ProblemCode.STOPPING, text, number)
-        elif isinstance(wish, control.Release | control.Resume | Impair) and not self.epoch:
+        elif isinstance(wish, control.Release | control.Resume | Impair | TaskOrder) and not self.epoch:
             text = "this client has no lease"
             self._answers[number] = control.Problem(ProblemCode.STALE_EPOCH, text, number)
         else:
@@ -187,8 +197,12 @@ class ClientCore:
             ProtocolError: If it's none of the protocol's; the connection is then to be given up.
         """
         raw = data.encode() if isinstance(data, str) else data
-        message = decode(raw, self.encoding, allowed=_COMING, largest=FROM_SERVER)
+        message = decode(raw, self.encoding, allowed=self.coming, largest=FROM_SERVER)
         self._heard = now
+        self._take(message, now)
+
+    def _take(self, message: Value, now: float) -> None:
+        """Take what a server says."""
         if isinstance(message, control.Welcome):
             self._begin(message, now)
         elif isinstance(message, MobileWelcome):
@@ -209,9 +223,9 @@ class ClientCore:
             self.network = message
             self._settle(message.answers, message)
         else:
-            self._hand_on(message, now)
+            self._hand_on(message, now)  # type: ignore[arg-type]
 
-    def _begin(self, welcome: control.Welcome, now: float) -> None:
+    def _begin(self, welcome: control.Welcome | MobileWelcome, now: float) -> None:
         before, self.welcome = self.welcome, welcome
         if not welcome.resumed:
             self.sessions += 1
@@ -311,7 +325,7 @@ class ClientCore:
         self._newest = max(self._newest, order.number)
         self._send(replace(order, number=order.number - self._base))
 
-    def _send(self, message: Request | control.Question) -> None:
+    def _send(self, message: Request | control.Question | TaskOrder) -> None:
         self._out.append(encode(message, self.encoding))
 
     def next_deadline(self) -> float | None:

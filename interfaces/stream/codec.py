@@ -14,13 +14,14 @@ import numpy as np
 
 from interfaces import messages
 from interfaces.messages import Reply, Request
-from interfaces.stream import control, mobile, network
+from interfaces.stream import control, mobile, network, tasks
 from interfaces.stream.control import Notice, ProblemCode, Question
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.wire import Message as Wire
 from interfaces.stream.wire import control as controls
 from interfaces.stream.wire import driving, replies, requests, sites
 from interfaces.stream.wire import network as networks
+from interfaces.stream.wire import tasks as works
 from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
@@ -36,6 +37,10 @@ Value: TypeAlias = (
     | Notice
     | mobile.MobileWelcome
     | mobile.Postures
+    | tasks.TaskOrder
+    | tasks.Tasks
+    | tasks.Seen
+    | tasks.Plan
     | Orders
     | Report
     | DriveOrders
@@ -77,6 +82,10 @@ WIRES: dict[type, type[Wire]] = {
     Report: sites.ReportWire,
     mobile.MobileWelcome: driving.MobileWelcomeWire,
     mobile.Postures: driving.PosturesWire,
+    tasks.TaskOrder: works.TaskOrderWire,
+    tasks.Tasks: works.TasksWire,
+    tasks.Seen: works.SeenWire,
+    tasks.Plan: works.PlanWire,
     DriveOrders: driving.DriveOrdersWire,
     DriveReport: driving.DriveReportWire,
 }

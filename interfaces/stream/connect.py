@@ -2,71 +2,20 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from functools import partial
-from types import TracebackType
-from typing import TypeVar
 
-from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import Form
-from interfaces.ports import EnginePort
-from interfaces.stream import control
-from interfaces.stream.client import Ask, ClientCore, Replied
+from interfaces.stream.client import ClientCore
 from interfaces.stream.codec import Encoding
-from interfaces.stream.control import Lease, Problem, ProblemCode, Role, State, Welcome
-from interfaces.stream.line import Line, UnreachableError, Worker
-from interfaces.stream.network import Impair, Network, Survey, Way
+from interfaces.stream.control import Role, State, Welcome
+from interfaces.stream.joining import Joined
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
 from interfaces.viewer import Shown
-from vrs.clock import WallClock
-
-T = TypeVar("T")
 
 
-class _Session:
-    """A client on a line, for those that use it from other threads."""
-
-    def __init__(self, url: str, core: ClientCore, clock: WallClock, worker: Worker, timeout: float) -> None:
-        self.core, self._clock = core, clock
-        self.changed = threading.Condition(threading.RLock())
-        self.line = Line(url, core, clock, self.changed, worker)
-        try:
-            self.line.wait_open(timeout)
-        except UnreachableError:
-            self.line.close()
-            raise
-
-    @property
-    def port(self) -> EnginePort:
-        return self.core.port
-
-    def now(self) -> float:
-        """Session time [s]."""
-        with self.changed:
-            t = self.core.time(self._clock.now())
-        assert t is not None
-        return t
-
-    def local(self) -> float:
-        return self._clock.now()
-
-    def do(self, action: Callable[[float], T]) -> T:
-        with self.changed:
-            result = action(self.now())
-        self.line.wake()
-        return result
-
-    def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
-        with self.changed:
-            return self.changed.wait_for(ready, timeout) if timeout > 0 else ready()
-
-
-class Connection:
-    """A robot that a server serves. A context manager: at its end everything is closed.
-
-    Lost connections are taken up again by themselves. Calls may come from any thread.
-    """
+class Connection(Joined[ClientCore]):
+    """An arm that a server serves."""
 
     def __init__(
         self,
@@ -79,16 +28,7 @@ class Connection:
         timeout: float = 5.0,
     ) -> None:
         """Connect; see `interfaces.connect`."""
-        self._url, self._token, self._name, self._encoding = _address(url), token, name, encoding
-        self._timeout = timeout
-        self._clock = WallClock()
-        self._worker = Worker()
-        self._sessions: list[_Session] = []
-        try:
-            self._session = self._open(Role(role))
-        except UnreachableError:
-            self._worker.close()
-            raise
+        super().__init__(ClientCore, url, role=role, token=token, name=name, encoding=encoding, timeout=timeout)
         self.designer = RemoteDesigner(self._session)
         """Issues commands; they need the lease."""
         self.observer = RemoteObserver(self._session)
@@ -97,39 +37,6 @@ class Connection:
         """Both."""
         self._add(self._session, self.designer)
         self._add(self._session, self.observer)
-
-    def _open(self, role: Role) -> _Session:
-        core = ClientCore(role=role, name=self._name, token=self._token, encoding=self._encoding)
-        self._sessions.append(_Session(self._url, core, self._clock, self._worker, self._timeout))
-        return self._sessions[-1]
-
-    @staticmethod
-    def _add(session: _Session, part: RemoteDesigner | RemoteObserver | RemoteViewer) -> None:
-        with session.changed:
-            session.line.parts.append(part)
-        session.line.wake()
-
-    def __enter__(self) -> Connection:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End all connections; a lease that is held is released."""
-        if self._session.core.epoch:
-            self.release(wait=1.0)
-        for session in self._sessions:
-            session.line.close()
-        self._sessions.clear()
-        self._worker.close()
-
-    def _end(self, session: _Session) -> None:
-        session.line.close()
-        if session in self._sessions:
-            self._sessions.remove(session)
 
     def viewer(
         self, *, rate: float = 50.0, form: Form = Form.SEGMENTS, show: Callable[[Shown], None] | None = None
@@ -150,112 +57,6 @@ class Connection:
         self._add(session, viewer)
         return viewer
 
-    def acquire(self, *, wait: float = 5.0) -> Lease | Problem:
-        """Ask for the lease; it's kept by itself until it's released.
-
-        Args:
-            wait: How long to wait for the answer [s].
-
-        Returns:
-            The lease, `yours` if it was given; or why not.
-        """
-        return _of_lease(self._wish(lambda number, _: control.Acquire(number), wait))
-
-    def take_over(self, *, wait: float = 5.0) -> Lease | Problem:
-        """Take the lease from whoever has it: for an admin. Waits until the robot has stopped.
-
-        Args:
-            wait: How long to wait [s].
-
-        Returns:
-            The lease as it's then, `yours` if it was given; or why not.
-        """
-        answer = _of_lease(self._wish(lambda number, _: control.TakeOver(number), wait))
-        if isinstance(answer, Lease) and not answer.yours:
-            self._session.wait(lambda: self._session.core.epoch > 0, wait)
-            return self.lease or answer
-        return answer
-
-    def share(self, session: str, *, wait: float = 5.0) -> Lease | Problem:
-        """Ask to command under the lease that another session of the same person has.
-
-        Whoever has the lease keeps it; when it ends, so does the share. Another session's command ends it, too.
-
-        Args:
-            session: The holder's, from its `Welcome`.
-            wait: How long to wait for the answer [s].
-
-        Returns:
-            The lease, `shared` if it is; or why not.
-        """
-        return _of_lease(self._wish(lambda number, _: control.Share(number, session), wait))
-
-    def ask_to_share(self, session: str) -> int:
-        """As `share`, without waiting; the number for `answer`."""
-        core = self._session.core
-        return self._session.do(
-            lambda _: core.wish(lambda number, _: control.Share(number, session), now=self._clock.now())
-        )
-
-    def answer(self, number: int) -> Lease | Problem | None:
-        """What the server answered to `ask_to_share`; None while it hasn't."""
-        answer = self._session.core.answer(number)
-        return None if answer is None else _of_lease(answer)
-
-    def release(self, *, wait: float = 5.0) -> Lease | Problem:
-        """Give the lease back, and the robot stops; or the share, without a stop."""
-        return _of_lease(self._wish(control.Release, wait))
-
-    def resume(self, *, wait: float = 5.0) -> Lease | Problem:
-        """Let the robot go on after it stopped by itself."""
-        return _of_lease(self._wish(control.Resume, wait))
-
-    def survey(self, *, wait: float = 5.0) -> Network | Problem:
-        """Ask how the emulated way to the robot is, and what was measured of it."""
-        return _of_network(self._wish(lambda number, _: Survey(number), wait))
-
-    def impair(self, forward: Way | None, backward: Way | None, *, wait: float = 5.0) -> Network | Problem:
-        """Change the emulated way to the robot: for who has the lease.
-
-        Args:
-            forward: To the robot, from now on; None leaves it as it is.
-            backward: Back.
-            wait: How long to wait for the answer [s].
-
-        Returns:
-            The way as it is then; or why not.
-        """
-        return _of_network(self._wish(lambda number, epoch: Impair(number, epoch, forward, backward), wait))
-
-    def _wish(self, ask: Ask, wait: float) -> Replied:
-        core = self._session.core
-        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now()))
-        self._session.wait(lambda: core.answer(number) is not None, wait)
-        missing = Problem(ProblemCode.STOPPING, f"no answer within {wait:g} s", number)
-        return core.answer(number) or missing
-
-    def now(self) -> float:
-        """Session time [s]: that of all stamps and positions."""
-        return self._session.now()
-
-    @property
-    def clock(self) -> ClockEstimate:
-        """Session time less local time, and how sure that is [s]."""
-        with self._session.changed:
-            estimate = self._session.core.sync.estimate(self._clock.now())
-        assert estimate is not None
-        return estimate
-
-    @property
-    def lease(self) -> Lease | None:
-        """The lease as it was last heard of."""
-        return self._session.core.lease
-
-    @property
-    def lapses(self) -> int:
-        """How often commands of this connection have ceased to count: a lease or a share has ended."""
-        return self._session.core.lapses
-
     @property
     def state(self) -> State | None:
         """The real robot as it was last heard of; None before that."""
@@ -265,33 +66,5 @@ class Connection:
     def welcome(self) -> Welcome:
         """What the server said of itself and its robot."""
         welcome = self._session.core.welcome
-        assert welcome is not None
+        assert isinstance(welcome, Welcome)
         return welcome
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether there's a connection just now."""
-        return self._session.core.phase is self._session.core.phase.OPEN
-
-    def wait(self, ready: Callable[[Connection], bool], timeout: float = 5.0) -> bool:
-        """Wait until something is so of this connection, or the time [s] is over; whether it is."""
-        return self._session.wait(lambda: ready(self), timeout)
-
-
-def _of_lease(answer: Replied) -> Lease | Problem:
-    return _ELSE if isinstance(answer, Network) else answer
-
-
-def _of_network(answer: Replied) -> Network | Problem:
-    return _ELSE if isinstance(answer, Lease) else answer
-
-
-_ELSE = Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
-
-
-def _address(url: str) -> str:
-    scheme, separator, rest = url.partition("://")
-    if not separator:
-        scheme, rest = "ws", url
-    scheme = {"http": "ws", "https": "wss"}.get(scheme, scheme)
-    return f"{scheme}://{rest}" if "/" in rest else f"{scheme}://{rest}/ws"

@@ -18,7 +18,8 @@ from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import Leasing, Robot
 from interfaces.stream.limits import Bucket, Limits
 from interfaces.stream.network import Impair, Network
-from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, Seat, Session, State, Welcome, Wish
+from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, News, Seat, Session, State, Welcome, Wish
+from interfaces.stream.tasks import TaskOrder, Tasks, Wanted
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
 
@@ -43,6 +44,16 @@ class Emulation(Protocol):
         Raises:
             InvalidValueError: If a condition isn't one of those that are allowed; nothing has changed then.
         """
+
+
+class Workers(Protocol):
+    """What lets a robot do something by itself."""
+
+    def order(self, wanted: Wanted, *, now: float) -> str:
+        """Let it; why it doesn't, empty if it does."""
+
+    def tasks(self, answers: int | None = None) -> Tasks:
+        """How it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +91,7 @@ class Hub:
         config: HubConfig | None = None,
         emulation: Emulation | None = None,
         welcome: Greeter | None = None,
+        workers: Workers | None = None,
         random_bytes: Callable[[int], bytes] = secrets.token_bytes,
     ) -> None:
         """Serve nobody yet.
@@ -92,6 +104,7 @@ class Hub:
             config: How to serve.
             emulation: The way to the robot, where one is emulated.
             welcome: Makes what a client of another robot than an arm is told.
+            workers: What lets the robot do something by itself, where it can.
             random_bytes: So many bytes that nobody can guess, to name sessions.
         """
         self.config = HubConfig() if config is None else config
@@ -108,6 +121,9 @@ class Hub:
         self.state: State | None = None
         """The real robot, as clients are told."""
         self._newest: State | None = None
+        self._workers = workers
+        self.news: dict[type, News] = {}
+        """What every client is told when it changes, by its kind."""
         self._state_due = -math.inf
         self.network_version = 0
         """Counts the changes of the way to the robot."""
@@ -146,6 +162,17 @@ class Hub:
     def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
         """Do what a client asks of the lease; the answer, None for a beat that counts."""
         return self._leasing.wish(seat, wish, now)
+
+    def commands(self, key: str, epoch: int, *, now: float) -> bool:
+        """Whether a session has the lease, in that epoch, at now [s].
+
+        Args:
+            key: The session's name, which nobody else knows.
+            epoch: Of the lease.
+            now: Session time [s].
+        """
+        seat = self._seats.get(key)
+        return seat is not None and seat.role is not Role.VIEWER and self._leasing.admits(seat, epoch, now)
 
     def stopped(self, *, now: float) -> None:
         """Say that the robot is at rest after a lease ended, and takes no command."""
@@ -201,6 +228,10 @@ class Hub:
     def show(self, state: State) -> None:
         """Take the newest that is known of the real robot."""
         self._newest = state
+
+    def tell(self, news: News) -> None:
+        """Let every client know what there is now, in place of what was told of that kind before."""
+        self.news[type(news)] = news
 
     def close(self, text: str = "the server stops") -> tuple[Session, ...]:
         """End every session; those that have a last word to send."""
@@ -289,3 +320,17 @@ class Hub:
             return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number)
         self.network_version += 1
         return None
+
+    def task(self, seat: Seat, order: TaskOrder, now: float) -> Tasks | Problem:
+        """Let the holder of the lease have the robot do something by itself: how it is then, or why not."""
+        if self._workers is None:
+            return Problem(ProblemCode.NOT_ALLOWED, "this robot does nothing by itself", order.number)
+        if seat.role is Role.VIEWER:
+            return Problem(ProblemCode.NOT_ALLOWED, "a viewer commands nothing", order.number)
+        if not self._leasing.admits(seat, order.epoch, now):
+            text = "only who has control tells the robot what to do"
+            return Problem(ProblemCode.STALE_EPOCH, text, order.number)
+        refusal = self._workers.order(order.wanted, now=now)
+        if refusal:
+            return Problem(ProblemCode.OUT_OF_RANGE, refusal, order.number)
+        return self._workers.tasks(order.number)

@@ -13,6 +13,7 @@ from interfaces.stream.limits import Bucket, Limits
 from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.network import Impair, Network, Survey
 from interfaces.stream.outbox import Outbox
+from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks
 
 POLICY, TOO_LARGE, RESTART, TRY_AGAIN = 1008, 1009, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""
@@ -26,7 +27,9 @@ Closing = tuple[int, str]
 """Close code and reason."""
 Wish = control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | control.Beat
 """What a client asks of the lease."""
-_ALLOWED = control.Ping | control.Pong | control.Problem | Wish | Survey | Impair | Order | Ask | Follow | Want
+_ALLOWED = (
+    control.Ping | control.Pong | control.Problem | Wish | Survey | Impair | TaskOrder | Order | Ask | Follow | Want
+)
 """What may come once the client is welcome."""
 
 
@@ -34,6 +37,10 @@ Welcome: TypeAlias = control.Welcome | MobileWelcome
 """What greets a client: of an arm's site, of a mobile robot's."""
 State: TypeAlias = control.State | Postures
 """What is known of the real robot, the same."""
+
+
+News: TypeAlias = Tasks | Seen | Plan
+"""What every client is told when it changes: of each kind the newest counts."""
 
 
 class Served(Protocol):
@@ -73,6 +80,7 @@ class Desk(Protocol):
     limits: Limits
     encoder: SharedEncoder
     state: State | None
+    news: dict[type, News]
     network_version: int
 
     @property
@@ -96,6 +104,9 @@ class Desk(Protocol):
 
     def impair(self, seat: Seat, wish: Impair, now: float) -> Problem | None:
         """Change the way to the robot; why not, None where it's done."""
+
+    def task(self, seat: Seat, order: TaskOrder, now: float) -> Tasks | Problem:
+        """Let the robot do something by itself: how it is then, or why not."""
 
 
 class Session:
@@ -124,6 +135,8 @@ class Session:
         self._network: int | None = None
         """Version of the way to the robot that the client knows; None while it hasn't asked."""
         self._state: State | None = None
+        self._news: dict[type, News] = {}
+        """What the client was told last, by its kind."""
 
     @property
     def dropped(self) -> int:
@@ -182,6 +195,8 @@ class Session:
                 self._put(answer)
         elif isinstance(message, Survey | Impair):
             self._survey(seat, message, now)
+        elif isinstance(message, TaskOrder):
+            self._put(self._desk.task(seat, message, now))
 
     def _survey(self, seat: Seat, message: Survey | Impair, now: float) -> None:
         """Tell how the way to the robot is, after it was changed where that was asked for."""
@@ -237,6 +252,8 @@ class Session:
             return True
         if self._network is not None and self._desk.network_version != self._network:
             return True
+        if any(self._news.get(kind) is not news for kind, news in self._desk.news.items()):
+            return True
         t = self.seat.servlet.next_deadline()
         return t is not None and t <= self._desk.engine_time(now)
 
@@ -270,6 +287,10 @@ class Session:
         if desk.state is not None and desk.state is not self._state:
             self._state = desk.state
             self._outbox.put_newest(desk.state)
+        for kind, news in desk.news.items():
+            if self._news.get(kind) is not news:
+                self._news[kind] = news
+                self._outbox.put_newest(news)
         self.look(now=now)
 
     def close(self, code: int, problem: ProblemCode, text: str) -> None:

@@ -14,7 +14,7 @@ from interfaces.val2.playing import Listeners, Player, endless, stuck
 from interfaces.val2.source import SourceFile
 from vrs.clock import ManualClock
 from vrs.engine import Engine
-from vrs.model import RobotModel
+from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 LONGEST: Final = 600.0
@@ -48,9 +48,14 @@ class Rehearsal:
 
 
 def rehearse(
-    source: SourceFile, model: RobotModel, *, limit: float = LONGEST, listeners: Listeners | None = None
+    source: SourceFile,
+    model: RobotModel,
+    *,
+    limit: float = LONGEST,
+    listeners: Listeners | None = None,
+    start: Array | None = None,
 ) -> Rehearsal:
-    """Carry out the first program of a file, once, from the robot's `nominal` pose.
+    """Carry out the first program of a file, once.
 
     Places that the arm can't reach are passed over, so that all of them are found. What PROMPT asks isn't known,
     nor signals that `.SIGNALS` doesn't say: where the program waits for those, the rehearsal ends.
@@ -60,9 +65,10 @@ def rehearse(
         model: The robot.
         limit: When the program is given up [s].
         listeners: Who hears what it says; nobody by default.
+        start: Where the arm stands [rad], (n,); in its `nominal` pose unless given.
     """
     now, computed, clock = 0.0, 0.0, ManualClock(0.0)
-    engine = Engine(model, q=model.poses["nominal"], clock=clock)
+    engine = Engine(model, q=model.poses["nominal"] if start is None else start, clock=clock)
     given_up: ValError | None = None
     rng = random.Random(0)  # noqa: S311 - RANDOM is no secret
     player = Player(source, Arm(EngineRobot(engine)), listeners or Listeners(), rng, skips=True)

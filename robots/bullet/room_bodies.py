@@ -23,21 +23,16 @@ class RoomBodies:
         self._world = world
         bullet, client = world.bullet, world.client
         shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
-        floor = bullet.createMultiBody(0.0, shape, physicsClientId=client)
+        self.floor = floor = int(bullet.createMultiBody(0.0, shape, physicsClientId=client))
+        """PyBullet's id of the floor."""
         bullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)
         bullet.setCollisionFilterGroupMask(floor, -1, FLOOR, WHEEL, physicsClientId=client)
         self.names: dict[int, str] = {}
         """Names of things by PyBullet's body ids."""
         self._coming: list[tuple[int, Block | Column, list[float], list[float]]] = []
         for thing in room.things:
-            turn = [0.0, 0.0, 0.0, 1.0]
-            if isinstance(thing, Block):
-                half = [thing.length / 2, thing.width / 2, thing.height / 2]
-                shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-                turn = [0.0, 0.0, math.sin(thing.angle / 2), math.cos(thing.angle / 2)]
-            else:
-                shape = self._cylinder(thing.radius, thing.height)
-            position = [thing.x, thing.y, thing.height / 2]
+            position, turn = _pose(thing)
+            shape = self._box(thing) if isinstance(thing, Block) else self._cylinder(thing.radius, thing.height)
             body = self._stand(shape, thing.name, position, turn)
             if thing.start > -math.inf or thing.end < math.inf:
                 self._coming.append((body, thing, position, turn))
@@ -45,6 +40,10 @@ class RoomBodies:
             (self._stand(self._cylinder(person.radius, person.height), person.name, [0.0, 0.0, _AWAY]), person)
             for person in room.people
         ]
+        self._doors = [
+            (self._stand(self._box(door.at(0.0)), door.name, *_pose(door.at(0.0))), door) for door in room.doors
+        ]
+        self._open = [door.share(0.0) for door in room.doors]
         self._there = [True] * len(self._coming)
         self._moved = math.nan
         self.at(0.0)
@@ -52,7 +51,7 @@ class RoomBodies:
     @property
     def moving(self) -> bool:
         """Whether anything ever moves, comes or goes."""
-        return bool(self._coming or self._walking)
+        return bool(self._coming or self._walking or self._doors)
 
     def at(self, t: float) -> None:
         """Bring everything to where it is at a time [s]."""
@@ -63,6 +62,10 @@ class RoomBodies:
         for body, person in self._walking:
             x, y = person.at(t)
             put(body, [x, y, person.height / 2], [0.0, 0.0, 0.0, 1.0], physicsClientId=client)
+        for k, (body, door) in enumerate(self._doors):
+            if (share := door.share(t)) != self._open[k]:
+                self._open[k] = share
+                put(body, *_pose(door.at(t)), physicsClientId=client)
         for k, (body, thing, (x, y, z), turn) in enumerate(self._coming):
             there = thing.stands(t)
             if there != self._there[k]:
@@ -88,6 +91,13 @@ class RoomBodies:
         )
         return np.array([hit[2] * reach if hit[0] >= 0 else math.inf for hit in hits])
 
+    def _box(self, block: Block) -> int:
+        bullet = self._world.bullet
+        half = [block.length / 2, block.width / 2, block.height / 2]
+        return int(
+            bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._world.client)
+        )
+
     def _cylinder(self, radius: float, height: float) -> int:
         bullet = self._world.bullet
         return int(
@@ -105,3 +115,9 @@ class RoomBodies:
         bullet.setCollisionFilterGroupMask(body, -1, THING, CHASSIS | RAY, physicsClientId=client)
         self.names[int(body)] = name
         return int(body)
+
+
+def _pose(thing: Block | Column) -> tuple[list[float], list[float]]:
+    """Where a thing's middle is [m], and how it's turned, a quaternion."""
+    angle = thing.angle if isinstance(thing, Block) else 0.0
+    return [thing.x, thing.y, thing.height / 2], [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]

@@ -10,20 +10,41 @@ The format is line by line, `docs/ipr.md` has all of it:
     box 3 2  1.2 0.6  angle_deg=30 height=0.75 unknown from=5 until=60
     column 5 3 0.2
     person 0.25 repeat  0,1,1  4,3,1  8,1,1
+    door 2 2  2 3  hinged  0,0  10,0  12,1
+    via 2.5 2.5
+    place table 3 1.2 90
 
 Lengths in metres, times in seconds, angles in degrees; `#` begins a comment. A thing is unknown if the operator's
-map doesn't have it; people always are.
+map doesn't have it; people and doors always are.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from robots.bullet.things import Block, Column, Door, DoorKind, Person
+from vrs.checks import one_of
 from vrs.errors import FormatError
+
+__all__ = [
+    "EMPTY",
+    "MOST_BYTES",
+    "MOST_POINTS",
+    "MOST_THINGS",
+    "VERSION",
+    "Block",
+    "Column",
+    "Door",
+    "DoorKind",
+    "Person",
+    "Place",
+    "Room",
+    "load_room",
+    "read_room",
+]
 
 VERSION = 1
 """Of the format."""
@@ -31,86 +52,20 @@ MOST_BYTES = 262_144
 MOST_THINGS = 1000
 MOST_POINTS = 1000
 _MARGIN = 1.0
-_WALL_HEIGHT, _BOX_HEIGHT, _PERSON_HEIGHT = 2.4, 0.8, 1.7
+_WALL_HEIGHT, _BOX_HEIGHT, _PERSON_HEIGHT, _DOOR_HEIGHT = 2.4, 0.8, 1.7, 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
-    """A box that stands on the floor, a wall among others."""
+class Place:
+    """A point of the map that has a name."""
 
     name: str
     x: float
-    """Of its middle [m]."""
+    """[m]."""
     y: float
-    length: float
-    """Along its own first axis [m]."""
-    width: float
-    angle: float
-    """Of its first axis [rad]."""
-    height: float
-    known: bool = True
-    """Whether the operator's map has it."""
-    start: float = -math.inf
-    """It stands there in [start, end) [s]."""
-    end: float = math.inf
-
-    def stands(self, t: float) -> bool:
-        """Whether it's there at t [s]."""
-        return self.start <= t < self.end
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """An upright cylinder."""
-
-    name: str
-    x: float
-    y: float
-    radius: float
-    height: float
-    known: bool = True
-    start: float = -math.inf
-    """It stands there in [start, end) [s]."""
-    end: float = math.inf
-
-    def stands(self, t: float) -> bool:
-        """Whether it's there at t [s]."""
-        return self.start <= t < self.end
-
-
-@dataclass(frozen=True, slots=True)
-class Person:
-    """A cylinder that walks along straight lines between places, at the times that belong to them."""
-
-    name: str
-    radius: float
-    height: float
-    times: tuple[float, ...]
-    """Ascending [s]."""
-    places: tuple[tuple[float, float], ...]
-    """Where at each time [m]."""
-    repeat: bool = False
-    """Whether the path begins again when it ended; it then ends where it began."""
-
-    def at(self, t: float) -> tuple[float, float]:
-        """Where the person is at t [s]; before the first time at the first place, after the last at the last."""
-        times, places = self.times, self.places
-        if self.repeat and t > times[-1]:
-            t = times[0] + math.fmod(t - times[0], times[-1] - times[0])
-        k = bisect_right(times, t)
-        if k == 0:
-            return places[0]
-        if k == len(times):
-            return places[-1]
-        share = (t - times[k - 1]) / (times[k] - times[k - 1])
-        (x0, y0), (x1, y1) = places[k - 1], places[k]
-        return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
-
-    @property
-    def speed(self) -> float:
-        """Fastest that the person walks [m/s]."""
-        steps = zip(self.times, self.places, self.times[1:], self.places[1:], strict=False)
-        return max((math.dist(p, q) / (b - a) for a, p, b, q in steps), default=0.0)
+    """[m]."""
+    heading: float | None = None
+    """[rad]; None for any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +82,11 @@ class Room:
     blocks: tuple[Block, ...] = ()
     columns: tuple[Column, ...] = ()
     people: tuple[Person, ...] = ()
+    doors: tuple[Door, ...] = ()
+    via: tuple[tuple[float, float], ...] = ()
+    """Via points of the map [m]."""
+    places: tuple[Place, ...] = ()
+    """Named points of the map."""
 
     @property
     def things(self) -> tuple[Block | Column, ...]:
@@ -134,15 +94,23 @@ class Room:
         return *self.blocks, *self.columns
 
     def known(self) -> Room:
-        """Return what the operator's map has: without unknown things and people."""
-        return Room(
-            self.name,
-            self.length,
-            self.width,
-            self.start,
-            tuple(block for block in self.blocks if block.known),
-            tuple(column for column in self.columns if column.known),
+        """Return what the operator's map has: without unknown things, people and doors."""
+        return replace(
+            self,
+            blocks=tuple(block for block in self.blocks if block.known),
+            columns=tuple(column for column in self.columns if column.known),
+            people=(),
+            doors=(),
         )
+
+    def place(self, name: str) -> Place:
+        """Return the point of that name.
+
+        Raises:
+            InvalidValueError: If the map has none.
+        """
+        by_name = {place.name: place for place in self.places}
+        return by_name[one_of("place", name, by_name)]
 
 
 EMPTY = Room("nothing", 200.0, 200.0)
@@ -188,6 +156,9 @@ class _Reader:
         self._blocks: list[Block] = []
         self._columns: list[Column] = []
         self._people: list[Person] = []
+        self._doors: list[Door] = []
+        self._via: list[tuple[float, float]] = []
+        self._places: dict[str, Place] = {}
         self._seen: set[str] = set()
         self._kinds: dict[str, Callable[[list[str]], None]] = {
             "name": self._read_name,
@@ -197,6 +168,9 @@ class _Reader:
             "box": self._read_box,
             "column": self._read_column,
             "person": self._read_person,
+            "door": self._read_door,
+            "via": self._read_via,
+            "place": self._read_named,
         }
 
     def read(self, text: str) -> Room:
@@ -221,7 +195,7 @@ class _Reader:
                 self._seen.add(kind)
             elif "size" not in self._seen:
                 self._fail("the size comes before what stands in the room")
-            elif len(self._blocks) + len(self._columns) + len(self._people) >= MOST_THINGS:
+            elif self._count() >= MOST_THINGS:
                 self._fail(f"more than {MOST_THINGS} things")
             self._kinds[kind](rest)
         if first:
@@ -235,7 +209,14 @@ class _Reader:
             tuple(self._blocks),
             tuple(self._columns),
             tuple(self._people),
+            tuple(self._doors),
+            tuple(self._via),
+            tuple(self._places.values()),
         )
+
+    def _count(self) -> int:
+        things = len(self._blocks) + len(self._columns) + len(self._people) + len(self._doors)
+        return things + len(self._via) + len(self._places)
 
     def _fail(self, problem: str) -> None:
         raise FormatError(f"{self._where}, line {self._line}", problem)
@@ -336,19 +317,12 @@ class _Reader:
         others = [word for word in words if "," not in word]
         options = {"height": (0.5, 2.5, _PERSON_HEIGHT)}
         (radius,), option, flags = self._split(others, 1, "a radius [m], then points t,x,y", options, {"repeat"})
-        if not 1 <= len(points) <= MOST_POINTS:
-            self._fail(f"a person has 1 to {MOST_POINTS} points t,x,y")
         times: list[float] = []
         places: list[tuple[float, float]] = []
-        for point in points:
-            parts = point.split(",")
-            if len(parts) != 3:
-                self._fail(f"a point is t,x,y without spaces; given: {point[:40]!r}")
-            t, place = self._number("t", parts[0], 0.0, 1e6), self._place(parts[1:])
-            if times and t <= times[-1]:
-                self._fail(f"times must ascend; {t:g} comes after {times[-1]:g}")
+        for t, parts in self._timetable(points, 3, "a person", "t,x,y"):
+            place = self._place(parts[1:])
             if times and math.dist(place, places[-1]) > 3.0 * (t - times[-1]):
-                self._fail(f"nobody walks faster than 3 m/s; to {point!r} it would be faster")
+                self._fail(f"nobody walks faster than 3 m/s; to {','.join(parts)!r} it would be faster")
             times.append(t)
             places.append(place)
         repeat = "repeat" in flags
@@ -356,6 +330,66 @@ class _Reader:
             self._fail("a path that repeats ends where it began")
         name, size = f"person in line {self._line}", self._number("radius", radius, 0.05, 1.0)
         self._people.append(Person(name, size, option["height"], tuple(times), tuple(places), repeat))
+
+    def _read_door(self, words: list[str]) -> None:
+        points = [word for word in words if "," in word]
+        others = [word for word in words if "," not in word]
+        options = {
+            "thickness": (0.01, 0.5, 0.04),
+            "height": (0.01, 5.0, _DOOR_HEIGHT),
+            "open_deg": (-180.0, 180.0, 90.0),
+        }
+        kinds = {kind.value for kind in DoorKind}
+        at, option, flags = self._split(others, 4, "x, y of both ends [m]", options, {"repeat", *kinds})
+        if len(flags & kinds) != 1:
+            self._fail(f"a door is either {' or '.join(DoorKind)}")
+        (x0, y0), (x1, y1) = self._place(at[:2]), self._place(at[2:])
+        length = math.hypot(x1 - x0, y1 - y0)
+        if not 0.3 <= length <= 5.0:
+            self._fail("a door is 0.3 m to 5 m wide")
+        timetable = self._timetable(points or ["0,0"], 2, "a door", "t,share")
+        shares = [self._number("share", parts[1], 0.0, 1.0) for _, parts in timetable]
+        times = [t for t, _ in timetable]
+        for k in range(1, len(times)):
+            if abs(shares[k] - shares[k - 1]) > 2.0 * (times[k] - times[k - 1]):
+                self._fail(f"no door opens or closes within less than 0.5 s; to {points[k]!r} it would")
+        repeat = "repeat" in flags
+        if repeat and (len(times) < 2 or shares[0] != shares[-1]):
+            self._fail("a timetable that repeats ends as it began")
+        kind = DoorKind(*(flags & kinds))
+        name, swing = f"door in line {self._line}", math.radians(option["open_deg"])
+        self._doors.append(Door(
+            name, kind, x0, y0, length, math.atan2(y1 - y0, x1 - x0), option["thickness"], option["height"], swing,
+            tuple(times), tuple(shares), repeat,
+        ))  # fmt: skip
+
+    def _read_via(self, words: list[str]) -> None:
+        self._via.append(self._place(self._split(words, 2, "x, y [m]", {}, set())[0]))
+
+    def _read_named(self, words: list[str]) -> None:
+        if len(words) not in (3, 4):
+            self._fail("needs a name, x, y [m], and perhaps a heading [deg]")
+        name, heading = words[0], None
+        if len(name) > 40 or name in self._places:
+            self._fail(f"a place has a name of its own, of at most 40 characters; given: {name[:40]!r}")
+        if len(words) == 4:
+            heading = math.radians(self._number("heading", words[3], -360.0, 360.0))
+        self._places[name] = Place(name, *self._place(words[1:3]), heading)
+
+    def _timetable(self, points: list[str], count: int, who: str, what: str) -> list[tuple[float, list[str]]]:
+        """Times and the words at each, of points such as t,x,y."""
+        if not 1 <= len(points) <= MOST_POINTS:
+            self._fail(f"{who} has 1 to {MOST_POINTS} points {what}")
+        found: list[tuple[float, list[str]]] = []
+        for point in points:
+            parts = point.split(",")
+            if len(parts) != count:
+                self._fail(f"a point is {what} without spaces; given: {point[:40]!r}")
+            t = self._number("t", parts[0], 0.0, 1e6)
+            if found and t <= found[-1][0]:
+                self._fail(f"times must ascend; {t:g} comes after {found[-1][0]:g}")
+            found.append((t, parts))
+        return found
 
     def _times(self, option: dict[str, float]) -> tuple[float, float]:
         if not option["from"] < option["until"]:

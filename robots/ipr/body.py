@@ -13,9 +13,10 @@ import numpy as np
 
 from robots.bullet.room_bodies import RoomBodies
 from robots.bullet.world import World
+from robots.ipr.cargo import Cargo, CargoBody
 from robots.ipr.robot import MobileRobot
 from robots.ipr.wheeled import DRIVES, load_chassis
-from vrs.errors import VrsError
+from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 
 _HOLD_TIME = 0.03
@@ -63,6 +64,7 @@ class MobileBody(MobileRobot):
             numSolverIterations=_ITERATIONS, deterministicOverlappingPairs=1, physicsClientId=self._world.client
         )
         self._room_bodies = RoomBodies(self._world, self.room)
+        self._cargo: list[CargoBody] = []
         train, dt = self._train, self.reality.dt
         start = self._truth
         loaded = load_chassis(self._world, self.chassis, self.reality, start, train.radii, train.base)
@@ -106,6 +108,35 @@ class MobileBody(MobileRobot):
             points = bullet.getContactPoints(bodyA=body, linkIndexA=j, physicsClientId=client)
             found.append(Wheel(speed, torque, sum(point[9] for point in points)))
         return found[0], found[1]
+
+    def load(self, cargo: Cargo, place: tuple[float, float] | None = None) -> None:
+        """Put something on top; friction alone holds it there.
+
+        Args:
+            cargo: What.
+            place: Where its middle is to lie, x forward and y left of the driving axle's middle [m]; the middle of
+                the robot's top unless given.
+
+        Raises:
+            InvalidValueError: If the place isn't on the robot's top.
+            WorldClosedError: If the robot is closed.
+        """
+        self._ready()
+        chassis = self.chassis
+        x, y = (chassis.centre_x, 0.0) if place is None else place
+        if not (abs(x - chassis.centre_x) <= chassis.length / 2 and abs(y) <= chassis.width / 2):
+            raise InvalidValueError("place", place, "one on the robot's top")
+        at, R = self._pose()
+        top = at + R @ np.array([x, y, chassis.height])
+        there = float(top[0]), float(top[1]), float(top[2]), self._truth[2]
+        self._cargo.append(CargoBody(self._world, cargo, self._body, self._room_bodies.floor, there))
+
+    @property
+    def cargo(self) -> tuple[tuple[float, float, float], ...]:
+        """Where the middle of each thing that was put on top is now, in the robot's frame, x, y, z [m]."""
+        at, R = self._pose()
+        places = (R.T @ (one.pose()[0] - at) for one in self._cargo)
+        return tuple((float(x), float(y), float(z)) for x, y, z in places)
 
     @property
     def closed(self) -> bool:
@@ -180,7 +211,9 @@ class MobileBody(MobileRobot):
         points = self._world.bullet.getContactPoints(
             bodyA=self._body, linkIndexA=-1, physicsClientId=self._world.client
         )
-        touched = sorted({self._room_bodies.names[point[2]] for point in points if point[8] <= 0.0})
+        names = self._room_bodies.names
+        # What lies on top has no name in the room.
+        touched = sorted({names[point[2]] for point in points if point[8] <= 0.0 and point[2] in names})
         # One that's touched on counts as the same collision.
         self._touch(self._touches if self._touches in touched else touched[0] if touched else "")
 

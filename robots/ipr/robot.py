@@ -29,7 +29,7 @@ from vrs.model import Array, frozen_array
 MOST_COLLISIONS = 1000
 """Collisions that are kept."""
 _ROOMS: Final = Path(__file__).parent / "rooms"
-PLACES: Final = ("berths", "corridor", "empty", "fig13", "fig13_person", "furnished", "lane", "slalom")
+PLACES: Final = ("berths", "corridor", "empty", "fig13", "fig13_person", "furnished", "home", "lane", "slalom")
 """Rooms that come with the package."""
 
 

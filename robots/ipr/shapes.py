@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.bullet.rooms import Block, Column, Person, Room
+from robots.bullet.rooms import Block, Column, Door, Person, Room
 from robots.ipr.chassis import IPR, MICRO, Chassis, chassis
 from robots.ipr.drive_train import as_posture
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft
@@ -33,10 +33,15 @@ BOARD: Final = (0.10, 0.36, 0.22)
 WALL: Final = (0.86, 0.84, 0.79)
 WOOD: Final = (0.66, 0.50, 0.33)
 GROUND: Final = (0.74, 0.74, 0.72)
+LEAF: Final = (0.76, 0.67, 0.53)
+"""Colour of doors."""
 NEW: Final = (0.80, 0.42, 0.20)
 """Of things that the operator's map doesn't have."""
 CLOTH: Final = (0.30, 0.36, 0.52)
 SKIN: Final = (0.86, 0.68, 0.56)
+
+SCREEN_SIZE: Final = (0.224, 0.134)
+"""Width and height of the IPR's display [m]; less than the paper's 12.1 inches, so that it fits the front."""
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Any:
@@ -57,8 +62,8 @@ def rounded(bounds: tuple[float, float, float, float], low: float, high: float, 
     return loft([(z, middle, a - inset, b - inset, corner - inset) for z, inset in layers])
 
 
-def _ipr_body() -> LinkShape:
-    """Build the 75 kg robot: skirt, housing with 16 sonars, sloping display, head with two cameras."""
+def _ipr_body(*, head: bool = True) -> LinkShape:
+    """Build the 75 kg robot: skirt, housing with 16 sonars, sloping display, perhaps its head with two cameras."""
     body = IPR
     back, front = body.centre_x - body.length / 2, body.centre_x + body.length / 2
     half = body.width / 2
@@ -79,25 +84,40 @@ def _ipr_body() -> LinkShape:
             ]
         )
     )
-    # The display's face leans back over the sloping front.
-    screen = box((-0.006, -0.125, -0.080), (0.006, 0.125, 0.080))
-    glass = box((0.005, -0.112, -0.067), (0.009, 0.112, 0.067))
-    lean = np.array([[0.78, 0.0, -0.626], [0.0, 1.0, 0.0], [0.626, 0.0, 0.78]])
-    lean /= np.linalg.norm(lean, axis=0)
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = lean, (middle + 0.150, 0.0, 0.585)
+    width, height = SCREEN_SIZE[0] / 2, SCREEN_SIZE[1] / 2
+    screen = box((-0.006, -width - 0.013, -height - 0.013), (0.006, width + 0.013, height + 0.013))
+    glass = box((0.005, -width, -height), (0.009, width, height))
+    pose = screen_pose()
     for part, colour in ((screen, DARK), (glass, SCREEN)):
         part.apply_transform(pose)
         build.add(part, colour)
     build.add(lathe([(0.040, 0.640), (0.034, 0.675)], at=(middle - 0.03, 0, 0)), DARK)
-    head = middle - 0.03
-    build.add(rounded((head - 0.050, head + 0.050, -0.105, 0.105), 0.670, body.height, 0.030, 0.008))
-    for side in (-1, 1):
-        eye = (head + 0.046, side * 0.058, 0.712)
-        build.add(drum(0.024, 0.0, 0.016, at=eye, axis="x", edge=0.003), DARK)
-        build.add(drum(0.015, 0.012, 0.020, at=eye, axis="x", edge=0.003), GLASS)
+    if head:
+        _add_head(build, body, middle - 0.03)
     _add_sonars(build, body, radius=0.020)
     return build.shape()
+
+
+def screen_pose() -> Array:
+    """Pose of the IPR's display in the robot's frame, (4, 4): x out of its leaning glass, y to its left."""
+    X = np.eye(4)
+    lean = np.array([[0.78, 0.0, -0.626], [0.0, 1.0, 0.0], [0.626, 0.0, 0.78]])
+    X[:3, :3], X[:3, 3] = lean / np.linalg.norm(lean, axis=0), (IPR.centre_x + 0.150, 0.0, 0.601)
+    return X
+
+
+def _add_head(build: Builder, body: Chassis, x: float) -> None:
+    """Set the head with its two cameras on the neck."""
+    build.add(rounded((x - 0.050, x + 0.050, -0.105, 0.105), 0.670, body.height, 0.030, 0.008))
+    for side in (-1, 1):
+        eye = (x + 0.046, side * 0.058, 0.712)
+        build.add(drum(0.024, 0.0, 0.016, at=eye, axis="x", edge=0.003), DARK)
+        build.add(drum(0.015, 0.012, 0.020, at=eye, axis="x", edge=0.003), GLASS)
+
+
+def headless() -> LinkShape:
+    """Build the IPR's body without its head: what the camera in the head may see of it, in the robot's frame."""
+    return _ipr_body(head=False)
 
 
 def _add_sonars(build: Builder, body: Chassis, radius: float) -> None:
@@ -266,6 +286,19 @@ def _thing(thing: Block | Column) -> LinkShape:
         body = rounded((-a, a, -b, b), 0.0, thing.height, 2 * edge, edge)
     body.apply_transform(upright(thing.x, thing.y, thing.angle))
     build.add(body)
+    return build.shape()
+
+
+def door_shape(door: Door) -> LinkShape:
+    """Build a door's leaf with a handle, in a frame on the floor under its middle, its first end at −x."""
+    a, b = door.length / 2, door.thickness / 2
+    build = Builder(door.name, LEAF)
+    build.add(box((-a, -b, 0.0), (a, b, door.height)))
+    reach, at = min(0.06, a / 4), a - min(0.08, a / 4)
+    for side in (-1, 1):
+        y0, y1 = sorted((side * b, side * (b + reach)))
+        z = min(1.0, 0.8 * door.height)
+        build.add(box((at - 0.015, y0, z), (at + 0.015, y1, z + 0.03)), STEEL)
     return build.shape()
 
 

@@ -15,6 +15,7 @@ from robots.onboard.following import FollowingAbort, FollowingMonitor, Tolerance
 from robots.onboard.free_ways import Outline
 from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
 from robots.onboard.gsp_map import GspMap, Lines, load_map, read_map, save_map
+from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
 from robots.onboard.known_trajectory import KnownTrajectory
 from robots.onboard.laser import LaserModel, LaserScan, OdometryTrack, deskewed
 from robots.onboard.laser_frame import FrameReader, decode_scan, encode_scan
@@ -26,6 +27,8 @@ from robots.onboard.localization import LocalizationConfig, Observability, Track
 from robots.onboard.localizer import Event, Localizer, LocalizerConfig, Status
 from robots.onboard.map_building import BuildingConfig, MapBuilder
 from robots.onboard.movers import Mover, MoversConfig, MoverTracker
+from robots.onboard.navigator import Navigator, NavigatorConfig
+from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.paper_localization import PaperConfig, PaperLocalizer
 from robots.onboard.path import Arc, MovingPath, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
@@ -38,6 +41,7 @@ from robots.onboard.quadratic_tracker import (
     parabola_drive,
     wheel_rates,
 )
+from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
 from robots.onboard.servo import FeedForward, Servo, ServoGains
 from robots.onboard.stamps import Kind, Stamp, Verdict
 from robots.onboard.stops import StopMotion, at_rest, from_commanded, from_measured
@@ -89,8 +93,12 @@ __all__ = [
     "Found",
     "FrameReader",
     "GoOn",
+    "Goal",
     "Grant",
     "GspMap",
+    "Journey",
+    "JourneyConfig",
+    "JourneyState",
     "Kind",
     "KnownTrajectory",
     "LaserModel",
@@ -114,8 +122,13 @@ __all__ = [
     "MoverTracker",
     "MoversConfig",
     "MovingPath",
+    "Navigator",
+    "NavigatorConfig",
+    "NoRoute",
     "Observability",
     "ObstacleAvoidance",
+    "ObstacleMap",
+    "ObstacleMapConfig",
     "OdometryTrack",
     "Outline",
     "PaperConfig",
@@ -135,6 +148,9 @@ __all__ = [
     "Reference",
     "Refusal",
     "RefusalCode",
+    "Route",
+    "RouteConfig",
+    "RouteMap",
     "SearchConfig",
     "Servo",
     "ServoGains",

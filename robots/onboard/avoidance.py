@@ -105,6 +105,7 @@ class ObstacleAvoidance:
         self._bearings = _SPREAD * np.linspace(-config.half_cone, config.half_cone, 5)
         self._points = np.empty((0, 2))
         self._seen = np.empty(0)
+        self._standing = np.empty((0, 2))
         self._curvature = 0.0
         self._side = 0.0
         self.acts = False
@@ -146,6 +147,14 @@ class ObstacleAvoidance:
         added = spread.reshape(-1, 2)
         self._points = np.concatenate([points, added])
         self._seen = np.concatenate([seen, np.full(len(added), now)])
+
+    def stand(self, places: Array) -> None:
+        """Take in where something stands by what else is known, as a laser or a map: until the next call.
+
+        Args:
+            places: In the world frame [m], (k, 2).
+        """
+        self._standing = places
 
     def drive(
         self,
@@ -244,6 +253,8 @@ class ObstacleAvoidance:
         size = math.hypot(max(outline.front, outline.rear), outline.half_width) + config.clearance
         # In the order in which they were seen.
         d = self._points[np.searchsorted(self._seen, now - config.memory) :]
+        if len(self._standing):
+            d = np.concatenate([d, self._standing])
         if not len(d):
             return d
         d = d - posture[:2]

@@ -113,16 +113,32 @@ class MoverTracker:
             posture: Where the robot was, (x, y, θ) [m, m, rad].
             now: When it was taken [s], not before an earlier one.
         """
+        found = []
+        for r, bearing, origin in self._groups(ranges, new, posture):
+            reach, c, s = r + self._config.radius, math.cos(bearing), math.sin(bearing)
+            turn = np.array([[c, -s], [s, c]])
+            noise = np.diag([self._config.range_noise**2, (self._config.bearing_noise * reach) ** 2])
+            found.append((origin + reach * np.array([c, s]), turn @ noise @ turn.T))
+        self._follow(found, now)
+
+    def see(self, middles: Sequence[tuple[float, float]], *, now: float) -> None:
+        """Take in what a laser saw.
+
+        Args:
+            middles: Of things that may move [m], in the world frame.
+            now: When it was seen [s], not before an earlier time.
+        """
+        noise = self._config.range_noise**2 * np.eye(2)
+        self._follow([(np.array(middle), noise) for middle in middles], now)
+
+    def _follow(self, found: Sequence[tuple[Array, Array]], now: float) -> None:
+        """Tell things by where they were seen, with what noise, which were known and which are new."""
         config = self._config
         self._things = [thing for thing in self._things if now - thing.seen <= config.memory]
         for thing in self._things:
             self._expect(thing, now)
         free = list(self._things)
-        for r, bearing, origin in self._groups(ranges, new, posture):
-            reach, c, s = r + config.radius, math.cos(bearing), math.sin(bearing)
-            z = origin + reach * np.array([c, s])
-            turn = np.array([[c, -s], [s, c]])
-            noise = turn @ np.diag([config.range_noise**2, (config.bearing_noise * reach) ** 2]) @ turn.T
+        for z, noise in found:
             off = [self._off(thing, z, noise) for thing in free]
             best = int(np.argmin(off)) if off else -1
             if off and off[best] < math.inf:

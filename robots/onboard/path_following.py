@@ -125,6 +125,11 @@ class PathFollowingController:
         self.direction = 0.0
         """Direction in which it was to travel then [rad]."""
 
+    @property
+    def config(self) -> PathFollowingConfig:
+        """Its constants."""
+        return self._config
+
     def control(self, posture: tuple[float, float, float], *, v_before: float | None = None) -> Drive:
         """Say what to drive until the next call.
 

@@ -17,7 +17,7 @@ def test_this_machine_is_fine(capsys):
     report = json.loads(capsys.readouterr().out)
     assert report["ok"] is True
     assert {check["name"] for check in report["checks"]} >= {
-        "python", "pybullet", "browser", "ports", "clock", "names",
+        "python", "pybullet", "browser", "camera", "voice", "ports", "clock", "names",
     }  # fmt: skip
 
 
@@ -30,6 +30,17 @@ def test_a_missing_browser_is_optional(monkeypatch, capsys):
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
     assert _status(["doctor"]) == 0
     assert "to mend: install chromium" in capsys.readouterr().out
+
+
+def test_a_missing_camera_and_voice_are_optional(monkeypatch, capsys):
+    real = doctor.importlib.util.find_spec
+    monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: None if name == "av" else real(name))
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
+    assert _status(["doctor"]) == 0
+    said = capsys.readouterr().out
+    assert "missing: av" in said
+    assert "vrs-teleop[media]" in said
+    assert "install the program espeak-ng" in said
 
 
 def test_a_package_of_the_same_name_is_found(monkeypatch, capsys):

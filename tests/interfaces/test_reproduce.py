@@ -92,7 +92,7 @@ class TestHouse:
     def test_all_and_one_and_none(self):
         assert papers("all") == tuple(PAPERS.values())
         assert papers("doulgeri") == (PAPERS["doulgeri"],)
-        with pytest.raises(InvalidValueError, match="doulgeri, han2001, kim2006, tipsuwan, all"):
+        with pytest.raises(InvalidValueError, match="doulgeri, han2001, kim2002, kim2006, tipsuwan, all"):
             papers("nobody")
 
     def test_misuse(self):
@@ -248,7 +248,10 @@ class TestCommand:
     def test_bad_input_is_one_line_and_exit_2(self, tmp_path, capsys):
         (tmp_path / "file").touch()
         for arguments, said in (
-            (["reproduce", "nobody", "--out", str(tmp_path)], "one of doulgeri, han2001, kim2006, tipsuwan, all"),
+            (
+                ["reproduce", "nobody", "--out", str(tmp_path)],
+                "one of doulgeri, han2001, kim2002, kim2006, tipsuwan, all",
+            ),
             (["reproduce", "--out", str(tmp_path)], "PAPER"),
             (["reproduce", "doulgeri"], "--out"),
             (["reproduce", "doulgeri", "--out", str(tmp_path / "file")], "can't hold the results"),

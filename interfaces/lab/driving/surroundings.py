@@ -7,15 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from interfaces.teleop.architectures import Controller, Following, OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.architectures.surroundings import Aim
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
+from robots.ipr.navigation import mounts_of, outline_of
 from robots.ipr.parameters import CELL, CELLS
 from robots.ipr.robot import MobileRobot
-from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
-from robots.onboard.free_ways import Outline
 from robots.onboard.movers import MoversConfig, MoverTracker
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
 from robots.onboard.yielding import Yielding, YieldingConfig
@@ -59,33 +60,30 @@ def operator_surroundings(room: Room, chassis: Chassis, start: Posture, model: M
     grid = grid_of(room, start)
     known = _known(room, grid, 0.0)
     environment = VirtualEnvironment(grid.shape, cell=grid.cell, origin=grid.origin, walls=known)
-    outline = _outline(chassis)
+    outline = outline_of(chassis)
     radius = math.hypot(max(outline.front, outline.rear), chassis.width / 2) + MARGIN
     return OperatorSurroundings(environment, Avoidance(model.limits, radius, period=model.period))
 
 
 def robot_surroundings(
-    body: MobileRobot, start: Posture, controller: Controller, period: float, *, since: float = 0.0
+    body: MobileRobot, start: Posture, aim: Aim | None, period: float, *, since: float = 0.0
 ) -> RobotSurroundings:
     """What the real robot has on board of it.
 
     Args:
         body: The real robot, with sonars.
         start: Where it begins.
-        controller: What drives it.
+        aim: What drives it, if it knows where it wants to get.
         period: Between two drives [s].
         since: The body's time that is 0 of the drive's [s].
     """
     near, far = body.chassis.sonar_reach
-    mounts = tuple(
-        SonarMount(x, y, angle)
-        for (x, y), angle in zip(body.sonar_places.tolist(), body.sonar_angles.tolist(), strict=True)
-    )
+    mounts = mounts_of(body)
     sonar = body.senses.sonar
     half_cone = 0.0 if sonar is None else sonar.half_angle
     grid = grid_of(body.room, start)
     seen = SupervisorConfig(mounts, half_cone=half_cone, range_min=near, range_max=far)
-    outline = _outline(body.chassis)
+    outline = outline_of(body.chassis)
     careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
     avoidance = ObstacleAvoidance(careful)
     return RobotSurroundings(
@@ -94,13 +92,8 @@ def robot_surroundings(
         avoidance,
         MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
-        controller if isinstance(controller, Following) else None,
+        aim,
     )
-
-
-def _outline(chassis: Chassis) -> Outline:
-    half = chassis.length / 2
-    return Outline(half + chassis.centre_x, half - chassis.centre_x, chassis.width / 2)
 
 
 def _known(room: Room, grid: Grid, height: float) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:

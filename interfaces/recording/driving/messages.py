@@ -81,6 +81,23 @@ class PersonEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     repeat: bool = False
 
 
+class DoorEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """A door that opens and closes."""
+
+    name: Word
+    sliding: bool
+    x: Length
+    y: Length
+    length: Size
+    angle: Length
+    thickness: Size
+    height: Size
+    swing: Length
+    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
+    shares: Annotated[list[Annotated[float, Meta(ge=0, le=1)]], Meta(min_length=1, max_length=1000)]
+    repeat: bool = False
+
+
 class RoomEntry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind", tag="room"):
     """Where it was: written at the beginning, and once more at the end."""
 
@@ -90,6 +107,7 @@ class RoomEntry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind
     things: Annotated[tuple[ThingEntry, ...], Meta(max_length=1000)] = ()
     """Blocks, then columns."""
     people: Annotated[tuple[PersonEntry, ...], Meta(max_length=1000)] = ()
+    doors: Annotated[tuple[DoorEntry, ...], Meta(max_length=1000)] = ()
 
 
 class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):

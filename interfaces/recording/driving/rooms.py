@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from interfaces.recording.driving.messages import GridFacts, PersonEntry, RoomEntry, ThingEntry
+from interfaces.recording.driving.messages import DoorEntry, GridFacts, PersonEntry, RoomEntry, ThingEntry
 from vrs.errors import FormatError
 from vrs.mobile import Grid
 
 if TYPE_CHECKING:
-    from robots.bullet.rooms import Block, Column, Room
+    from robots.bullet.rooms import Block, Column, Door, Room
 
 
 def room_entry(room: Room) -> RoomEntry:
@@ -27,7 +28,15 @@ def room_entry(room: Room) -> RoomEntry:
         )
         for one in room.people
     )
-    return RoomEntry(room.name, room.length, room.width, tuple(_thing_entry(one) for one in room.things), people)
+    things = tuple(_thing_entry(one) for one in room.things)
+    return RoomEntry(room.name, room.length, room.width, things, people, tuple(map(_door_entry, room.doors)))
+
+
+def _door_entry(door: Door) -> DoorEntry:
+    return DoorEntry(
+        door.name, door.kind.value == "sliding", door.x, door.y, door.length, door.angle, door.thickness,
+        door.height, door.swing, list(door.times), list(door.shares), door.repeat,
+    )  # fmt: skip
 
 
 def _thing_entry(thing: Block | Column) -> ThingEntry:
@@ -43,20 +52,34 @@ def room_of(entry: RoomEntry, where: str) -> Room:
     Raises:
         FormatError: If a thing or somebody in it makes no sense.
     """
-    from robots.bullet.rooms import Person, Room
+    from robots.bullet.rooms import Door, DoorKind, Person, Room
 
     things = [_thing(one, where) for one in entry.things]
     people = []
     for one in entry.people:
-        ascending = all(a < b for a, b in zip(one.times, one.times[1:], strict=False))
-        if not ascending or not len(one.times) == len(one.x) == len(one.y):
+        if not _ascend(one.times) or not len(one.times) == len(one.x) == len(one.y):
             raise FormatError(where, f"{one.name!r} in its room walks no path")
         places = tuple(zip(one.x, one.y, strict=True))
         repeats = one.repeat and len(one.times) > 1
         people.append(Person(one.name, one.radius, one.height, tuple(one.times), places, repeats))
+    doors = []
+    for leaf in entry.doors:
+        if not _ascend(leaf.times) or len(leaf.times) != len(leaf.shares):
+            raise FormatError(where, f"{leaf.name!r} in its room has no timetable")
+        kind = DoorKind.SLIDING if leaf.sliding else DoorKind.HINGED
+        doors.append(Door(
+            leaf.name, kind, leaf.x, leaf.y, leaf.length, leaf.angle, leaf.thickness, leaf.height, leaf.swing,
+            tuple(leaf.times), tuple(leaf.shares), leaf.repeat and len(leaf.times) > 1,
+        ))  # fmt: skip
     blocks = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is None)
     columns = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is not None)
-    return Room(entry.name, entry.length, entry.width, blocks=blocks, columns=columns, people=tuple(people))  # type: ignore[arg-type]
+    size = entry.name, entry.length, entry.width
+    moving = {"people": tuple(people), "doors": tuple(doors)}
+    return Room(*size, blocks=blocks, columns=columns, **moving)  # type: ignore[arg-type]
+
+
+def _ascend(times: list[float]) -> bool:
+    return all(a < b for a, b in pairwise(times))
 
 
 def _thing(entry: ThingEntry, where: str) -> Block | Column:

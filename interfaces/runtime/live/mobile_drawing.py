@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -10,9 +12,10 @@ import numpy as np
 from interfaces.stream.meshcat import Committed, MobileScene
 from interfaces.stream.meshcat.driving import PIECE
 from interfaces.teleop.driving import DrivingOperator
+from interfaces.teleop.tasks import Doing, Point
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
-from vrs.mobile import ArcTimeline, Drive, Grid, MobileModel
+from vrs.mobile import ArcTimeline, Drive, Grid, MobileModel, wrapped
 from vrs.mobile.kinematics import advanced
 from vrs.mobile.limiting import braking
 
@@ -22,8 +25,29 @@ KEPT = 24 * PIECE
 """Places of it that are kept at least."""
 SMOOTHED = 0.05
 """A measured posture goes on at the measured speeds for so long, until the next comes [s]."""
+ROUTE_SPEED: Final = 0.4
+"""At which a route is drawn [m/s]: marks lie half a second apart."""
+_CORNER: Final = 1e-3
+"""So long it takes to turn at a corner of it [s]."""
 NOISE: Final = (0.003, 0.005)
 """A real robot that's measured nearer than this to where it's shown stays there [m, rad]: nothing is drawn anew."""
+
+
+def route_timeline(route: Sequence[Point]) -> ArcTimeline:
+    """A route as a path: straight from point to point at one speed, as if it turned at once.
+
+    Args:
+        route: Two points or more [m].
+    """
+    drives: list[Drive] = []
+    first = theta = math.atan2(route[1][1] - route[0][1], route[1][0] - route[0][0])
+    for a, b in pairwise(route):
+        if math.dist(a, b) > 0:
+            aim = math.atan2(b[1] - a[1], b[0] - a[0])
+            drives.append(Drive(_CORNER, 0.0, wrapped(aim - theta) / _CORNER, 0))
+            drives.append(Drive(math.dist(a, b) / ROUTE_SPEED, ROUTE_SPEED, 0.0, 0))
+            theta = aim
+    return ArcTimeline((*route[0], first)).edited(0.0, drives)
 
 
 class _Way:
@@ -38,6 +62,24 @@ class _Way:
             self.places.append(place)
         if len(self.places) >= KEPT + PIECE:
             del self.places[:PIECE]
+
+
+def reality(operator: DrivingOperator, now: float) -> tuple[tuple[float, float, float], float] | None:
+    """Where the real robot is, and the time in its room, as far as is known; None before its first report.
+
+    Args:
+        operator: What has heard of it.
+        now: Session time [s].
+
+    Returns:
+        x, y [m], θ [rad], and a time [s].
+    """
+    report = operator.report
+    if report is None:
+        return None
+    posture = advanced(report.posture, *report.drive, min(operator.heard_ago(now), SMOOTHED))
+    world = 0.0 if report.world is None else report.world + max(0.0, now - report.measured_at)
+    return posture, world
 
 
 class MobileDrawing:
@@ -57,6 +99,7 @@ class MobileDrawing:
         """What all viewers see."""
         self._ways: dict[str, _Way] = {}
         self._drive = -1
+        self._route: tuple[tuple[Point, ...], ArcTimeline] | None = None
         self._committed: tuple[int, ArcTimeline] | None = None
         self._real: tuple[float, float, float] | None = None
 
@@ -71,24 +114,32 @@ class MobileDrawing:
 
     def show(self, operator: DrivingOperator, *, now: float) -> None:
         """Show everything as it is at session time now [s]."""
-        report = operator.report
-        age = 0.0 if report is None else max(0.0, now - report.measured_at)
-        if report is not None:
-            self._measure(advanced(report.posture, *report.drive, min(operator.heard_ago(now), SMOOTHED)))
-        committed = None
+        known = reality(operator, now)
+        if known is not None:
+            self._measure(known[0])
+        committed = self._to_goal(operator)
         if not operator.halted and operator.deviation is not None:
             committed = Committed(self._to_rest(operator), operator.path.place)
         around = operator.site.surroundings
-        world = 0.0 if report is None or report.world is None else report.world + age
         self.scene.show(
             virtual=np.array(operator.virtual(now)),
             real=None if self._real is None else np.array(self._real),
             path=committed,
             driven={twin: np.array(way.places).reshape(-1, 2) for twin, way in self._ways.items()},
             learned=() if around is None else around.environment.obstacles(operator.next_t),
-            t=world,
+            t=0.0 if known is None else known[1],
             now=now,
         )
+
+    def _to_goal(self, operator: DrivingOperator) -> Committed | None:
+        """The way that a robot drives by itself, as far as it hasn't driven it; None where there's none."""
+        report, tasks = operator.report, operator.tasks
+        if report is None or tasks is None or report.doing is Doing.NOTHING or len(tasks.route) < 2:
+            return None
+        if self._route is None or self._route[0] != tasks.route:
+            self._route = tasks.route, route_timeline(tasks.route)
+        length = sum(math.dist(a, b) for a, b in pairwise(tasks.route))
+        return Committed(self._route[1], max(0.0, length - report.left) / ROUTE_SPEED)
 
     def _measure(self, posture: tuple[float, float, float]) -> None:
         """Let the real robot be shown where it's measured."""

@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 from starlette.routing import BaseRoute
 
+from interfaces.jobs import JobFile, OperatorLoss
 from interfaces.lab.driving.surroundings import grid_of, operator_surroundings
 from interfaces.link import LinkConditions
+from interfaces.media import CameraConfig, LiveMedia
 from interfaces.runtime.live.emulation import LiveEmulation
-from interfaces.runtime.live.mobile_drawing import MobileDrawing
+from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
+from interfaces.runtime.live.mobile_tasks import TaskDesk
 from interfaces.runtime.live.operator import GONE, SHOW, UNHEARD
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.access import Access
@@ -26,9 +29,11 @@ from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.mobile import Postures
 from interfaces.stream.server import HubServer
+from interfaces.stream.tasks import Tasks, Wanted
 from interfaces.teleop.architectures import DriveReport, OperatorSurroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator
-from interfaces.teleop.driving.operator import FREE, STOPPED
+from interfaces.teleop.driving.operator import BY_ITSELF, FREE, STOPPED
+from interfaces.teleop.tasks import Doing
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import chassis
@@ -58,6 +63,10 @@ class LiveMobileOperatorConfig:
     """Seed of the emulated link, ≥ 0."""
     server: str = "vrs"
     """Name and version of the program."""
+    jobs: JobFile | None = None
+    """Where the list of jobs is kept; nowhere unless given."""
+    camera: CameraConfig | None = None
+    """The robot's camera; None for none, nor voice and screen."""
 
 
 class LiveMobileOperator:
@@ -86,11 +95,16 @@ class LiveMobileOperator:
         self.site = DriveSite(self.operator, config.model, room=config.room.name)
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, lambda _, __: self._turning.soon())
         self.hub = Hub(
-            self.site, lease, access, self, config=hub, emulation=self.emulation, welcome=self.site.welcome
-        )
+            self.site, lease, access, self, config=hub, emulation=self.emulation, welcome=self.site.welcome,
+            workers=self,
+        )  # fmt: skip
+        body = chassis("ipr"), config.model.limits
+        self.desk = TaskDesk(self.operator, config.room, body, self.hub.tell, config.jobs)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self.drawing = MobileDrawing(config.model, start, config.room, grid_of(config.room, start))
         self._view = view_routes(self.drawing.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
+        self.media = None if config.camera is None else self._media(config.camera, access)
+        """Camera, voice and screen; None where there's no camera."""
         self._wants_resume = False
         self._ending = -math.inf
         """Since when a lease is ending [s]; −∞ while none is."""
@@ -99,12 +113,25 @@ class LiveMobileOperator:
     @property
     def routes(self) -> list[BaseRoute]:
         """What it answers."""
-        return [*self.server.routes, *self._view]
+        return [*self.server.routes, *self._view, *(() if self.media is None else self.media.routes)]
+
+    def _media(self, camera: CameraConfig, access: Access) -> LiveMedia:
+        return LiveMedia(
+            camera, self.config.room, self.clock, access,
+            stand=self._stand,
+            commands=lambda session, epoch: self.hub.commands(session, epoch, now=self.clock.now()),
+            screen=self.drawing.scene.say,
+        )  # fmt: skip
+
+    def _stand(self, now: float) -> tuple[tuple[float, float, float], float]:
+        """Where the real robot is, and the time in its room [s]; where it begins before it's been heard."""
+        return reality(self.operator, now) or (self.config.room.start, 0.0)
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[LiveMobileOperator]:
         """Serve clients, and keep the robot connected."""
-        async with self.server.running():
+        media = contextlib.nullcontext() if self.media is None else self.media.running()
+        async with self.server.running(), media:
             tasks = [asyncio.create_task(work) for work in (self.robot.run(), self._draw())]
             self._turning.start()
             try:
@@ -146,6 +173,10 @@ class LiveMobileOperator:
             # After a stop, too: the next drive begins where the real robot has come to rest.
             self._wants_resume = bool(self.operator.resume(now=now))
         self._end_lease(now)
+        self.desk.turn()
+        tasks = self.operator.tasks
+        if self.media is not None and tasks is not None:
+            self.media.presenter.follow(tasks.says, tasks.shows)
         if self.operator.report is not report or self.operator.steps != steps:
             self._show(now)
             self.server.kick()
@@ -159,8 +190,24 @@ class LiveMobileOperator:
     def ended(self, ended: Ended, *, now: float) -> None:  # noqa: ARG002 - the hub says it
         """A lease has ended: the robots stop on their way."""
         self._ending, self._wants_resume = now, False
-        self.operator.stop()
+        if not self._carries_on:
+            self.operator.stop()
         self._turning.soon()
+
+    @property
+    def _carries_on(self) -> bool:
+        """Whether the robot goes on with what it does by itself, also where nobody has control."""
+        tasks, doing = self.operator.tasks, self.operator.doing
+        return doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
+
+    def order(self, wanted: Wanted, *, now: float) -> str:
+        """Let the robot do something by itself; why it doesn't, empty if it does."""
+        self._turning.soon()
+        return self.desk.order(wanted, now=now)
+
+    def tasks(self, answers: int | None = None) -> Tasks:
+        """How that is."""
+        return self.desk.tasks(answers)
 
     def resume(self, epoch: int, *, now: float) -> str:  # noqa: ARG002 - the hub says it
         """Let a robot go on that stopped by itself; why it can't, empty if it does."""
@@ -170,7 +217,12 @@ class LiveMobileOperator:
         """Let the next one have the lease once both robots rest."""
         if self._ending == -math.inf or not self.operator.stands:
             return
-        if self.operator.done or self.line.silence(now=now) >= GONE or now >= self._ending + PATIENCE:
+        if (
+            self._carries_on
+            or self.operator.done
+            or self.line.silence(now=now) >= GONE
+            or now >= self._ending + PATIENCE
+        ):
             self._ending = -math.inf
             self.operator.halted = FREE
             self.hub.stopped(now=now)
@@ -199,7 +251,7 @@ class LiveMobileOperator:
                 command=operator.site.before,
                 estimate=Posture(*operator.site.estimator.posture.tolist()),
                 connected=self.connected,
-                halted=operator.halted,
+                halted="" if operator.halted == BY_ITSELF else operator.halted,
                 drives=operator.epochs,
                 round_trip=operator.round_trip,
                 messages=self.line.messages(),
@@ -222,9 +274,12 @@ class LiveMobileOperator:
             "halted": self.operator.halted,
             "epoch": self.operator.epoch,
             "drives": self.operator.epochs,
+            "doing": self.operator.doing,
+            "jobs": {"stage": self.desk.progress.stage, "problem": self.desk.problem},
             "D": None if report is None else report.D,
             "path_error": None if deviation is None else deviation.path_error,
             "time_difference": None if deviation is None else deviation.time_difference,
             "link_loss": None if attached is None else attached.link_loss,
             "timer_late": self._turning.lateness.worst,
+            "media": None if self.media is None else self.media.health(),
         }

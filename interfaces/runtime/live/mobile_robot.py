@@ -17,23 +17,30 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
-from interfaces.lab.driving.run import CONTROL, SENSING
+from interfaces.jobs import RunnerConfig, ValArm
+from interfaces.jobs.val_arm import in_a_thread
+from interfaces.lab.driving.run import CONTROL, POSITIONS, SENSING
 from interfaces.lab.driving.surroundings import robot_surroundings
+from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.runtime.live.mobile_senses import LaserSight, NavigatorPilot
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached
-from interfaces.teleop.architectures import Constants, DriveOrders, RobotSite, architecture, controller
-from interfaces.teleop.driving import DrivenConfig, DrivenHost, DrivenRobot
+from interfaces.teleop.architectures import Constants, DriveOrders, Following, RobotSite, architecture, controller
+from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands
 from interfaces.teleop.hosting import HostConfig
 from interfaces.timer import Turning
 from robots.bullet.rooms import Room
 from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
-from robots.ipr.position import FusedPosition
 from robots.onboard.driving import Posture
+from robots.onboard.laser import LaserModel
+from vrs.checks import one_of
 from vrs.clock import WallClock
 
+_COUNTED = 1200
+"""Control periods of which it's told how late they were, and how long they took: the last minute."""
 _REST = 3.0
 """Longest time to come to rest in the end [s]."""
 
@@ -48,6 +55,13 @@ class LiveMobileConfig:
     """What it does with the operator's path: one of `ARCHITECTURES`, or `module:name`."""
     driven: DrivenConfig = field(default_factory=lambda: DrivenConfig(period=CONTROL))
     """How its site behaves."""
+    jobs: RunnerConfig = field(default_factory=RunnerConfig)
+    """How it does lists of jobs, and what follows when the operator is lost."""
+    hands: Hands = field(default_factory=lambda: Hands(arm=ValArm(beside=in_a_thread())))
+    """Who speaks, shows and lets an arm work; nobody aloud, and a virtual arm, unless given."""
+    position: str = ""
+    """What tells it where it is: a name of `interfaces.lab.driving.run.POSITIONS`. Unless given, its laser where
+    the map has walls or other blocks for it to see, else the camera."""
     constants: Constants = field(default_factory=Constants)
     """Of all architectures."""
     seed: int = 0
@@ -57,6 +71,10 @@ class LiveMobileConfig:
 
     def __post_init__(self) -> None:
         architecture(self.architecture)
+        if not self.position:
+            seen = any(block.height >= LaserModel().height for block in self.room.known().blocks)
+            object.__setattr__(self, "position", "laser" if seen else "fused")
+        one_of("position", self.position, POSITIONS)
 
 
 class LiveMobileRobot:
@@ -70,12 +88,14 @@ class LiveMobileRobot:
             access: Who may come in as `Role.SITE`.
         """
         self.config = config
-        senses = Senses() if config.architecture in SENSING else Senses(sonar=None)
+        senses = Senses(laser=LaserModel())
         rng = np.random.default_rng(config.seed)
         self.body = MobileBody("ipr", room=config.room, rng=rng, senses=senses)
-        self._position = FusedPosition(self.body)
+        self._position = POSITIONS[config.position](self.body)
         # The first look of its senses, before anybody waits for it.
         self.body.drive(0.0, 0.0, 0)
+        self.autonomy = Autonomy(NavigatorPilot(self.body, CONTROL), config.hands, config.jobs)
+        self._sight = LaserSight(self.body, self._position)
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
         self.host = DrivenHost(
@@ -92,6 +112,7 @@ class LiveMobileRobot:
         """Control periods that were run, and left out as the process stood still."""
         self.worst = 0.0
         """By how much the latest of them was late [s]."""
+        self._late, self._took = SlidingQuantiles(_COUNTED), SlidingQuantiles(_COUNTED)
         self._touched = 0
 
     @property
@@ -130,10 +151,12 @@ class LiveMobileRobot:
                 now = self.clock.now()
                 late = now - due
                 self.worst = max(self.worst, late)
+                self._late.add(late, now=now)
                 missed = int(late / CONTROL)
                 self.skipped += missed
                 due += (1 + missed) * CONTROL
                 self._drive(now)
+                self._took.add(self.clock.now() - now, now=now)
         except Exception:
             # Whoever waits for the robot must not wait for ever.
             self.ended.set()
@@ -142,6 +165,7 @@ class LiveMobileRobot:
     def _drive(self, now: float) -> None:
         """One control period."""
         drive = self.host.drive(now=now)
+        self._sight.look()
         body = self.body
         body.drive(drive.v, drive.w, round(CONTROL / body.reality.dt))
         self.ticks += 1
@@ -165,6 +189,8 @@ class LiveMobileRobot:
             now=t,
             world=lambda: body.time,
             config=driven,
+            autonomy=self.autonomy,
+            sight=self._sight.newest,
         )
 
     def _architecture(self, start: Posture, since: float) -> RobotSite:
@@ -173,7 +199,8 @@ class LiveMobileRobot:
         made = controller(config.architecture, start, config.constants)
         around = None
         if config.architecture in SENSING:
-            around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
+            aim = made if isinstance(made, Following) else None
+            around = robot_surroundings(body, start, aim, CONTROL, since=body.time - since)
         return RobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
 
     def _turn(self, now: float) -> float:
@@ -206,9 +233,18 @@ class LiveMobileRobot:
             "posture": list(self._position.posture()),
             "truth": list(body.truth),
             "motion": list(body.motion),
+            "doing": self.autonomy.doing,
+            "operator_loss": self.autonomy.loss,
             "touching": body.touching,
             "collisions": len(body.collisions),
-            "ticks": {"run": self.ticks, "skipped": self.skipped, "worst": self.worst},
+            "ticks": {
+                "run": self.ticks,
+                "skipped": self.skipped,
+                "worst": self.worst,
+                "late_p99": self._late.quantile(0.99),
+                "took": self._took.median,
+                "took_p99": self._took.quantile(0.99),
+            },
             "timer_late": self._turning.lateness.worst,
         }
 

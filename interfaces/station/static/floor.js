@@ -1,4 +1,5 @@
 // The 3D view of a mobile robot: both twins in their room, where they drove, what is committed, and how old that is.
+import { busy } from "./tasks.js";
 import { StationScene } from "./twins.js";
 import { Viewport } from "./viewport.js";
 
@@ -28,6 +29,7 @@ export function mount(station, box) {
     if (link !== "live" || !state) return ["help", "Nothing known", "none"];
     if (!state.connected && state.connected !== undefined) return ["cloud_off", "Real robot not heard", "falsified"];
     if (state.halted) return ["pause_circle", "Real robot waits", "none"];
+    if (busy(session)) return ["route", "Drives by itself", "confirmed"];
     if (state.starved) return ["hourglass_empty", "Real robot waits for news", "none"];
     const later = state.time_difference;
     if (later == null || later < 0.02) return ["verified", "Real robot is there too", "confirmed"];

@@ -1,5 +1,6 @@
 // How the connection is, and how the real robot is: two pills, each with a word and a symbol.
 import { h, icon, mark, write } from "./dom.js";
+import { busy } from "./tasks.js";
 
 const WORDS = {
   connecting: ["sync", "Connecting"],
@@ -46,12 +47,13 @@ export function mount(station, box) {
     if (!live || !state) robot.show("none", body, "Real robot unknown");
     else if (!state.connected && state.connected !== undefined) robot.show("bad", "cloud_off", "Real robot not heard");
     else if (halted) robot.show("warn", "pause_circle", "Real robot waits");
+    else if (busy(session)) robot.show("good", "route", "Drives by itself");
     else robot.show("good", body, "Real robot follows");
     robot.element.title = halted ? state.halted : "The real robot, as the server last heard of it";
     resume.hidden = !(halted && session.holds);
   }
 
-  for (const type of ["link", "state", "lease", "welcome"]) station.on(type, show);
+  for (const type of ["link", "state", "lease", "welcome", "tasks"]) station.on(type, show);
   station.on("link", (state) => {
     if (state === "lost") station.announce("Connection lost. Trying again.", { urgent: true });
     if (state === "live") station.announce("Connected.");

@@ -15,7 +15,7 @@ const KEY = "vrs-session";
 /** A token opens its own role and those below it. */
 const ROLES = ["admin", "operator", "viewer"];
 /** Requests of who has control. */
-const HOLDERS = ["release", "resume", "impair"];
+const HOLDERS = ["release", "resume", "impair", "task"];
 
 const seconds = () => performance.now() / 1000;
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 WALL: Final = 0.25
 """Walls are drawn up to here [m]: one looks over them."""
+LEAF: Final = 0.6
+"""And doors up to here [m]: one sees that they're none."""
 LOOKED_FROM: Final = {"elevation": 0.9, "azimuth": -0.47 * math.pi, "away": 0.85}
 """Where the camera stands at first: angles [rad] above the floor and about z; how far away."""
 PIECE: Final = 64
@@ -36,6 +38,8 @@ FLOOR: Final = 0xE6E4DF
 """Colour of a room's floor."""
 DRIVEN: Final = {"virtual": (0.10, 0x2F7DE1), "real": (0.26, 0x6E675C)}
 """Width of a path that was driven, as a share of the robot, and its colour: where both lie, both are seen."""
+SCREEN_LIFT: Final = 0.011
+"""How far a message shines before the middle of the robot's display [m]: just before its glass."""
 _CELL = 4.0
 """Side of the grid that the page draws [m]."""
 _HEIGHTS: Final = {"learned": 0.004, "real": 0.008, "virtual": 0.012, "committed": 0.03}
@@ -141,6 +145,19 @@ class MobileScene(TwinScene):
         if self._newest.version != before:
             self._newest.wake()
 
+    def say(self, text: str) -> None:
+        """Show a message on the real robot's screen; an empty one clears it."""
+        path = f"{ROOT}/real/body/0/screen"
+        if text:
+            from interfaces.stream.meshcat.screen import lettered
+            from robots.ipr.shapes import SCREEN_SIZE, screen_pose
+
+            X = screen_pose()
+            X[:3, 3] += SCREEN_LIFT * X[:3, 0]
+            self._set_object(path, self._objects.sign(path, lettered(text), SCREEN_SIZE, X))
+        self._set(path, "visible", bool(text))
+        self._newest.wake()
+
     def _put_robots(self, posture: Array, looks: Bodies) -> None:
         rest = parts_at(self._model, posture)
         for twin in COLOURS:
@@ -170,7 +187,7 @@ class MobileScene(TwinScene):
             self._build(room)
 
     def _build(self, room: Room) -> None:
-        from robots.ipr.shapes import person_shape, room_shapes
+        from robots.ipr.shapes import door_shape, person_shape, room_shapes
 
         things = tuple(
             replace(thing, height=min(thing.height, WALL)) if thing.name.startswith("wall") else thing
@@ -182,15 +199,24 @@ class MobileScene(TwinScene):
             path, mesh = f"{ROOT}/room/{i}", shaded(shape)
             lowered = self._objects.solid(path, mesh) if i else self._objects.plain(path, mesh, FLOOR)
             self._set_object(path, lowered)
+        for i, door in enumerate(room.doors):
+            path = f"{ROOT}/doors/{i}"
+            leaf = door_shape(replace(door, height=min(door.height, LEAF)))
+            self._set_object(path, self._objects.solid(path, shaded(leaf)))
         for i, person in enumerate(room.people):
             path = f"{ROOT}/people/{i}"
             self._set_object(path, self._objects.solid(path, shaded(person_shape(person))))
         self._live(0.0)
 
     def _live(self, t: float) -> None:
-        """Put those who walk where they are at a time [s], and show what stands then."""
+        """Put those who walk, and doors, where they are at a time [s], and show what stands then."""
         if self._room is None:
             return
+        for i, door in enumerate(self._room.doors):
+            leaf, path = door.at(t), f"{ROOT}/doors/{i}"
+            c, s, X = math.cos(leaf.angle), math.sin(leaf.angle), np.eye(4)
+            X[:2, :2], X[:2, 3] = [[c, -s], [s, c]], (leaf.x, leaf.y)
+            self._put(path, set_transform(path, X))
         for i, person in enumerate(self._room.people):
             path = f"{ROOT}/people/{i}"
             X = np.eye(4)

@@ -25,6 +25,9 @@ TUBE = 0.006
 _CYLINDER = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 """three.js's cylinders stand along y."""
 
+_STANDING = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""three.js's planes lie: x to the right, y up, z to who looks."""
+
 
 class Part(NamedTuple):
     """A child of an object: a geometry in a material."""
@@ -85,6 +88,19 @@ class Shaded:
         attributes["normal"] = g.pack_numpy_array(mesh.normals.T)
         if self._coloured:
             attributes["color"] = {**g.pack_numpy_array(mesh.colours.T), "normalized": True}
+
+
+class Sheet:
+    """A rectangle in its own xy plane with room for a picture, which MeshCat has no class for."""
+
+    def __init__(self, width: float, height: float) -> None:
+        self._width, self._height = width, height
+        self.uuid = ""
+
+    def lower_in_object(self, data: Json) -> None:
+        """Add itself to the object's geometries."""
+        sheet = {"uuid": self.uuid, "type": "PlaneGeometry", "width": self._width, "height": self._height}
+        data["geometries"].append(sheet)
 
 
 def solid(path: str, mesh: ShadedMesh) -> Json:
@@ -169,6 +185,23 @@ def band(path: str, points: Array, width: float, colour: int) -> Json:
     k = 2 * np.arange(len(points) - 1)[:, None, None]
     faces = (k + np.array([[0, 1, 2], [2, 1, 3]])).reshape(-1, 3)
     return group(path, [Part(g.TriangularMeshGeometry(vertices, faces), g.MeshBasicMaterial(color=colour))])
+
+
+def sign(path: str, png: bytes, size: tuple[float, float], X: Array) -> Json:
+    """Lower a picture on a rectangle that shines by itself.
+
+    Args:
+        path: See `group`.
+        png: The picture.
+        size: Width and height of the rectangle [m].
+        X: Its pose, (4, 4): x out of the picture, y to the right of who looks at it, z up.
+    """
+    image = g.PngImage(png)
+    texture = g.ImageTexture(image)
+    image.uuid, texture.uuid = f"{path}:image", f"{path}:texture"
+    turned = X @ _STANDING
+    part = Part(Sheet(*size), g.MeshBasicMaterial(map=texture, side=FRONT), matrix=turned.T.ravel().tolist())
+    return group(path, [part])
 
 
 def tiles(path: str, places: Array, side: float, colour: int) -> Json:

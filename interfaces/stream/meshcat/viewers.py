@@ -84,7 +84,7 @@ class Viewers:
         batches = BATCHES in websocket.scope["subprotocols"]
         try:
             await websocket.accept(subprotocol=BATCHES if batches else None)
-            if self._authorize is not None and not self._authorize(await _token(websocket)):
+            if self._authorize is not None and not self._authorize(await first_token(websocket)):
                 await websocket.close(UNAUTHORISED, "a token that is valid here, please")
                 return
             try:
@@ -210,7 +210,7 @@ def _framed(commands: tuple[bytes, ...]) -> bytes:
     return b"".join(part for data in commands for part in (len(data).to_bytes(4, "little"), data))
 
 
-async def _token(websocket: WebSocket) -> str | None:
+async def first_token(websocket: WebSocket) -> str | None:
     """The token of the viewer's first message, `{"token": "…"}`; None if there's none in time."""
     try:
         async with asyncio.timeout(PATIENCE):

@@ -25,9 +25,11 @@ from interfaces.stream.wire.fields import (
     epoch,
     text,
 )
+from interfaces.stream.wire.tasks import ErrandForm, SightForm, TaskReportForm
 from interfaces.teleop.architectures import CellChanges, Packet, Report
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.architectures.segments import MOST_REPEATED
+from interfaces.teleop.tasks import Doing
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.supervisor import CellChange
 from vrs.mobile import DriveLimits
@@ -156,21 +158,24 @@ class DriveOrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
     start: PostureRow | None = None
     runs: Runs = ()
     tail: Arcs = ()
+    errands: Annotated[tuple[ErrandForm, ...], Meta(max_length=16)] = ()
 
     @classmethod
     def of(cls, value: DriveOrders, packed: bool) -> DriveOrdersWire:  # noqa: ARG003 - the same in both encodings
         """See `Message.of`."""
         packet = value.packet
         runs = tuple((first, _rows(arcs)) for first, arcs in packet.runs)
+        errands = tuple(ErrandForm.of(errand) for errand in value.errands)
         stamps = str(value.epoch), value.number, value.sent_at, value.began
-        return cls(*stamps, packet.complete_until, value.start, runs, _rows(packet.tail))
+        return cls(*stamps, packet.complete_until, value.start, runs, _rows(packet.tail), errands)
 
     def read(self) -> DriveOrders:
         """The orders."""
         runs = tuple((first, _arcs(rows)) for first, rows in self.runs)
         packet = Packet(runs, self.complete_until, _arcs(self.tail))
         start = None if self.start is None else Posture(*self.start)
-        return DriveOrders(epoch(self.epoch), self.number, self.sent_at, self.began, start, packet)
+        errands = tuple(form.read() for form in self.errands)
+        return DriveOrders(epoch(self.epoch), self.number, self.sent_at, self.began, start, packet, errands)
 
 
 class FollowedWire(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -216,6 +221,11 @@ class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
     starved: bool = False
     uncertainty: Annotated[float, Meta(ge=0, le=1e12)] | None = None
     world: Time | None = None
+    errand: Count = 0
+    doing: Doing = Doing.NOTHING
+    left: Annotated[float, Meta(ge=0, le=1e9)] | None = None
+    tasks: TaskReportForm | None = None
+    sight: SightForm | None = None
 
     @classmethod
     def of(cls, value: DriveReport, packed: bool) -> DriveReportWire:  # noqa: ARG003 - the same in both encodings
@@ -225,7 +235,9 @@ class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
         why = text(value.halted), text(value.refused)
         return cls(
             digits(value.epoch), value.number, *where, *why, report, value.play, value.D, value.starved,
-            value.uncertainty, value.world,
+            value.uncertainty, value.world, value.errand, value.doing, value.left or None,
+            None if value.tasks is None else TaskReportForm.of(value.tasks),
+            None if value.sight is None else SightForm.of(value.sight),
         )  # fmt: skip
 
     def read(self) -> DriveReport:
@@ -234,7 +246,8 @@ class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
         where = self.sent_at, self.measured_at, Posture(*self.posture), Drive(*self.drive), self.echo
         return DriveReport(
             epoch(self.epoch), self.number, *where, self.halted, self.refused, report, self.play, self.D,
-            self.starved, self.uncertainty, self.world,
+            self.starved, self.uncertainty, self.world, self.errand, self.doing, self.left or 0.0,
+            None if self.tasks is None else self.tasks.read(), None if self.sight is None else self.sight.read(),
         )  # fmt: skip
 
 

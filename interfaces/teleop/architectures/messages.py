@@ -11,6 +11,7 @@ from typing import Final
 
 from interfaces.teleop.architectures.segments import Packet
 from interfaces.teleop.architectures.sites import Report
+from interfaces.teleop.tasks import Doing, Errand, Sight, TaskReport
 from robots.onboard.driving import Drive, Posture
 
 STILL: Final = Drive(0.02, 0.05)
@@ -38,6 +39,8 @@ class DriveOrders:
     """Where it began; None while nobody drives."""
     packet: Packet
     """What the robot may lack."""
+    errands: tuple[Errand, ...] = ()
+    """Tasks that it isn't known to have, in their order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,3 +78,13 @@ class DriveReport:
     """Bound on the error of what it takes for the operator's clock [s]; None where that isn't known."""
     world: float | None = None
     """Time of a simulated room when it was measured [s]: where people walk then; None of a real one."""
+    errand: int = 0
+    """Number of the newest errand that it has done, or left; 0 for none."""
+    doing: Doing = Doing.NOTHING
+    """What it does by itself."""
+    left: float = 0.0
+    """Way to the goal of that [m]."""
+    tasks: TaskReport | None = None
+    """How far it is with that; None where that was told a moment ago."""
+    sight: Sight | None = None
+    """What it sees; None where there's nothing new."""

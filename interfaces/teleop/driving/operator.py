@@ -11,6 +11,7 @@ from interfaces.teleop.architectures import OperatorSite, OperatorSurroundings, 
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
 from interfaces.teleop.driving.deviation import Deviation, PathDeviation
 from interfaces.teleop.line import SiteLine
+from interfaces.teleop.tasks import Doing, Errand, Halt, Sight, Task, TaskReport, stops
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import finite
 from vrs.mobile import MobileModel
@@ -23,10 +24,16 @@ FREE: Final = "nobody has control"
 """Why the real robot doesn't follow between two drives."""
 STOPPED: Final = "stopped"
 """The same after a stop."""
+BY_ITSELF: Final = "the robot drives by itself"
+"""The same while it does what it was told to do by itself."""
 MOVING: Final = "the robot isn't at rest yet"
 """Why it can't go on."""
 HOLDS: Final = 0.3
 """A wish counts for so long [s]: who says nothing more stops."""
+ERRANDS: Final = 4
+"""So many that the robot isn't known to have are sent at once."""
+WAITS: Final = 5.0
+"""What is given while the robot comes to rest waits so long for that [s]."""
 TAKES_UP: Final = 4.0
 """So long, and twice the usual round trip, a robot has to follow a new epoch [s]."""
 
@@ -64,6 +71,17 @@ class DrivingOperator:
         """Of the newest report; None before the first of an epoch."""
         self.round_trip: float | None = None
         self.round_trips = SlidingQuantiles(1000, 120.0)
+        self.tasks: TaskReport | None = None
+        """How far the robot is with what it does by itself; None before it has said."""
+        self.sight: Sight | None = None
+        """What it saw last."""
+        self._errands: list[Errand] = []
+        self._errand = 0
+        self._later: tuple[tuple[float, tuple[Task, ...]], ...] = ()
+        """What it's to be told when the next drive has begun, and when that was given [s]."""
+        self._now = now
+        self._prompt = False
+        """Whether something is to be sent at once."""
         self._measured_since = -math.inf
         self._packets = 0
         self._wish, self._until = STAND, -math.inf
@@ -100,14 +118,63 @@ class DrivingOperator:
         """
         finite("v", v)
         finite("w", w)
+        if self.halted == BY_ITSELF and (v or w):
+            # Who takes the wheel drives: first the robot comes to rest.
+            self.stop()
         if self.halted:
             return f"the robot doesn't follow: {self.halted}"
         self._wish, self._until = Drive(v, w), min(issued_at, now) + min(lasts, HOLDS)
         return ""
 
     def stop(self) -> None:
-        """Let both robots brake at once, each along its arc: the drive is over, with what's left of its path."""
+        """Let both robots brake at once, each along its arc: the drive is over, with what's left of its path.
+
+        What the real one does by itself is over as well.
+        """
+        self._later = ()
+        if self.doing is not Doing.NOTHING:
+            self._send(Halt())
+            self.halted = ""
         self.halt(STOPPED)
+
+    @property
+    def doing(self) -> Doing:
+        """What the real robot does by itself, as far as is known; something, while it may have been told to."""
+        report = self.report
+        if self.halted == BY_ITSELF and any(not stops(errand.task) for errand in self._errands):
+            return Doing.JOBS
+        return Doing.NOTHING if report is None else report.doing
+
+    def order(self, *tasks: Task) -> str:
+        """Let the real robot do something by itself; the virtual one comes to rest, and follows it then.
+
+        Args:
+            tasks: What, in this order.
+
+        Returns:
+            Why not; empty if it's told to.
+        """
+        if self.report is None:
+            return NOT_MET
+        if not all(stops(task) for task in tasks):
+            if self.halted == STOPPED:
+                # It's told once it has come to rest, and the next drive has begun.
+                self._later = *self._later, (self._now, tasks)
+                return ""
+            if self.halted and self.halted != BY_ITSELF:
+                return f"the robot doesn't follow: {self.halted}"
+            self.halt(BY_ITSELF)
+        self._send(*tasks)
+        return ""
+
+    def _send(self, *tasks: Task) -> None:
+        """Send errands, until the robot has them; one that stops everything overrules what it hasn't heard yet."""
+        for task in tasks:
+            if isinstance(task, Halt):
+                self._errands.clear()
+            self._errand += 1
+            self._errands.append(Errand(self._errand, task))
+        self._prompt = True
 
     @property
     def stands(self) -> bool:
@@ -121,6 +188,8 @@ class DrivingOperator:
         if report is None or not self.stands:
             return self.stands
         knows = bool(report.halted) or (report.echo is not None and 0 < self._over <= report.echo[0])
+        if report.doing is not Doing.NOTHING or (self._errands and report.epoch == self.epoch):
+            return False
         return is_still(report.drive) and (knows or report.epoch != self.epoch or not self.epochs)
 
     def resume(self, *, now: float) -> str:
@@ -130,12 +199,20 @@ class DrivingOperator:
             return NOT_MET
         if not self.halted:
             return ""
+        if report.doing is not Doing.NOTHING and not self._errands:
+            self.halted = BY_ITSELF
+            return ""
         if not self.done:
             return MOVING
+        self._errands.clear()
         self.epoch += 1
         self.epochs += 1
         self.halted, self._wish, self._until = "", STAND, -math.inf
         self._set(report.posture, now)
+        later, self._later = self._later, ()
+        for given, tasks in later:
+            if now <= given + WAITS:
+                self.order(*tasks)
         return ""
 
     def halt(self, reason: str) -> None:
@@ -143,26 +220,33 @@ class DrivingOperator:
         if not self.halted:
             self.halted = reason
             self._until = -math.inf
+            self._later = ()
 
     def advance(self, *, now: float) -> tuple[DriveOrders, ...]:
         """Do what is due by now [s], and say what is to be sent."""
+        self._now = now
         packet: Packet | None = None
         while now >= self._due - 1e-9:
             packet = self._step()
         if packet is None:
-            if not self.halted or self._over:
+            if (not self.halted or self._over) and not self._prompt:
                 return ()
             # That a drive is over is said at once.
             packet = Packet((), 0.0)
-        if not self.halted and self.report is not None and self.report.epoch < self.epoch:
+        if self.halted in {"", BY_ITSELF} and self.report is not None and self.report.epoch < self.epoch:
             usual = self.round_trips.quantile(0.95) or 0.0
             if now > self.began + TAKES_UP + 2.0 * usual:
+                self.halted = ""
                 self.halt(self.report.refused or "the robot doesn't take up the new drive")
         self._packets += 1
         if self.halted and not self._over:
             self._over = self._packets
-        start = None if self.halted else self.start
-        return (DriveOrders(self.epoch, self._packets, now, self.began, start, packet),)
+        self._prompt = False
+        # What it's to do by itself belongs to a drive, too: that must have begun.
+        begins = self.halted == BY_ITSELF and self.report is not None and self.report.epoch < self.epoch
+        start = None if self.halted and not begins else self.start
+        errands = tuple(self._errands[:ERRANDS])
+        return (DriveOrders(self.epoch, self._packets, now, self.began, start, packet, errands),)
 
     @property
     def next_t(self) -> float:
@@ -204,6 +288,8 @@ class DrivingOperator:
             self._set(report.posture, now)
             self.halted = FREE
         self.report = report
+        self.tasks = self.tasks if report.tasks is None else report.tasks
+        self.sight = self.sight if report.sight is None else report.sight
         if report.echo is not None and report.epoch == self.epoch:
             _, sent, arrived = report.echo
             self.round_trip = now - sent - (report.sent_at - arrived)
@@ -211,8 +297,17 @@ class DrivingOperator:
                 self.round_trips.add(self.round_trip, now=now)
         if report.epoch != self.epoch:
             return
+        self._errands = [errand for errand in self._errands if errand.number > report.errand]
         if report.halted:
+            # What it was told and hasn't begun isn't to begin after a stop.
+            self._errands = [errand for errand in self._errands if stops(errand.task)]
+            if self.halted == BY_ITSELF:
+                self.halted = ""
             self.halt(report.halted)
+        elif self.halted == BY_ITSELF:
+            if not self._errands and report.doing is Doing.NOTHING:
+                # The next drive begins where it has come to.
+                self.halted = STOPPED
         elif report.report is not None:
             self.site.receive(report.report, now=self.next_t)
             self.deviation = self.path.match(report.posture, report.measured_at - self.began)
@@ -227,7 +322,9 @@ class DrivingOperator:
         self._measured_since = now
 
     def virtual(self, now: float) -> Posture:
-        """Where the virtual robot is [s]."""
+        """Where the virtual robot is [s]; of one that drives by itself, where it takes itself to be."""
+        if self.report is not None and self.report.doing is not Doing.NOTHING:
+            return self.report.posture
         return Posture(*self.site.engine.timeline.sample(now - self.began).tolist())
 
 

@@ -8,14 +8,20 @@ from dataclasses import dataclass
 
 from interfaces.teleop.architectures import Player, Position, RobotSite
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
+from interfaces.teleop.driving.autonomy import Autonomy
+from interfaces.teleop.tasks import Doing, Errand, Sight, TaskReport, stops
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
-from robots.onboard.driving import STAND, Drive, Posture
+from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs.checks import number_in
 from vrs.mobile import DriveLimits
 from vrs.mobile.limiting import braking
 
 TOO_FAR = "the drive is to begin too far from where the robot is"
 """Why a new epoch isn't followed."""
+LOST = "nothing fresh came from the operator: link loss"
+"""Why it stops by itself."""
+TOLD = 0.5
+"""So often at least it's told how far the robot is with what it does by itself [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +36,16 @@ class DrivenConfig:
     """So near to where it takes itself to be a drive must begin [m], in [0, 100]."""
     watchdog: WatchdogConfig | None = None
     """When the link counts as lost, and messages as too old; None: it holds, and no message is too old."""
+    lost_after: float = 2.0
+    """Without a watchdog, the operator is lost to what the robot does by itself after so long [s], in [0.1, 60]."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (("period", 1e-3, 1.0), ("beat", 1e-3, 10.0), ("begin_within", 0.0, 100.0)):
+        for name, low, high in (
+            ("period", 1e-3, 1.0),
+            ("beat", 1e-3, 10.0),
+            ("begin_within", 0.0, 100.0),
+            ("lost_after", 0.1, 60.0),
+        ):
             number_in(name, getattr(self, name), low, high)
 
 
@@ -48,6 +61,8 @@ class DrivenRobot:
         now: float,
         world: Callable[[], float | None] = lambda: None,
         config: DrivenConfig | None = None,
+        autonomy: Autonomy | None = None,
+        sight: Callable[[], Sight | None] = lambda: None,
     ) -> None:
         """Stand, and wait for an epoch.
 
@@ -58,7 +73,14 @@ class DrivenRobot:
             now: [s].
             world: Tells what time it is where the robot drives, see `DriveReport`.
             config: How to behave.
+            autonomy: What it does by itself; None for nothing.
+            sight: What it sees of its surroundings, once; None where there's nothing new.
         """
+        self.autonomy, self._sight = autonomy, sight
+        self._errand = 0
+        self._carries_on = False
+        """Whether the operator was lost, and it goes on by itself nevertheless."""
+        self._told: tuple[float, TaskReport] | None = None
         self.config = DrivenConfig() if config is None else config
         self._make, self._position, self._limits, self._world = make, position, limits, world
         self._site: RobotSite | None = None
@@ -88,12 +110,15 @@ class DrivenRobot:
             correction: What is to be added to its stamp [s].
             uncertainty: Of that [s].
         """
-        if orders.epoch > self.epoch and orders.start is not None and self.rests(now=now):
+        if orders.epoch > self.epoch and orders.start is not None and self.rests(now=now) and not self.doing:
             self._begin(orders, now)
         if orders.epoch != self.epoch:
             return
         self._uncertainty = uncertainty
-        if not self._counts(orders, now, correction, uncertainty):
+        counts = self._counts(orders, now, correction, uncertainty)
+        for errand in orders.errands:
+            self._do(errand, now, counts=counts)
+        if not counts:
             return
         if self._newest is None or orders.number > self._newest[0]:
             self._newest = orders.number, orders.sent_at, now
@@ -102,6 +127,26 @@ class DrivenRobot:
                 self._site = None
         if self._site is not None and not self.halted:
             self._site.receive(orders.packet, now=self._since(now))
+
+    @property
+    def doing(self) -> bool:
+        """Whether it does something by itself."""
+        return self.autonomy is not None and self.autonomy.doing is not Doing.NOTHING
+
+    def _do(self, errand: Errand, now: float, *, counts: bool) -> None:
+        """Do a task once; whatever only stops something counts however late it comes."""
+        if errand.number <= self._errand:
+            return
+        if self.autonomy is None:
+            self._errand = errand.number
+            return
+        fresh = counts and (not self.halted or self._carries_on)
+        if not fresh and not stops(errand.task):
+            return
+        self._errand = errand.number
+        if not stops(errand.task):
+            self._site = None
+        self.autonomy.receive(errand.task, now=now)
 
     def _begin(self, orders: DriveOrders, now: float) -> None:
         """Follow a new epoch, from where the robot stands."""
@@ -113,6 +158,7 @@ class DrivenRobot:
         if self._watchdog is not None and not self._armed(self._watchdog, orders.epoch, now):
             return
         self.epoch, self.halted, self._newest = orders.epoch, "", None
+        self._carries_on = False
         self._began = orders.began
         self._site = self._make(start, self._since(now))
 
@@ -131,6 +177,8 @@ class DrivenRobot:
             return True
         stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
         verdict = self._watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
+        if verdict is Verdict.HALTED and self._carries_on:
+            return True
         if verdict not in (Verdict.HALTED, Verdict.STALE_EPOCH, Verdict.UNKNOWN_EPOCH):
             self._refused = "" if verdict.counts else f"the newest message was refused: {verdict.value}"
         return verdict.counts
@@ -142,12 +190,25 @@ class DrivenRobot:
     def _watch(self, now: float) -> None:
         """Let the watchdog do what is due by now."""
         if self._watchdog is None:
+            if self.doing and self._newest is not None and now >= self._newest[2] + self.config.lost_after:
+                self._lose(now)
             return
         if any(isinstance(action, BeginStop) for action in self._watchdog.advance(now=now)):
-            last = f" ({self._refused})" if self._refused else ""
-            self._halt(f"nothing fresh came from the operator: link loss{last}", now)
-        if self.halted and self.rests(now=now):
+            self._lose(now)
+            if not self._carries_on:
+                last = f" ({self._refused})" if self._refused else ""
+                self._halt(LOST + last, now)
+        if self._carries_on and not self.doing:
+            self._carries_on = False
+            self._halt(f"{LOST}, and it has carried on to the end", now)
+        if self._carries_on or (self.halted and self.rests(now=now)):
             self._watchdog.stopped(self._watchdog.number, now=now)
+
+    def _lose(self, now: float) -> None:
+        """The operator is lost: what the robot does by itself ends or goes on."""
+        if self.autonomy is not None:
+            self.autonomy.lost(LOST, now=now)
+            self._carries_on = self.doing and self._watchdog is not None
 
     def advance(self, *, now: float) -> tuple[DriveReport, ...]:
         """Do what is due by now [s], and say what is to be sent."""
@@ -169,11 +230,21 @@ class DrivenRobot:
             self._drive = self._site.drive(now=self._since(now))
             self._posture = self._site.posture
         else:
-            steps = braking(self._drive, self.config.period, self._limits)
-            self._drive = Drive(*steps[0]) if steps else STAND
             self._posture = self._position.posture()
+            self._drive = self._by_itself(now)
         self._driven_at = now
         return self._drive
+
+    def _by_itself(self, now: float) -> Drive:
+        """What to drive that no operator's path says: to a goal, or to rest along the arc that it's on."""
+        period, limits = self.config.period, self._limits
+        wanted = None
+        if self.autonomy is not None and not self.halted:
+            wanted = self.autonomy.drive(self._posture, self._drive, now=now)
+        if wanted is not None:
+            return kept(wanted.v, wanted.w, self._drive.v, period, limits)
+        steps = braking(self._drive, period, limits)
+        return Drive(*steps[0]) if steps else STAND
 
     def rests(self, *, now: float) -> bool:  # noqa: ARG002 - a follower's
         """Whether the robot is at rest."""
@@ -188,10 +259,14 @@ class DrivenRobot:
     def _halt(self, reason: str, now: float) -> None:
         if not self.halted:
             self.halted, self._due = reason, now
+        self._carries_on = False
+        if self.autonomy is not None:
+            self.autonomy.stop(reason, now=now)
 
     def _report(self, now: float) -> DriveReport:
         self._reports += 1
         site = None if self.halted else self._site
+        autonomy = self.autonomy
         player = site.controller if site is not None and isinstance(site.controller, Player) else None
         return DriveReport(
             epoch=self.epoch,
@@ -209,4 +284,19 @@ class DrivenRobot:
             starved=player is not None and player.reference.starved,
             uncertainty=self._uncertainty if math.isfinite(self._uncertainty) else None,
             world=self._world(),
+            errand=self._errand,
+            doing=Doing.NOTHING if autonomy is None else autonomy.doing,
+            left=0.0 if autonomy is None else autonomy.left,
+            tasks=self._tasks(now),
+            sight=self._sight(),
         )
+
+    def _tasks(self, now: float) -> TaskReport | None:
+        """How far it is with what it does by itself, where that's news or was told a while ago."""
+        if self.autonomy is None:
+            return None
+        report = self.autonomy.report()
+        if self._told is not None and self._told[1] == report and now < self._told[0] + TOLD:
+            return None
+        self._told = now, report
+        return report

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import re
-import secrets
 from pathlib import Path
 from typing import Final
 
+from interfaces.files import write_whole
 from interfaces.val2.errors import ValError
 
 SUFFIX: Final = ".v2"
@@ -96,15 +95,8 @@ class Files:
         Raises:
             ValError: If it can't be written.
         """
-        draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
         try:
-            try:
-                with draft.open("w", encoding="utf-8", newline="") as file:
-                    file.write(text)
-                os.replace(draft, path)
-            finally:
-                with contextlib.suppress(FileNotFoundError):
-                    draft.unlink()
+            write_whole(path, text.encode())
         except OSError as error:
             raise ValError("File error", f"{path.name}: {error.strerror}") from None
 

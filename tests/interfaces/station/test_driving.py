@@ -12,8 +12,20 @@ from axe_core_python.sync_playwright import Axe
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import Page, paged, station
 
-SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--delay", "constant:0.05", "--port", "0")
-"""Its robot waits for a machine that is busy."""
+SERVE = (
+    "serve",
+    "--robot",
+    "ipr",
+    "--link-loss",
+    "hold",
+    "--delay",
+    "constant:0.05",
+    "--port",
+    "0",
+    "--camera",
+    "12",
+)
+"""Its robot waits for a machine that is busy, and so many pictures are asked for that some come on one, too."""
 
 
 @pytest.fixture(scope="module")
@@ -110,11 +122,82 @@ def test_the_way_is_changed_on_the_fly_and_plots_are_drawn(page: Page) -> None:
     page.shoot("drive-plots")
     for scheme in ("light", "dark"):
         page.page.emulate_media(color_scheme=scheme)
-        for tab in ("drive", "deviation", "network"):
+        for tab in ("drive", "camera", "deviation", "network"):
             page.page.click(f"#tab-{tab}")
             found = Axe().run(page.page)["violations"]
             grave = [fault["id"] for fault in found if fault["impact"] in ("serious", "critical")]
             assert grave == [], (scheme, tab, grave)
+
+
+LISTEN = """() => {
+  const context = new AudioContext();
+  const analyser = context.createAnalyser();
+  context.createMediaStreamSource(station.shared.camera.video.srcObject).connect(analyser);
+  const samples = new Float32Array(analyser.fftSize);
+  window.level = () => {
+    analyser.getFloatTimeDomainData(samples);
+    return Math.max(...samples.map(Math.abs));
+  };
+}"""
+"""How loud what arrives is."""
+PIXELS = """() => {
+  const { video } = station.shared.camera;
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
+  const context = canvas.getContext("2d");
+  context.drawImage(video, 0, 0);
+  const at = (x, y) => [...context.getImageData(x * canvas.width, y * canvas.height, 1, 1).data].slice(0, 3);
+  return [canvas.width, canvas.height, at(0.5, 0.4), at(0.5, 0.9)];
+}"""
+"""Size of the newest picture, and what is in its middle and at its bottom."""
+CAMERA = "station.shared.camera"
+
+
+def test_the_camera_is_seen_by_rtp_turned_and_heard_by_who_has_control_and_its_message_stands(page: Page) -> None:
+    page.page.click("#tab-camera")
+    page.wait(f"{CAMERA}.receiver.rate >= 5", 90.0)
+    width, height, wall, floor = page.get(PIXELS)
+    assert (width, height) == (352, 264)
+    # The room's far wall is of a warm white, the floor before the robot of a cold grey.
+    assert wall[0] > wall[2] + 5
+    assert min(wall) > 90
+    assert abs(floor[0] - floor[2]) <= 6
+    page.page.keyboard.press("KeyJ")
+    page.page.click("#camera-say", force=True)
+    assert page.get(f"{CAMERA}.facts.target") == [0, 0]
+    page.take_control()
+    page.page.click("#camera-sound")
+    page.page.evaluate(LISTEN)
+    page.wait("level() === 0")
+    page.page.fill("#camera-text", "Hello!")
+    page.page.click("#camera-say")
+    page.wait("level() > 0.05")
+    page.wait("document.getElementById('camera-saying').textContent.includes('Hello!')")
+    page.page.click("#camera-show")
+    page.wait("document.getElementById('robot-screen').textContent === 'Hello!'")
+    page.page.locator("button[aria-label='Look left']").hover()
+    page.page.mouse.down()
+    page.wait(f"{CAMERA}.facts.pan > 0.2")
+    page.page.mouse.up()
+    page.shoot("camera")
+    page.page.click("#camera-clear")
+    page.wait("document.getElementById('robot-screen').hidden")
+    page.page.click("button[aria-label='Look ahead']")
+    page.wait(f"{CAMERA}.facts.pan === 0")
+    page.page.keyboard.press("KeyL")
+    page.wait(f"{CAMERA}.facts.pan < 0")
+    page.page.click("#give")
+
+
+def test_a_browser_without_rtp_shows_single_pictures_and_says_so(browser: Any, server: Child) -> None:
+    with paged(browser, station(server)) as other:
+        other.page.add_init_script("delete window.RTCPeerConnection")
+        other.open()
+        other.page.click("#tab-camera")
+        other.wait(f"{CAMERA}.stills.frames >= 2", 60.0)
+        assert other.page.locator("#camera-still").is_visible()
+        assert other.get("document.getElementById('camera-still').naturalWidth") == 352
+        assert server.health()["media"]["peers"] <= 1
 
 
 def test_a_server_that_is_gone_shows_and_a_stop_waits(server: Child, page: Page) -> None:

@@ -8,14 +8,32 @@ import numpy as np
 from hypothesis import strategies as st
 
 from interfaces import messages as m
+from interfaces.jobs import (
+    Command,
+    Forecast,
+    JobForecast,
+    JobList,
+    JobProgress,
+    Load,
+    Message,
+    Move,
+    OperatorLoss,
+    Progress,
+    Stage,
+    Voice,
+    Wait,
+)
 from interfaces.link import Measured
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.stream import network as n
+from interfaces.stream import tasks as w
 from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
 from interfaces.teleop.architectures import Report as Followed
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.tasks import Doing, Errand, Go, Halt, Sight, TaskReport
 from robots.onboard.driving import Drive, Posture
+from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState
 from robots.onboard.supervisor import CellChange
 from vrs import commands as v
@@ -147,6 +165,45 @@ cells = st.lists(st.builds(CellChange, st.tuples(counts, counts), times, st.bool
 followed = st.builds(Followed, numbers, counts, postures, counts, st.none() | st.builds(CellChanges, times, cells))
 
 
+metres = st.floats(-1e6, 1e6)
+points = st.tuples(metres, metres)
+rows = st.lists(points, max_size=4).map(tuple)
+doubts = st.tuples(metres, metres, metres)
+near = st.floats(-1000, 1000)
+goals = st.builds(Goal, near, near, st.none() | near)
+texts = words.filter(str.strip)
+jobs = st.one_of(
+    st.builds(Move, goals), st.builds(Voice, texts), st.builds(Message, texts),
+    st.builds(Wait, st.none() | st.floats(0, 1e4)),
+)  # fmt: skip
+job_lists = st.builds(lambda some, goal: JobList.of(*some, places={"A": goal}), st.lists(jobs, max_size=4), goals)
+job_numbers = st.integers(1, 2**31 - 1)
+stages = st.sampled_from(Stage)
+progress = st.builds(
+    Progress, stages,
+    st.lists(
+        st.builds(JobProgress, job_numbers, stages, words, st.none() | st.floats(0, 1e4)), max_size=3
+    ).map(tuple),
+    words,
+)  # fmt: skip
+forecasts = st.builds(
+    Forecast,
+    st.lists(
+        st.builds(JobForecast, job_numbers, positive, st.none() | positive, rows, words), max_size=3
+    ).map(tuple),
+)  # fmt: skip
+wanted = st.one_of(
+    st.builds(Go, goals), st.builds(Load, job_lists, st.none() | progress), st.sampled_from([*Command, *w.Trial])
+)
+tasks = st.one_of(
+    st.builds(Go, goals), st.builds(Halt, words), st.builds(Load, job_lists, st.none() | progress),
+    st.sampled_from(Command),
+)  # fmt: skip
+task_reports = st.builds(
+    TaskReport, st.sampled_from(JourneyState), words, st.none() | goals, rows, words, progress,
+    st.sampled_from(OperatorLoss), words, words,
+)  # fmt: skip
+
 messages = {
     m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
     m.Ask: st.builds(m.Ask, numbers, stamps),
@@ -197,10 +254,25 @@ messages = {
         stamps, st.booleans(), st.none() | positive, st.none() | positive, st.integers(0, 2**64 - 1), st.booleans(),
         words, counts, st.none() | finite, st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
     ),
-    DriveOrders: st.builds(DriveOrders, epochs, numbers, times, times, st.none() | postures, packets),
+    w.TaskOrder: st.builds(w.TaskOrder, numbers, st.integers(0, 2**64 - 1), wanted),
+    w.Tasks: st.builds(
+        w.Tasks, st.sampled_from(Doing), st.sampled_from(JourneyState), words, st.none() | goals, rows, positive,
+        job_lists, progress, st.none() | forecasts, st.none() | st.sampled_from(OperatorLoss), words, words, words,
+        st.none() | numbers,
+    ),
+    w.Seen: st.builds(w.Seen, times, rows, st.none() | doubts),
+    w.Plan: st.builds(
+        w.Plan, points, st.lists(rows, max_size=3).map(tuple), rows, st.tuples(positive, positive, positive)
+    ),
+    DriveOrders: st.builds(
+        DriveOrders, epochs, numbers, times, times, st.none() | postures, packets,
+        st.lists(st.builds(Errand, numbers, tasks), max_size=4).map(tuple),
+    ),
     DriveReport: st.builds(
         DriveReport, st.integers(0, 2**64 - 1), numbers, times, times, postures, drives, echoes, words, words,
-        st.none() | followed, stamps, stamps, st.booleans(), st.none() | positive, stamps,
+        st.none() | followed, stamps, stamps, st.booleans(), st.none() | positive, stamps, counts,
+        st.sampled_from(Doing), positive, st.none() | task_reports,
+        st.none() | st.builds(Sight, times, rows, st.none() | doubts),
     ),
     n.Survey: st.builds(n.Survey, numbers),
     n.Impair: st.builds(n.Impair, numbers, epochs, st.none() | ways, st.none() | ways),

@@ -13,17 +13,37 @@ from typing import Any
 import numpy as np
 
 from interfaces import messages as m
+from interfaces.jobs import (
+    Arm,
+    Command,
+    Forecast,
+    JobForecast,
+    JobList,
+    JobProgress,
+    Load,
+    Message,
+    Move,
+    OperatorLoss,
+    Progress,
+    Stage,
+    Voice,
+    Wait,
+    digest,
+)
 from interfaces.link import ClockSync, Measured, RoundTrip
 from interfaces.site import Site
 from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.stream import network as n
+from interfaces.stream import tasks as w
 from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
 from interfaces.teleop.architectures import Report as Followed
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.tasks import Doing, Errand, Go, Halt, Sight, TaskReport
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
+from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState
 from robots.onboard.supervisor import CellChange
 from vrs import Engine, Insertion, ManualClock, Motion, PolynomialSegment, Profile, commands
@@ -36,6 +56,16 @@ PATH = Path(__file__).with_name("vectors.json")
 Q = frozen_array([0.1, 0.2, -0.3])
 Q2 = frozen_array([1 / 3, -0.5, 2.0])
 POSE = np.array([[0.0, -1.0, 0.0, 0.4], [1.0, 0.0, 0.0, 0.1], [0.0, 0.0, 1.0, -0.2], [0.0, 0.0, 0.0, 1.0]])
+
+
+JOBS = JobList.of(
+    Move("B"), Move(Goal(1.0, 2.0)), Voice("Hello!"), Message("Look"), Wait(2.5), Wait(),
+    Arm("pick", ".PROGRAM pick"),
+    places={"B": Goal(4.0, 1.5, 0.25)},
+)  # fmt: skip
+PROGRESS = Progress(
+    Stage.PAUSED, (JobProgress(1, Stage.DONE), JobProgress(5, Stage.PAUSED, "somebody stopped it", 1.5)), "somebody"
+)
 
 
 def segments() -> tuple[PolynomialSegment, ...]:
@@ -121,6 +151,36 @@ def values() -> dict[str, Any]:
             ),
         ),
         "drive orders without a drive": DriveOrders(1, 1, 0.5, 0.0, None, Packet((), 0.0)),
+        "drive orders with errands": DriveOrders(
+            3, 6, 2.85, 2.5, None, Packet((), 0.0),
+            errands=(
+                Errand(1, Go(Goal(4.0, 1.5, 0.25))), Errand(2, Halt()), Errand(3, Load(JOBS, PROGRESS)),
+                Errand(4, Command.RUN),
+            ),
+        ),
+        "drive report of a robot that drives by itself": DriveReport(
+            3, 15, 3.1, 3.09, Posture(1.5, 3.0, 0.0), Drive(0.3, 0.0), errand=4, doing=Doing.JOBS, left=2.5,
+            tasks=TaskReport(
+                JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), digest(JOBS), PROGRESS,
+                OperatorLoss.CARRY_ON, "Look", "Hello!",
+            ),
+            sight=Sight(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
+        ),
+        "task: a goal": w.TaskOrder(7, 7_730_941_132_801, Go(Goal(4.0, 1.5))),
+        "task: a list": w.TaskOrder(8, 7_730_941_132_801, Load(JOBS)),
+        "task: run it": w.TaskOrder(9, 7_730_941_132_801, Command.RUN),
+        "task: try it": w.TaskOrder(10, 7_730_941_132_801, w.Trial.DRY_RUN),
+        "tasks": w.Tasks(
+            Doing.JOBS, JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), 2.5, JOBS,
+            PROGRESS,
+            Forecast((JobForecast(1, 0.0, 8.25, ((1.5, 3.0), (4.0, 1.5))), JobForecast(2, 8.25, None))),
+            OperatorLoss.STOP, "Look", "", answers=9,
+        ),
+        "tasks before the robot is met": w.Tasks(problem="jobs.json: is no list of jobs"),
+        "seen": w.Seen(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
+        "plan": w.Plan(
+            (6.0, 4.0), (((0.0, 0.0), (6.0, 0.0), (6.0, 0.1), (0.0, 0.1)),), ((3.0, 2.0),), (0.2, 0.32, 0.45),
+        ),
         "drive report": DriveReport(
             3, 12, 2.95, 2.94, Posture(1.5, 3.0, 0.0), Drive(0.04, -0.01), (5, 2.75, 2.9), "", "",
             Followed(4, 2, Posture(1.5, 3.0, 0.0), 3), 0.1, -0.2, False, 0.015, 12.25,

@@ -20,6 +20,7 @@ from interfaces.stream import LARGEST, Encoding, ProblemCode, ProtocolError, Sha
 from interfaces.stream import control as c
 from interfaces.stream.codec import TYPES, WIRES
 from interfaces.stream.mobile import MobileWelcome, Postures
+from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks
 from interfaces.stream.wire.commands import ReceiptWire
 from interfaces.stream.wire.fields import MOST_NAMES
 from interfaces.teleop.architectures import DriveOrders, DriveReport
@@ -37,7 +38,7 @@ PACKED, PLAIN = Encoding
 BROADCAST = m.Broadcast(m.Frame(7, 2.5, 2.0, Q, m.FrameStatus.PREDICTED), m.Verdicts(1, 5, ((2, 3, 4),)))
 
 
-MOBILE = {MobileWelcome, Postures, DriveOrders, DriveReport}
+MOBILE = {MobileWelcome, Postures, TaskOrder, Tasks, Seen, Plan, DriveOrders, DriveReport}
 """Of mobile robots."""
 
 

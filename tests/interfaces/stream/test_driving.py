@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from interfaces.jobs import Load
 from interfaces.messages import Order, Outcome
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
@@ -16,7 +17,10 @@ from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.mobile import Postures
 from interfaces.stream.session import Session
+from interfaces.stream.tasks import Seen, Tasks, Wanted
+from interfaces.teleop.tasks import Go
 from robots.onboard.driving import Drive, Posture
+from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease
 from tests.interfaces.teleop.driving.rig import MODEL, Rig
 from vrs import DriveCommand, Stop
@@ -119,3 +123,54 @@ def test_a_client_for_arms_is_told_that_there_is_none(hub: Hub) -> None:
     assert core.phase is Phase.CLOSED
     assert isinstance(core.problem, Problem)
     assert "mobile robot ipr" in core.problem.text
+
+
+class Workers:
+    """Takes what is wanted, but no list."""
+
+    def __init__(self) -> None:
+        self.wanted: list[Wanted] = []
+
+    def order(self, wanted: Wanted, *, now: float) -> str:
+        self.wanted.append(wanted)
+        return "no list is wanted here" if isinstance(wanted, Load) else ""
+
+    def tasks(self, answers: int | None = None) -> Tasks:
+        return Tasks(answers=answers)
+
+
+def test_only_who_has_control_lets_the_robot_do_something_and_all_are_told() -> None:
+    site, workers = DriveSite(met().operator, MODEL), Workers()
+    hub = Hub(
+        site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), welcome=site.welcome, workers=workers
+    )
+    ada, bob = hub.open(Encoding.JSON, now=5.0), hub.open(Encoding.JSON, now=5.0)
+    said(ada, HELLO)
+    said(bob, HELLO | {"role": "viewer"})
+    order: dict[str, Any] = {"type": "task", "number": 1, "task": {"go": {"x": 1, "y": 2}}}
+    assert said(ada, order, now=5.1)[0]["code"] == "stale-epoch"
+    lease = said(ada, {"type": "acquire", "number": 2}, now=5.2)[0]
+    order |= {"epoch": lease["epoch"]}
+    told = {message["type"]: message for message in said(bob, order, now=5.3)}
+    assert told["problem"]["text"] == "a viewer commands nothing"
+    assert not workers.wanted
+    assert said(ada, order, now=5.4)[0]["answers"] == 1
+    assert workers.wanted == [Go(Goal(1.0, 2.0))]
+    refused = said(ada, order | {"number": 3, "task": {"jobs": {}}}, now=5.5)[0]
+    assert (refused["text"], refused["number"]) == ("no list is wanted here", 3)
+    for wrong in ({}, {"go": {"x": 1, "y": 2}, "do": "run"}, {"do": "dance"}, {"halt": "so"}):
+        assert said(ada, order | {"task": wrong}, now=5.6)[0]["code"] == "out-of-range"
+    hub.tell(Seen(1.0, ((1.0, 2.0),)))
+    hub.tell(Tasks(reason="old"))
+    hub.tell(Tasks(reason="new"))
+    for now, session in ((6.0, ada), (6.2, bob)):
+        heard = {message["type"]: message for message in said(session, now=now)}
+        assert heard["tasks"]["reason"] == "new"
+        assert heard["seen"]["points"] == [[1.0, 2.0]]
+        assert said(session, now=now + 0.1) == []
+
+
+def test_a_hub_whose_robot_does_nothing_by_itself_says_so(hub: Hub) -> None:
+    session = hub.open(Encoding.JSON, now=5.0)
+    said(session, HELLO)
+    assert "nothing by itself" in said(session, {"type": "task", "number": 1, "task": {"do": "run"}})[0]["text"]

@@ -56,6 +56,17 @@ def test_it_expires_without_beats_and_stops_the_robot():
     assert hub.robot.log[2:] == [("began", epoch + 1)]
 
 
+def test_who_commands_is_known_by_the_session_and_its_epoch():
+    hub = make_hub()
+    (peer, epoch), viewer = holder(hub), Peer(hub, role=Role.VIEWER)
+    mine, other = (one.session.seat.key for one in (peer, viewer))
+    assert hub.commands(mine, epoch, now=0.5)
+    assert not hub.commands(mine, epoch - 1, now=0.5)
+    assert not hub.commands(other, epoch, now=0.5)
+    assert not hub.commands("", epoch, now=0.5)
+    assert not hub.commands(mine, epoch, now=60.0)
+
+
 def test_orders_keep_it():
     hub = make_hub()
     peer, epoch = holder(hub)

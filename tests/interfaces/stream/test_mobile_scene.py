@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import base64
+import io
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from PIL import Image
 
 from interfaces.stream.meshcat import Committed, MobileScene
 from interfaces.stream.meshcat.meshes import bodies
+from interfaces.stream.meshcat.screen import INK
 from interfaces.view_parts import parts_at
 from robots import ipr
 from robots.ipr.robot import place
+from robots.ipr.shapes import SCREEN_SIZE, screen_pose
 from vrs import DriveCommand, Engine
 from vrs.errors import InvalidValueError
 from vrs.mobile import Grid
@@ -94,6 +99,51 @@ def test_people_walk_and_things_come_and_go_by_the_rooms_time() -> None:
     scene.show(virtual=(0, 0, 0), t=1e6, now=1.0)
     found = told(slot)
     assert {f"/vrs/room/{i} visible" for i in passing} <= found.keys()
+
+
+def test_a_message_stands_on_the_glass_of_the_real_robot_until_it_is_cleared() -> None:
+    scene, slot = opened()
+    pictures = []
+    for text in (
+        "Please put the book on my top side!",
+        "Donaudampfschifffahrtselektrizitätenhauptwerk" * 5,
+        "ё Ω é",
+    ):
+        scene.say(text)
+        found = told(slot)
+        lowered = found["/vrs/real/body/0/screen set_object"]["object"]
+        assert found.get("/vrs/real/body/0/screen visible", {"value": True})["value"] is True
+        (sheet,), (image,) = lowered["geometries"], lowered["images"]
+        assert (sheet["width"], sheet["height"]) == SCREEN_SIZE
+        matrix = np.array(lowered["object"]["children"][0]["matrix"]).reshape(4, 4).T
+        glass = screen_pose()
+        # Before the glass by a hair, its normal outwards and its letters upright.
+        np.testing.assert_allclose(matrix[:3, 3] - glass[:3, 3], 0.011 * glass[:3, 0], atol=1e-12)
+        np.testing.assert_allclose(matrix[:3, :3], glass[:3, [1, 2, 0]], atol=1e-12)
+        data = base64.b64decode(image["url"].removeprefix("data:image/png;base64,"))
+        pictures.append(np.asarray(Image.open(io.BytesIO(data))))
+    scene.say("")
+    assert told(slot)["/vrs/real/body/0/screen visible"]["value"] is False
+    for picture in pictures:
+        ink = (picture == INK).all(axis=-1)
+        rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
+        assert 0 < rows[0] < rows[-1] < picture.shape[0] - 1
+        assert 0 < columns[0] < columns[-1] < picture.shape[1] - 1
+        assert rows[0] + rows[-1] == pytest.approx(picture.shape[0], abs=40)
+
+
+def test_doors_are_drawn_and_move() -> None:
+    room = place("home")
+    scene, slot = opened(room=room)
+    moves = [k for k, door in enumerate(room.doors) if door.share(61.0) != door.share(0.0)]
+    scene.show(virtual=(0, 0, 0), t=61.0, now=0.0)
+    found = told(slot)
+    assert moves
+    for k in moves:
+        leaf = room.doors[k].at(61.0)
+        sent = found[f"/vrs/doors/{k} set_transform"]["matrix"]
+        np.testing.assert_allclose(sent[12:14], (leaf.x, leaf.y), atol=1e-9)
+        np.testing.assert_allclose(sent[:2], (np.cos(leaf.angle), np.sin(leaf.angle)), atol=1e-9)
 
 
 def test_cells_that_were_learned_are_shown_until_they_are_forgotten() -> None:

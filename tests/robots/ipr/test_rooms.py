@@ -67,7 +67,7 @@ BAD = {
     "person 0.25 0,1 1,5,1": "t,x,y",
     "person 0.25 repeat 0,1,1 5,2,1": "ends where it began",
     "size 3 3": "second size",
-    "door 1 1": "unknown word 'door'",
+    "gate 1 1": "unknown word 'gate'",
 }
 
 

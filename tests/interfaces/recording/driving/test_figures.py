@@ -103,7 +103,8 @@ def test_a_cut_file_gives_figures_until_there(share: float, tmp_path: Path, caps
 def test_a_destroyed_block_is_bridged_and_told(tmp_path: Path) -> None:
     drive, path = recorded(WANDER)
     data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 0x10
+    # Inside of a block: between them lie indexes, which can be done without.
+    data[len(data) * 9 // 20] ^= 0x10
     (tmp_path / "torn.mcap").write_bytes(data)
     with open_recording(tmp_path / "torn.mcap") as recording:
         found = driven(recording)

@@ -126,8 +126,9 @@ def test_packets_on_their_way_at_the_end_are_told_from_lost_ones(tmp_path: Path)
 def test_rooms_come_back(name: str) -> None:
     room = place(name)
     assert room_of(room_entry(room), "here") == room.__class__(
-        room.name, room.length, room.width, blocks=room.blocks, columns=room.columns, people=room.people
-    )
+        room.name, room.length, room.width, blocks=room.blocks, columns=room.columns, people=room.people,
+        doors=room.doors,
+    )  # fmt: skip
 
 
 def test_a_room_that_makes_no_sense_is_a_format_error() -> None:
@@ -142,6 +143,9 @@ def test_a_room_that_makes_no_sense_is_a_format_error() -> None:
     ):
         with pytest.raises(FormatError, match="here"):
             room_of(wrong, "here")
+    home = room_entry(place("home"))
+    with pytest.raises(FormatError, match="timetable"):
+        room_of(replace(home, doors=(replace(home.doors[0], times=[1.0, 0.5], shares=[0.0, 1.0]),)), "here")
 
 
 def test_a_disk_that_takes_nothing_is_a_problem_of_the_recording_alone(tmp_path: Path) -> None:

@@ -7,9 +7,19 @@ from collections.abc import Callable
 
 import numpy as np
 
+from interfaces.jobs import ArmControl, RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.teleop.architectures import Constants, RobotSite, controller
-from interfaces.teleop.driving import DriveLine, DrivenConfig, DrivenHost, DrivenRobot, DrivingOperator
+from interfaces.teleop.driving import (
+    Autonomy,
+    DriveLine,
+    DrivenConfig,
+    DrivenHost,
+    DrivenRobot,
+    DrivingOperator,
+    Hands,
+    JourneyPilot,
+)
 from interfaces.teleop.hosting import HostConfig
 from robots import ipr
 from robots.ipr.bare import BareBody
@@ -17,6 +27,8 @@ from robots.ipr.parameters import IPR_LIMITS
 from robots.ipr.position import FusedPosition
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
+from robots.onboard.journey import Journey
+from robots.onboard.routes import RouteConfig, RouteMap
 
 TURN = 0.01
 CONTROL = 5
@@ -29,13 +41,26 @@ class Rig:
 
     AHEAD = 123.25
 
-    def __init__(self, delay: str = "constant:0.1", *, hold: bool = False, architecture: str = "timeline") -> None:
+    def __init__(
+        self,
+        delay: str = "constant:0.1",
+        *,
+        hold: bool = False,
+        architecture: str = "timeline",
+        jobs: RunnerConfig | None = None,
+        arm: ArmControl | None = None,
+    ) -> None:
         self.k = 0
         self.body = BareBody("ipr", (1.0, 2.0, 0.5), rng=3)
         self.position = FusedPosition(self.body)
         self.architecture = architecture
         watchdog = None if hold else WatchdogConfig(max_uncertainty=1.0)
         self.config = DrivenConfig(watchdog=watchdog)
+        wall = [(4.0, 0.0), (4.2, 0.0), (4.2, 3.5), (4.0, 3.5)]
+        self.roads = RouteMap((8.0, 6.0), [wall], RouteConfig(0.4, 0.25))
+        pilot = JourneyPilot(Journey(self.roads), lambda: self.body.time)
+        self.hands = Hands() if arm is None else Hands(arm=arm)
+        self.autonomy = Autonomy(pilot, self.hands, jobs)
         self.operator = DrivingOperator(MODEL, Posture(0.0, 0.0, 0.0), now=0.0)
         way = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
         self.line = DriveLine(self.operator, way, np.random.default_rng(1))
@@ -46,7 +71,7 @@ class Rig:
         """What the body was told, a control period each."""
 
     def _site(self, t: float) -> DrivenRobot:
-        return DrivenRobot(self._made, self.position, IPR_LIMITS, now=t, config=self.config)
+        return DrivenRobot(self._made, self.position, IPR_LIMITS, now=t, config=self.config, autonomy=self.autonomy)
 
     def _made(self, start: Posture, since: float) -> RobotSite:
         assert since >= 0.0

@@ -1,6 +1,6 @@
 """An architecture of one's own: the robot drives to where the operator's robot was last, straight on.
 
-Beside this file:  vrs lab --architecture 20_own_architecture:Chaser --architecture I --delay mon --out out/own
+Beside this file:  vrs lab --architecture 23_own_architecture:Chaser --architecture I --delay mon --out out/own
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """An operator style of one's own: somebody who drives a square, and hesitates before each corner.
 
-Beside this file:  vrs lab --operator 21_own_operator:square --operator corridor --delay mon --out out/own
+Beside this file:  vrs lab --operator 24_own_operator:square --operator corridor --delay mon --out out/own
 """
 
 from __future__ import annotations

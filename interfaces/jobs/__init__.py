@@ -1,0 +1,80 @@
+"""Lists of jobs for a personal robot: what is to be done, how far it is, and the machine that gets it done."""
+
+from interfaces.jobs.carrying import (
+    ArmControl,
+    NoArm,
+    Screen,
+    SilentSpeaker,
+    Speaker,
+    TextScreen,
+    speaking_time,
+)
+from interfaces.jobs.file import JobFile, digest, read_jobs, written_jobs
+from interfaces.jobs.forecast import Forecast, JobForecast, dry_run
+from interfaces.jobs.messages import (
+    Command,
+    Done,
+    End,
+    Failed,
+    Input,
+    Interrupted,
+    Load,
+    Lost,
+    MoveTo,
+    Request,
+    RunArm,
+    Show,
+    Speak,
+)
+from interfaces.jobs.progress import POLICY_SAYS, JobProgress, OperatorLoss, Progress, Stage
+from interfaces.jobs.runner import JobRunner, RunnerConfig, carried_over
+from interfaces.jobs.val_arm import ValArm, lasts
+from interfaces.jobs.values import Arm, Entry, Job, JobList, Message, Move, Voice, Wait
+
+__all__ = [
+    "POLICY_SAYS",
+    "Arm",
+    "ArmControl",
+    "Command",
+    "Done",
+    "End",
+    "Entry",
+    "Failed",
+    "Forecast",
+    "Input",
+    "Interrupted",
+    "Job",
+    "JobFile",
+    "JobForecast",
+    "JobList",
+    "JobProgress",
+    "JobRunner",
+    "Load",
+    "Lost",
+    "Message",
+    "Move",
+    "MoveTo",
+    "NoArm",
+    "OperatorLoss",
+    "Progress",
+    "Request",
+    "RunArm",
+    "RunnerConfig",
+    "Screen",
+    "Show",
+    "SilentSpeaker",
+    "Speak",
+    "Speaker",
+    "Stage",
+    "TextScreen",
+    "ValArm",
+    "Voice",
+    "Wait",
+    "carried_over",
+    "digest",
+    "dry_run",
+    "lasts",
+    "read_jobs",
+    "speaking_time",
+    "written_jobs",
+]

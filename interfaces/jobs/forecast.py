@@ -1,0 +1,119 @@
+"""A dry run: how long the jobs of a list are likely to take, on a robot that drives exactly as it's told.
+
+The virtual robot drives over the known map, within its limits, and nothing stands in its way. Speaking takes as
+long as `speaking_time` says, an arm's program isn't known here, and nobody knows when a key is pressed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from interfaces.jobs.carrying import speaking_time
+from interfaces.jobs.values import Arm, Job, JobList, Message, Move, Voice, Wait
+from robots.onboard.driving import STAND, Drive, Posture, kept
+from robots.onboard.journey import GOING, Journey, JourneyState
+from robots.onboard.routes import Point, RouteMap
+from vrs.mobile import DriveLimits
+from vrs.mobile.kinematics import advanced
+
+PERIOD: Final = 0.05
+"""Between two drives [s]."""
+LONGEST: Final = 1800.0
+"""A move isn't followed for longer [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobForecast:
+    """What is likely to become of a job."""
+
+    number: int
+    begins: float
+    """After so long [s], times that nobody knows left out."""
+    lasts: float | None
+    """For so long [s]; None where nobody knows."""
+    route: tuple[Point, ...] = ()
+    """Of a move [m]."""
+    problem: str = ""
+    """Why it'd fail; the list ends there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What is likely to become of a list."""
+
+    jobs: tuple[JobForecast, ...] = ()
+    """In their order, up to the first that'd fail."""
+
+    @property
+    def lasts(self) -> float:
+        """For how long it'd take, times that nobody knows left out [s]."""
+        return self.jobs[-1].begins + (self.jobs[-1].lasts or 0.0) if self.jobs else 0.0
+
+    @property
+    def problem(self) -> str:
+        """Why it'd fail; empty if it wouldn't."""
+        return self.jobs[-1].problem if self.jobs else ""
+
+
+def dry_run(
+    jobs: JobList,
+    posture: Posture,
+    roads: RouteMap,
+    limits: DriveLimits,
+    *,
+    arm: Callable[[Arm], float | str | None] = lambda _: None,
+) -> Forecast:
+    """Do a list on the virtual robot.
+
+    Args:
+        jobs: The list.
+        posture: Where the robot stands when it begins.
+        roads: The known ways.
+        limits: Of the robot.
+        arm: Says how long a program takes [s], why it'd fail, or None where nobody knows.
+    """
+    found: list[JobForecast] = []
+    t = 0.0
+    for entry in jobs.entries:
+        if isinstance(entry.job, Move):
+            moved, posture = _moved(entry.number, entry.job, jobs, t, posture, roads, limits)
+            found.append(moved)
+        else:
+            lasts = _lasts(entry.job, arm)
+            why = lasts if isinstance(lasts, str) else ""
+            found.append(JobForecast(entry.number, t, None if isinstance(lasts, str) else lasts, problem=why))
+        if found[-1].problem:
+            break
+        t += found[-1].lasts or 0.0
+    return Forecast(tuple(found))
+
+
+def _lasts(job: Job, arm: Callable[[Arm], float | str | None]) -> float | str | None:
+    match job:
+        case Voice(text):
+            return speaking_time(text)
+        case Wait(seconds):
+            return seconds
+        case Arm():
+            return arm(job)
+        case Message() | Move():
+            return 0.0
+
+
+def _moved(
+    number: int, move: Move, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
+) -> tuple[JobForecast, Posture]:
+    """Drive to a goal; what became of it, and where the robot stands then."""
+    journey, drive, t = Journey(roads), STAND, 0.0
+    journey.go(jobs.goal(move), posture, now=0.0)
+    route = () if journey.route is None else journey.route.points
+    while journey.state in GOING and t < LONGEST:
+        wanted = journey.control(posture, now=t, v_before=drive.v)
+        drive = Drive(*kept(wanted.v, wanted.w, drive.v, PERIOD, limits))
+        posture = Posture(*advanced(posture, drive.v, drive.w, PERIOD))
+        t += PERIOD
+    arrived = journey.state is JourneyState.ARRIVED
+    problem = "" if arrived else journey.reason or f"it'd take longer than {LONGEST:g} s"
+    return JobForecast(number, begins, t if arrived else None, route, problem), posture

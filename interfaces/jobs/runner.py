@@ -1,0 +1,312 @@
+"""Does a list of jobs, one after the other: a state machine that asks others to carry them out.
+
+It knows no clock and no robot. Each thing asked for is an attempt with a number of its own, so that a late answer
+to one that was ended counts for nothing. Whatever isn't running has been ended: a list that is paused, aborted or
+has failed asks for no motion.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from interfaces.jobs.messages import (
+    Command,
+    Done,
+    End,
+    Failed,
+    Input,
+    Interrupted,
+    Load,
+    Lost,
+    MoveTo,
+    Request,
+    RunArm,
+    Show,
+    Speak,
+)
+from interfaces.jobs.progress import JobProgress, OperatorLoss, Progress, Stage
+from interfaces.jobs.values import Arm, Entry, JobList, Message, Move, Voice, Wait
+from vrs.checks import finite, number_in
+
+RUNS = "the list is being done: pause or abort it first"
+"""Why a list can't be changed or begun."""
+STANDS = "the list isn't being done"
+"""Why it can't be paused or aborted."""
+EMPTY = "there's no job in the list"
+"""Why it can't be run."""
+ALL_DONE = "all jobs of the list are done: run it"
+"""Why it can't be resumed."""
+ANEW = "the station was started anew"
+"""Why a list is paused that was being done when it was saved."""
+NO_KEY = "no job waits for the key"
+"""Why the key does nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerConfig:
+    """How a runner behaves."""
+
+    loss: OperatorLoss = OperatorLoss.STOP
+    """When the operator is lost."""
+    longest_move: float = 3600.0
+    """A move that takes longer has failed [s], in [1, 86400]."""
+    longest_voice: float = 120.0
+    """The same of speaking [s], in [1, 86400]."""
+    longest_arm: float = 3600.0
+    """The same of a program [s], in [1, 86400]."""
+
+    def __post_init__(self) -> None:
+        for name in ("longest_move", "longest_voice", "longest_arm"):
+            number_in(name, getattr(self, name), 1.0, 86_400.0, unit=" s")
+
+
+def carried_over(jobs: JobList, progress: Progress, load: Load) -> Progress:
+    """How far a list is that takes the place of another; nothing of it is being done.
+
+    Args:
+        jobs: The list before.
+        progress: How far that is.
+        load: What takes its place.
+    """
+    given = progress if load.progress is None else load.progress
+    same = {entry for entry in load.jobs.entries if load.progress is not None or entry in jobs.entries}
+    known = {job.number: job for job in given.jobs}
+    states = tuple(
+        known.get(entry.number, JobProgress(entry.number)) if entry in same else JobProgress(entry.number)
+        for entry in load.jobs.entries
+    )
+    if given.stage is Stage.RUNNING:
+        paused = tuple(replace(job, stage=Stage.PAUSED, reason=ANEW) for job in states)
+        states = tuple(p if job.stage is Stage.RUNNING else job for p, job in zip(paused, states, strict=True))
+        given = Progress(Stage.PAUSED, reason=ANEW)
+    stages = {job.stage for job in states}
+    if given.stage not in stages or (given.stage is Stage.DONE and len(stages) > 1):
+        return Progress(jobs=states)
+    return replace(given, jobs=states)
+
+
+class JobRunner:
+    """Holds a list, and does it."""
+
+    def __init__(self, jobs: JobList | None = None, config: RunnerConfig | None = None) -> None:
+        """Hold a list of which nothing is done.
+
+        Args:
+            jobs: The list; an empty one unless given.
+            config: How to behave.
+        """
+        self.jobs = JobList() if jobs is None else jobs
+        self._config = RunnerConfig() if config is None else config
+        self.progress = Progress.of(self.jobs)
+        """How far it is."""
+        self._requests: list[Request] = []
+        self._attempt = 0
+        self._open = False
+        """Whether somebody carries out the attempt."""
+        self._due = math.inf
+        """When the running job is over, or has failed [s]."""
+
+    @classmethod
+    def at(cls, jobs: JobList, progress: Progress) -> JobRunner:
+        """As one that is as far as that, to try what it'd answer; nothing is asked for again."""
+        runner = cls(jobs)
+        runner.progress = progress
+        return runner
+
+    @property
+    def config(self) -> RunnerConfig:
+        """How it behaves."""
+        return self._config
+
+    @property
+    def running(self) -> bool:
+        """Whether the list is being done."""
+        return self.progress.stage is Stage.RUNNING
+
+    @property
+    def waits_for_key(self) -> bool:
+        """Whether the key would end a WAIT."""
+        entry = self._current()
+        return entry is not None and entry.job == Wait()
+
+    def receive(self, message: Input, *, now: float) -> str:
+        """Take in what a person asks for, or what became of a request.
+
+        Args:
+            message: That.
+            now: [s].
+
+        Returns:
+            Why it isn't done; empty if it is. An answer to an attempt that's over counts for nothing.
+        """
+        self._catch_up(finite("now", now, "finite seconds"))
+        match message:
+            case Load():
+                return self._load(message)
+            case Command():
+                return self._commanded(message, now)
+            case Done() | Failed():
+                self._answered(message, now)
+            case Lost(reason):
+                if self._config.loss is OperatorLoss.STOP:
+                    self._pause(reason, now)
+            case Interrupted(reason):
+                self._pause(reason, now)
+        return ""
+
+    def advance(self, *, now: float) -> tuple[Request, ...]:
+        """Do what is due by now [s], and say what is to be done next."""
+        self._catch_up(now)
+        requests, self._requests = tuple(self._requests), []
+        return requests
+
+    def next_deadline(self) -> float | None:
+        """When there's something to do [s]; −∞ for at once, None if nothing is due."""
+        if self._requests:
+            return -math.inf
+        return None if math.isinf(self._due) else self._due
+
+    def _commanded(self, command: Command, now: float) -> str:
+        if command is Command.KEY:
+            if not self.waits_for_key:
+                return NO_KEY
+            self._finish(now)
+        elif command is Command.PAUSE:
+            if not self.running:
+                return STANDS
+            self._pause("", now)
+        elif command is Command.ABORT:
+            return self._abort()
+        else:
+            return self._begin(command, now)
+        return ""
+
+    def _load(self, message: Load) -> str:
+        if self.running:
+            return RUNS
+        self.jobs, self.progress = message.jobs, carried_over(self.jobs, self.progress, message)
+        return ""
+
+    def _begin(self, command: Command, now: float) -> str:
+        if self.running:
+            return RUNS
+        if not self.jobs.entries:
+            return EMPTY
+        if command is Command.RUN:
+            self.progress = Progress.of(self.jobs)
+        elif all(job.stage is Stage.DONE for job in self.progress.jobs):
+            return ALL_DONE
+        self.progress = replace(self.progress, stage=Stage.RUNNING, reason="")
+        self._next(now)
+        return ""
+
+    def _abort(self) -> str:
+        if self.progress.stage not in (Stage.RUNNING, Stage.PAUSED):
+            return STANDS
+        self._end()
+        for job in self.progress.jobs:
+            if job.stage in (Stage.RUNNING, Stage.PAUSED):
+                self._mark(JobProgress(job.number, Stage.ABORTED))
+        self.progress = replace(self.progress, stage=Stage.ABORTED, reason="")
+        self._requests.append(Show(""))
+        return ""
+
+    def _pause(self, reason: str, now: float) -> None:
+        """Stop what is being done, if anything is; the list goes on when it's resumed."""
+        if not self.running:
+            return
+        left = self._due - now if self._waiting() is not None else math.inf
+        self._end()
+        self._stage_of_running(Stage.PAUSED, reason, None if math.isinf(left) else max(0.0, left))
+
+    def _stage_of_running(self, stage: Stage, reason: str, left: float | None = None) -> None:
+        """Let the list, and the job that's running, be at a stage."""
+        job = self.progress.running
+        if job is not None:
+            self._mark(JobProgress(job.number, stage, reason, left))
+        self.progress = replace(self.progress, stage=stage, reason=reason)
+
+    def _end(self) -> None:
+        """Nobody carries out anything any more."""
+        if self._open:
+            self._requests.append(End(self._attempt))
+        self._open, self._due = False, math.inf
+
+    def _answered(self, answer: Done | Failed, now: float) -> None:
+        if not self._open or answer.attempt != self._attempt:
+            return
+        self._open, self._due = False, math.inf
+        if isinstance(answer, Done):
+            self._finish(now)
+        else:
+            self._stage_of_running(Stage.FAILED, answer.reason)
+
+    def _finish(self, now: float) -> None:
+        """The running job is done: on to the next."""
+        job = self.progress.running
+        assert job is not None
+        self._due = math.inf
+        self._mark(JobProgress(job.number, Stage.DONE))
+        self._next(now)
+
+    def _next(self, now: float) -> None:
+        """Begin the first job that isn't done; messages, which take no time, as well as what follows them."""
+        for entry in self.jobs.entries:
+            before = self._of(entry)
+            if before.stage is Stage.DONE:
+                continue
+            self._mark(JobProgress(entry.number, Stage.RUNNING))
+            if not isinstance(entry.job, Message):
+                self._ask(entry, before, now)
+                return
+            self._requests.append(Show(entry.job.text))
+            self._mark(JobProgress(entry.number, Stage.DONE))
+        self.progress = replace(self.progress, stage=Stage.DONE, reason="")
+
+    def _ask(self, entry: Entry, before: JobProgress, now: float) -> None:
+        """Let a job be carried out."""
+        job, config = entry.job, self._config
+        if isinstance(job, Wait):
+            seconds = job.seconds if before.left is None else before.left
+            self._due = math.inf if seconds is None else now + seconds
+            return
+        self._attempt += 1
+        self._open = True
+        match job:
+            case Move():
+                self._requests.append(MoveTo(self._attempt, self.jobs.goal(job)))
+                self._due = now + config.longest_move
+            case Voice(text):
+                self._requests.append(Speak(self._attempt, text))
+                self._due = now + config.longest_voice
+            case Arm(program, source):
+                self._requests.append(RunArm(self._attempt, program, source))
+                self._due = now + config.longest_arm
+
+    def _catch_up(self, now: float) -> None:
+        """Do what is due by now: a wait ends when it was to, however late this is called."""
+        while self._due <= now:
+            due = self._due
+            if self._waiting() is not None:
+                self._finish(due)
+            else:
+                self._end()
+                self._stage_of_running(Stage.FAILED, "it took longer than is allowed")
+
+    def _current(self) -> Entry | None:
+        """The job that is being done."""
+        job = self.progress.running
+        return None if job is None else self.jobs.entries[self.jobs.index(job.number)]
+
+    def _waiting(self) -> Wait | None:
+        """The WAIT that is being done."""
+        entry = self._current()
+        return entry.job if entry is not None and isinstance(entry.job, Wait) else None
+
+    def _of(self, entry: Entry) -> JobProgress:
+        return next(job for job in self.progress.jobs if job.number == entry.number)
+
+    def _mark(self, progress: JobProgress) -> None:
+        jobs = tuple(progress if job.number == progress.number else job for job in self.progress.jobs)
+        self.progress = replace(self.progress, jobs=jobs)

@@ -1,0 +1,222 @@
+"""The study behind `vrs lab goals`: trips in groups, what is asked of them, and what was measured."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from interfaces.lab.claims import Cell, Claim, Findings, Paper, Part, Reproduction, Study, Table
+from interfaces.lab.goals.pictures import maps
+from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND, SHUT, TITLES, setting
+from interfaces.lab.goals.shortest import Shortest
+from interfaces.lab.goals.trial import Setting, Trip, seen_all, travel
+from interfaces.lab.output import to_json, write_files
+from interfaces.lab.statistics import bootstrap, median
+from robots.ipr.chassis import IPR
+from robots.ipr.navigation import route_config
+from robots.onboard.journey import JourneyState
+
+GOALS = 100
+"""Trips among furniture and doors, unless said otherwise."""
+SHARES: Final = {ROUND: 0.25, LATE: 0.15, SHUT: 0.05, PEOPLE: 0.1, PHYSICS: 0.2}
+"""Trips of each group as shares of those; the rest of them is of `FURNITURE`."""
+ASKED: Final = (FURNITURE, ROUND, LATE)
+"""Groups that make them up."""
+REACHED, LONGER = 0.99, 1.15
+"""Share of goals that are to be reached; how much longer than the shortest a route may be."""
+SOURCE = "issue 11, It must show"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A trip, and the yardsticks of its length."""
+
+    group: str
+    setting: Setting
+    trip: Trip
+    mapped: float
+    """Length of the shortest way on the map [m]."""
+    true: float
+    """Of the shortest way as things stood at first [m]; infinite where there was none."""
+
+    @property
+    def ratio(self) -> float:
+        """Length of the route on the map, by the shortest."""
+        return self.trip.planned / self.mapped
+
+
+def study_of(goals: int) -> Paper:
+    """The parts of a study: so many goals among furniture and doors, fewer of the other groups."""
+    counts = {group: max(1, round(share * goals)) for group, share in SHARES.items()}
+    counts[FURNITURE] = max(1, goals - counts[ROUND] - counts[LATE])
+    asked = tuple(f"{group}:{k}" for group in ASKED for k in range(counts[group]))
+    others = [
+        Part(group, measure, conclude, tuple(f"{group}:{k}" for k in range(counts[group])))
+        for group, conclude in ((SHUT, conclude_shut), (PEOPLE, conclude_people), (PHYSICS, conclude_physics))
+    ]
+    return Paper(
+        "goals",
+        "Kim, Han, Kim, Kim, Internet-Based Personal Robot System using Map-Based Localization, 2002, section 4.1",
+        (Part("goals", measure, conclude_asked, asked), *others),
+        runs=GOALS,
+    )
+
+
+def measure(study: Study, case: str) -> Found:
+    """A trip; the case is its group and number."""
+    group, number = case.split(":")
+    chosen = setting(group, study.seed, int(number))
+    begin, end = chosen.start[:2], (chosen.goal.x, chosen.goal.y)
+    # A disc as wide as the robot, with what its routes keep free on either side.
+    radius = route_config(IPR).half_width + route_config(IPR).margin
+    mapped, true = (
+        Shortest(room, radius).length(begin, end) for room in (chosen.room.known(), seen_all(chosen.room))
+    )
+    return Found(group, chosen, travel(chosen), mapped, true)
+
+
+def conclude_asked(study: Study, found: tuple[Found, ...]) -> Findings:
+    """What the issue asks for, of the goals among furniture and doors."""
+    _, touched = _count(found)
+    ratios = np.array([one.ratio for one in found])
+    long = int(np.sum(ratios > LONGER))
+    middle = bootstrap(ratios, study.seed, median)
+    blocked = [one for one in found if one.group == ROUND]
+    rerouted = sum(one.trip.arrived for one in blocked)
+    late = [one for one in found if one.group == LATE]
+    waited = sum(one.trip.arrived for one in late)
+    total = len(found)
+    claims = (
+        _reached(found, math.ceil(REACHED * total - 1e-9)),
+        Claim("goals on whose way something was touched", SOURCE, "0", touched, touched == 0),
+        Claim(
+            "routes on the map, by the shortest way: median", SOURCE, f"≤ {LONGER:g}", middle.value,
+            middle.value <= LONGER, middle.interval,
+        ),
+        Claim(f"routes of {total} that are longer than {LONGER:g} times that", SOURCE, "0", long, long == 0),
+        Claim(
+            f"blocked doors of {len(blocked)} that the robot went round", SOURCE, f"{len(blocked)}", rerouted,
+            rerouted == len(blocked),
+        ),
+        Claim(
+            f"doors of {len(late)} that it waited for", "issue 11, What to build", f"{len(late)}", waited,
+            waited == len(late),
+        ),
+    )  # fmt: skip
+    groups = dict.fromkeys(one.group for one in found)
+    rows = tuple(_row(group, [one for one in found if one.group == group]) for group in groups)
+    table = Table("groups", "trips by group", COLUMNS, rows)
+    return Findings(claims, (table, _each(found)), tuple(maps(found)))
+
+
+def conclude_shut(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: ARG001
+    """Where there's no way the robot says so."""
+    clear = sum(one.trip.state is JourneyState.FAILED and "way" in one.trip.reason for one in found)
+    total = len(found)
+    claim = Claim(
+        f"goals of {total} behind a closed door that were given up with the reason", SOURCE, f"{total}", clear,
+        clear == total,
+    )  # fmt: skip
+    return Findings((claim,), (_each(found),), tuple(maps(found)))
+
+
+def conclude_people(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: ARG001
+    """Among people who stop for nobody nothing is asked of touches: they run into robots that stand."""
+    table = Table("with people", TITLES[PEOPLE], COLUMNS, (_row(PEOPLE, found),))
+    return Findings((), (table, _each(found)), tuple(maps(found)))
+
+
+def conclude_physics(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: ARG001
+    """The same with physics."""
+    _, touched = _count(found)
+    claims = (
+        _reached(found, math.ceil(REACHED * len(found) - 1e-9), " in PyBullet"),
+        Claim("goals in PyBullet on whose way something was touched", SOURCE, "0", touched, touched == 0),
+    )
+    return Findings(claims, (_each(found),), tuple(maps(found)))
+
+
+COLUMNS: Final = (
+    "group", "goals", "reached", "with touches", "routes by the shortest", "largest", "way by the shortest true",
+    "routes taken, mean", "time [s]", "position error [cm]", "heading error [deg]", "largest error underway [cm]",
+)  # fmt: skip
+"""Of the table of groups; medians unless they say otherwise."""
+
+
+def _reached(found: Sequence[Found], least: int, where: str = "") -> Claim:
+    reached, _ = _count(found)
+    what = f"goals of {len(found)}{where} reached within 5 cm and 2 deg"
+    return Claim(what, SOURCE, f"≥ {least}", reached, reached >= least)
+
+
+def _count(found: Sequence[Found]) -> tuple[int, int]:
+    """Goals that were reached, and on whose way something was touched."""
+    return sum(one.trip.arrived for one in found), sum(bool(one.trip.touched) for one in found)
+
+
+def _row(group: str, found: Sequence[Found]) -> tuple[Cell, ...]:
+    trips = [one.trip for one in found]
+    there = [trip for trip in trips if trip.arrived]
+    ratios = [one.ratio for one in found]
+    ways = [one.trip.way / one.true for one in found if one.trip.arrived and math.isfinite(one.true)]
+    reached, touched = _count(found)
+    return (
+        TITLES[group], len(found), reached, touched, _median(ratios), max(ratios), _median(ways),
+        float(np.mean([trip.routes for trip in trips])), _median([trip.time for trip in there]),
+        100 * _median([trip.off for trip in there]), math.degrees(_median([trip.turned for trip in there])),
+        100 * max(trip.lost for trip in trips),
+    )  # fmt: skip
+
+
+def _median(values: Sequence[float]) -> float:
+    return float(np.median(values)) if values else math.nan
+
+
+EACH: Final = (
+    "group", "room", "state", "reason", "reached", "touched", "start x [m]", "start y [m]",
+    "goal x [m]", "goal y [m]", "route on the map [m]", "shortest on the map [m]", "shortest true [m]",
+    "driven [m]", "routes", "time [s]", "position error [cm]", "heading error [deg]", "largest error underway [cm]",
+)  # fmt: skip
+"""Of the table of trips."""
+
+
+def _each(found: Sequence[Found]) -> Table:
+    group = "goals" if len({one.group for one in found}) > 1 else found[0].group
+    rows = tuple(_trip(one) for one in found)
+    return Table(f"trips: {group}", "trip by trip", EACH, rows)
+
+
+def _trip(one: Found) -> tuple[Cell, ...]:
+    trip, start, goal = one.trip, one.setting.start, one.setting.goal
+    true = one.true if math.isfinite(one.true) else None
+    planned = trip.planned if math.isfinite(trip.planned) else None
+    things = ", ".join(dict.fromkeys(touch.thing for touch in trip.touched))
+    return (
+        one.group, one.setting.room.name, trip.state.value, trip.reason, "yes" if trip.arrived else "no", things,
+        start[0], start[1], goal.x, goal.y, planned, one.mapped, true, trip.way, trip.routes, trip.time,
+        100 * trip.off, math.degrees(trip.turned), 100 * trip.lost,
+    )  # fmt: skip
+
+
+def write(found: Reproduction, out: Path) -> None:
+    """Write summary.json, runs.csv with a row a trip, and the maps into an existing directory.
+
+    Raises:
+        FormatError: If it can't hold them.
+    """
+    lines = io.StringIO()
+    rows = csv.writer(lines, lineterminator="\n")
+    rows.writerow(EACH)
+    for table in found.findings.tables:
+        if table.columns == EACH:
+            rows.writerows(
+                [f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in table.rows
+            )
+    write_files(out, found.findings.figures, {"runs.csv": lines.getvalue(), "summary.json": to_json(found)})

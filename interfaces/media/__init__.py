@@ -1,0 +1,20 @@
+"""What the robot's operator sees, hears and says through it: camera, voice and screen (docs/media.md)."""
+
+from __future__ import annotations
+
+from interfaces.media.aloud import Aloud
+from interfaces.media.camera import CameraConfig, CameraError, LiveCamera
+from interfaces.media.live import LiveMedia
+from interfaces.media.presenter import Presenter
+from interfaces.media.speech import SpeechConfig, SpeechError
+
+__all__ = [
+    "Aloud",
+    "CameraConfig",
+    "CameraError",
+    "LiveCamera",
+    "LiveMedia",
+    "Presenter",
+    "SpeechConfig",
+    "SpeechError",
+]

@@ -1,0 +1,85 @@
+"""The process that draws what the robot's camera sees: `python -m interfaces.media.camera_process DESCRIPTOR`.
+
+It has a world of its own and never touches the robot's physics. It ends when the other end of its socket does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import sys
+
+from interfaces.media.coding import VideoEncoder, encode_still
+from interfaces.media.messages import HEAD, Order, Ready, Setup, Shot, Taken, decode_order, encode, size_of
+from robots.ipr.camera import Look
+from robots.ipr.sight import Sight
+from vrs.clock import WallClock
+from vrs.errors import FormatError
+
+NICE = 2
+"""Whoever steers, and the robot's body, go before pictures."""
+
+
+def run(connection: socket.socket) -> int:
+    """Draw what is asked for, until the other end is closed.
+
+    Args:
+        connection: To the site; its first message is the setup.
+
+    Returns:
+        The exit status: 0, or 2 if something came that isn't a message.
+    """
+    with contextlib.suppress(OSError):
+        os.nice(NICE)
+    try:
+        setup = _order(connection)
+        if not isinstance(setup, Setup):
+            return 0 if setup is None else 2
+        sight, lens = Sight(setup.room, setup.lens), setup.lens
+        video = VideoEncoder(lens.width, lens.height, setup.rate) if setup.video else None
+        connection.sendall(encode(Ready()))
+        clock = WallClock()
+        while isinstance(shot := _order(connection), Shot):
+            connection.sendall(encode(take(shot, sight, video, clock)))
+    except FormatError:
+        return 2
+    except OSError:
+        return 0
+    return 0
+
+
+def take(shot: Shot, sight: Sight, video: VideoEncoder | None, clock: WallClock) -> Taken:
+    """Draw a picture, and encode it as it's wanted."""
+    began = clock.now()
+    picture = sight.draw(shot.posture, Look(*shot.look), shot.t)
+    frame, key = (b"", False) if video is None else video.encode(picture, key=shot.key)
+    still = encode_still(picture) if shot.still else b""
+    return Taken(shot.number, frame, key, still, clock.now() - began)
+
+
+def _order(connection: socket.socket) -> Order | None:
+    """The next message; None where the other end is closed.
+
+    Raises:
+        FormatError: If it's none.
+    """
+    head = _read(connection, HEAD)
+    return None if head is None else decode_order(_read(connection, size_of(head)) or b"")
+
+
+def _read(connection: socket.socket, size: int) -> bytes | None:
+    data = b""
+    while len(data) < size:
+        part = connection.recv(size - len(data))
+        if not part:
+            return None
+        data += part
+    return data
+
+
+if __name__ == "__main__":
+    with socket.socket(fileno=int(sys.argv[1])) as _connection:
+        _status = run(_connection)
+    # Nothing is left to tidy up: the renderer goes with the process.
+    os._exit(_status)

@@ -1,0 +1,107 @@
+"""Pictures and sound as browsers take them: VP8 and Opus by PyAV, of the extra `[media]`, and JPEG by Pillow."""
+
+from __future__ import annotations
+
+import io
+from fractions import Fraction
+from importlib.util import find_spec
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+VIDEO_CLOCK: Final = 90_000
+"""RTP's clock of video [1/s]."""
+SOUND_RATE: Final = 48_000
+"""Samples a second of Opus, and RTP's clock of it [1/s]."""
+SOUND_PERIOD: Final = 0.02
+"""Length of an Opus packet [s]."""
+BITS: Final = 800_000
+"""Of video a second at most."""
+KEY_PERIOD: Final = 2.0
+"""Time between two whole pictures [s]: so long at most a receiver that lost one shows nothing new."""
+STILL_QUALITY: Final = 85
+_LEAD_OUT: Final = 0.08
+"""Silence after what is said [s]: the last sound isn't cut off."""
+
+
+def missing() -> str:
+    """What the extra `[media]` would bring and isn't there; empty where it's whole."""
+    return ", ".join(name for name in ("aiortc", "av") if find_spec(name) is None)
+
+
+class VideoEncoder:
+    """One stream of VP8 for any number of receivers."""
+
+    def __init__(self, width: int, height: int, rate: float) -> None:
+        """Begin a stream.
+
+        Args:
+            width: Pixels across.
+            height: Pixels down.
+            rate: Pictures a second.
+        """
+        import av
+
+        self._av = av
+        codec: Any = av.CodecContext.create("libvpx", "w")
+        codec.width, codec.height, codec.pix_fmt = width, height, "yuv420p"
+        codec.bit_rate = BITS
+        codec.time_base = Fraction(1, VIDEO_CLOCK)
+        codec.framerate = Fraction(rate).limit_denominator(1000)
+        codec.gop_size = max(1, round(KEY_PERIOD * rate))
+        codec.options = {"cpu-used": "-6", "deadline": "realtime", "lag-in-frames": "0"}
+        codec.thread_count = 1
+        self._codec, self._step, self._count = codec, round(VIDEO_CLOCK / rate), 0
+
+    def encode(self, picture: NDArray[np.uint8], *, key: bool) -> tuple[bytes, bool]:
+        """Encode a picture.
+
+        Args:
+            picture: Red, green, blue, (height, width, 3).
+            key: Whether it's to be whole; others refer to the one before.
+
+        Returns:
+            The frame, and whether it's whole.
+        """
+        frame = self._av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p")
+        frame.pts, frame.time_base = self._count * self._step, Fraction(1, VIDEO_CLOCK)
+        if key:
+            frame.pict_type = self._av.video.frame.PictureType.I
+        self._count += 1
+        packets = self._codec.encode(frame)
+        return b"".join(bytes(packet) for packet in packets), any(packet.is_keyframe for packet in packets)
+
+
+def encode_sound(samples: NDArray[np.int16], rate: int) -> tuple[bytes, ...]:
+    """Encode what is said.
+
+    Args:
+        samples: (k,), one channel.
+        rate: Samples a second.
+
+    Returns:
+        Opus packets, of `SOUND_PERIOD` each.
+    """
+    import av
+
+    codec: Any = av.CodecContext.create("libopus", "w")
+    codec.bit_rate, codec.format, codec.layout, codec.sample_rate = 48_000, "s16", "stereo", SOUND_RATE
+    codec.time_base, codec.options = Fraction(1, SOUND_RATE), {"application": "voip"}
+    quiet = np.zeros(round(_LEAD_OUT * rate), dtype=np.int16)
+    frame = av.AudioFrame.from_ndarray(np.concatenate([samples, quiet])[None], format="s16", layout="mono")
+    frame.sample_rate, frame.pts = rate, 0
+    size = round(SOUND_RATE * SOUND_PERIOD)
+    resampler = av.AudioResampler(format="s16", layout="stereo", rate=SOUND_RATE, frame_size=size)
+    frames = [*resampler.resample(frame), *resampler.resample(None)]
+    whole = [part for part in frames if part.samples == size]
+    return tuple(bytes(packet) for part in whole for packet in codec.encode(part))
+
+
+def encode_still(picture: NDArray[np.uint8]) -> bytes:
+    """A picture, (height, width, 3), as JPEG."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=STILL_QUALITY)
+    return file.getvalue()

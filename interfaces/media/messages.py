@@ -1,0 +1,113 @@
+"""What crosses between a site and the process of its robot's camera: length-prefixed msgpack on a socket pair."""
+
+from __future__ import annotations
+
+from typing import Final, TypeAlias, TypeVar
+
+import msgspec
+
+from robots.bullet.rooms import Room
+from robots.ipr.camera import Lens
+from vrs.errors import FormatError
+
+MESSAGE_MOST: Final = 1 << 24
+"""Largest message [bytes]."""
+HEAD: Final = 4
+"""Bytes of a message's length before it, big-endian."""
+
+
+class Setup(msgspec.Struct, frozen=True, tag=True):
+    """Site: what is to be seen, and how; the first message."""
+
+    room: Room
+    lens: Lens
+    rate: float
+    """Pictures a second that are asked for; the encoder spreads its bits by it."""
+    video: bool
+    """Whether pictures are to be encoded for RTP."""
+
+
+class Shot(msgspec.Struct, frozen=True, tag=True):
+    """Site: draw a picture."""
+
+    number: int
+    posture: tuple[float, float, float]
+    """Where the robot is, x, y [m], θ [rad]."""
+    look: tuple[float, float]
+    """Pan and tilt [rad]."""
+    t: float
+    """Time in the room [s]."""
+    key: bool
+    """Whether a receiver needs nothing before it."""
+    still: bool
+    """Whether it's also wanted by itself."""
+
+
+class Ready(msgspec.Struct, frozen=True, tag=True):
+    """Process: pictures can be asked for."""
+
+
+class Taken(msgspec.Struct, frozen=True, tag=True):
+    """Process: a picture."""
+
+    number: int
+    """Of the shot."""
+    video: bytes
+    """A VP8 frame; empty where none was wanted."""
+    key: bool
+    """Whether a receiver needs nothing before it."""
+    still: bytes
+    """A JPEG; empty where none was wanted."""
+    took: float
+    """How long drawing and encoding took [s]."""
+
+
+Order: TypeAlias = Setup | Shot
+News: TypeAlias = Ready | Taken
+_Message = TypeVar("_Message")
+_encoder = msgspec.msgpack.Encoder()
+_orders: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
+_news: msgspec.msgpack.Decoder[News] = msgspec.msgpack.Decoder(News)
+
+
+def encode(message: Order | News) -> bytes:
+    """A message with its length before it."""
+    data = _encoder.encode(message)
+    return len(data).to_bytes(HEAD, "big") + data
+
+
+def size_of(head: bytes) -> int:
+    """Length of the message that follows a head.
+
+    Raises:
+        FormatError: If it's too long.
+    """
+    size = int.from_bytes(head, "big")
+    if size > MESSAGE_MOST:
+        raise FormatError("camera", f"a message of {size} bytes; {MESSAGE_MOST} are allowed")
+    return size
+
+
+def decode_order(data: bytes) -> Order:
+    """Read what a site says.
+
+    Raises:
+        FormatError: If it's none of its messages.
+    """
+    return _decoded(data, _orders)
+
+
+def decode_news(data: bytes) -> News:
+    """Read what the process says.
+
+    Raises:
+        FormatError: If it's none of its messages.
+    """
+    return _decoded(data, _news)
+
+
+def _decoded(data: bytes, decoder: msgspec.msgpack.Decoder[_Message]) -> _Message:
+    try:
+        return decoder.decode(data)
+    except (msgspec.MsgspecError, ValueError) as error:
+        raise FormatError("camera", str(error)) from None

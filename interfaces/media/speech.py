@@ -1,0 +1,150 @@
+"""What is said, as sound: text cleaned and bounded, spoken by the program `espeak-ng` without a shell."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import shutil
+import unicodedata
+import wave
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vrs.checks import number_in
+from vrs.errors import FormatError, InvalidValueError, VrsError
+
+PROGRAM: Final = "espeak-ng"
+LONGEST: Final = 300
+"""Characters of what is said or shown at most."""
+TIME: Final = 10.0
+"""How long the program may take [s]."""
+_MOST_SOUND: Final = 1 << 24
+"""Bytes of sound at most, some six minutes."""
+_READ_ALOUD: Final = 15.0
+"""Characters a second where nothing speaks and people read."""
+
+
+class SpeechError(VrsError):
+    """The program that speaks isn't there, or failed."""
+
+    def __init__(self, problem: str) -> None:
+        self.problem = problem
+        super().__init__(f"nothing can be said: {problem}")
+
+
+@dataclass(frozen=True, slots=True)
+class SpeechConfig:
+    """How the robot speaks."""
+
+    language: str = "en"
+    """Of the program's voice, as `espeak-ng --voices` lists them: letters, digits and hyphens, 1 to 32."""
+    pace: int = 150
+    """Words a minute, 80 to 450."""
+    pitch: int = 45
+    """0 to 99."""
+
+    def __post_init__(self) -> None:
+        word = self.language.replace("-", "a")
+        if not (word.isascii() and word.isalnum() and 1 <= len(word) <= 32) or self.language.startswith("-"):
+            raise InvalidValueError("language", self.language, "a voice's name, as en or en-us")
+        number_in("pace", self.pace, 80, 450, unit=" words a minute")
+        number_in("pitch", self.pitch, 0, 99)
+
+
+def cleaned(text: str) -> str:
+    """A text as it's said and shown: printable, blanks in one, without the brackets that begin phonemes.
+
+    Raises:
+        InvalidValueError: If nothing is left of it, or it's too long.
+    """
+    if not isinstance(text, str) or len(text) > 4 * LONGEST:
+        raise InvalidValueError("text", str(text)[:40], f"1 to {LONGEST} characters")
+    words = _printable(text)
+    if not 1 <= len(words) <= LONGEST:
+        raise InvalidValueError("text", text[:40], f"1 to {LONGEST} characters")
+    return words
+
+
+def shortened(text: str) -> str:
+    """The same of a text that somebody else took already: as much of it as there's room for, perhaps nothing."""
+    return _printable(text[: 4 * LONGEST])[:LONGEST].strip()
+
+
+def _printable(text: str) -> str:
+    kept = "".join(" " if unicodedata.category(letter)[0] in "ZC" else letter for letter in text)
+    while "[[" in kept or "]]" in kept:
+        kept = kept.replace("[[", " ").replace("]]", " ")
+    return " ".join(kept.split())
+
+
+def reading_time(text: str) -> float:
+    """How long people take to read a text [s]."""
+    return 1.0 + len(text) / _READ_ALOUD
+
+
+def program() -> str | None:
+    """Where the program is; None where it isn't."""
+    return shutil.which(PROGRAM)
+
+
+async def spoken(text: str, config: SpeechConfig) -> tuple[NDArray[np.int16], int]:
+    """Let the program say a text.
+
+    Args:
+        text: From `cleaned`; it goes through standard input, so that none of it's an option.
+        config: How.
+
+    Returns:
+        Samples, (k,), and their rate [1/s].
+
+    Raises:
+        SpeechError: If the program isn't there, fails or takes too long.
+    """
+    found = program()
+    if found is None:
+        raise SpeechError(f"the program {PROGRAM} isn't installed")
+    options = ("-v", config.language, "-s", str(config.pace), "-p", str(config.pitch), "--stdin", "--stdout")
+    try:
+        process = await asyncio.create_subprocess_exec(
+            found, *options, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+    except OSError as error:
+        raise SpeechError(error.strerror or str(error)) from None
+    try:
+        async with asyncio.timeout(TIME):
+            data, _ = await process.communicate(text.encode())
+    except TimeoutError:
+        raise SpeechError(f"{PROGRAM} took longer than {TIME:g} s") from None
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+    if process.returncode:
+        raise SpeechError(f"{PROGRAM} ended with status {process.returncode}")
+    try:
+        return samples_of(data)
+    except FormatError as error:
+        raise SpeechError(str(error)) from None
+
+
+def samples_of(data: bytes) -> tuple[NDArray[np.int16], int]:
+    """Samples, (k,), and their rate [1/s], of a WAV file of one channel; its header may say any length.
+
+    Raises:
+        FormatError: If it's none.
+    """
+    try:
+        with wave.open(io.BytesIO(data)) as sound:
+            kind, rate = (sound.getnchannels(), sound.getsampwidth()), sound.getframerate()
+            frames = sound.readframes(_MOST_SOUND)
+    except (wave.Error, EOFError) as error:
+        raise FormatError(PROGRAM, f"no sound: {error}") from None
+    if kind != (1, 2) or not 8000 <= rate <= 48_000:
+        raise FormatError(PROGRAM, f"sound of {kind[0]} channels of {kind[1]} bytes at {rate}/s")
+    return np.frombuffer(frames[: len(frames) // 2 * 2], dtype="<i2").astype(np.int16), rate

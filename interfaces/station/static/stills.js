@@ -1,0 +1,48 @@
+// Single pictures of the robot's camera, one a second, where RTP isn't to be had.
+
+const PERIOD = 1000;
+
+export class Stills {
+  /**
+   * @param {HTMLImageElement} image where they're shown
+   * @param {object} session knows the token
+   */
+  constructor(image, session) {
+    this.image = image;
+    this.session = session;
+    this.wanted = false;
+    /** Pictures that were shown. */
+    this.frames = 0;
+    this.rate = 0;
+  }
+
+  /** Show them, or don't. */
+  want(wanted) {
+    const begins = wanted && !this.wanted;
+    this.wanted = wanted;
+    if (!wanted) this.rate = 0;
+    if (begins && !this.busy) this.run();
+  }
+
+  async run() {
+    this.busy = true;
+    while (this.wanted) {
+      const due = performance.now() + PERIOD;
+      await this.fetch().catch(() => {});
+      await new Promise((resolve) => setTimeout(resolve, Math.max(0, due - performance.now())));
+    }
+    this.busy = false;
+  }
+
+  async fetch() {
+    const headers = this.session.token ? { Authorization: "Bearer " + this.session.token } : {};
+    const answer = await fetch("/media/still", { headers });
+    this.rate = answer.ok ? 1000 / PERIOD : 0;
+    if (!answer.ok) return;
+    const before = this.image.src;
+    this.image.src = URL.createObjectURL(await answer.blob());
+    await this.image.decode();
+    if (before) URL.revokeObjectURL(before);
+    this.frames += 1;
+  }
+}

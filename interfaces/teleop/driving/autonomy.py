@@ -1,0 +1,212 @@
+"""What a mobile robot does by itself: drive to a goal, or do a list of jobs. It's on board, and outlives links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from interfaces.jobs.carrying import ArmControl, NoArm, Screen, SilentSpeaker, Speaker, TextScreen
+from interfaces.jobs.file import digest
+from interfaces.jobs.messages import (
+    Command,
+    Done,
+    End,
+    Failed,
+    Interrupted,
+    Load,
+    Lost,
+    MoveTo,
+    Request,
+    RunArm,
+    Show,
+    Speak,
+)
+from interfaces.jobs.progress import OperatorLoss
+from interfaces.jobs.runner import JobRunner, RunnerConfig
+from interfaces.teleop.architectures.messages import is_still
+from interfaces.teleop.driving.pilot import Pilot
+from interfaces.teleop.tasks import Doing, Go, Halt, Task, TaskReport
+from robots.onboard.driving import Drive, Posture
+from robots.onboard.journey import GOING, Goal, JourneyState
+
+DIRECT = "it's to drive to a goal"
+"""Why a list is paused when somebody gives another goal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hands:
+    """Who carries out what isn't driving."""
+
+    speaker: Speaker = field(default_factory=SilentSpeaker)
+    screen: Screen = field(default_factory=TextScreen)
+    arm: ArmControl = field(default_factory=NoArm)
+
+
+class Autonomy:
+    """Takes tasks, and drives; times are the operator's [s], journeys go by the robot's own."""
+
+    def __init__(self, pilot: Pilot, hands: Hands | None = None, config: RunnerConfig | None = None) -> None:
+        """Do nothing.
+
+        Args:
+            pilot: Takes the robot to a goal.
+            hands: Who speaks, shows and lets an arm work; nobody aloud unless given.
+            config: Of the list of jobs.
+        """
+        self._pilot = pilot
+        self._hands = Hands() if hands is None else hands
+        self._runner = JobRunner(config=config)
+        self._digest = digest(self._runner.jobs)
+        self._next: Goal | None = None
+        """Where to set out for once the robot rests."""
+        self._aside: tuple[JourneyState, str] | None = None
+        """What became of a journey that never began."""
+        self._move = self._voice = self._work = 0
+        """Attempts that are being carried out; 0 for none."""
+        self._says = self._shows = ""
+
+    @property
+    def doing(self) -> Doing:
+        """What it does."""
+        if self._runner.running:
+            return Doing.JOBS
+        return Doing.GOAL if self._next is not None or self._pilot.state in GOING else Doing.NOTHING
+
+    @property
+    def loss(self) -> OperatorLoss:
+        """What follows when the operator is lost."""
+        return self._runner.config.loss
+
+    @property
+    def left(self) -> float:
+        """Way to the goal [m]."""
+        return self._pilot.left
+
+    def receive(self, task: Task, *, now: float) -> None:
+        """Take a task; one that can't be done now changes nothing."""
+        match task:
+            case Go(goal):
+                self._runner.receive(Interrupted(DIRECT), now=now)
+                self._turn(now)
+                self._set_out(goal)
+            case Halt(reason):
+                self.stop(reason, now=now)
+            case Load():
+                self._runner.receive(task, now=now)
+                self._digest = digest(self._runner.jobs)
+            case Command():
+                if task in (Command.RUN, Command.RESUME) and not self._runner.running:
+                    self._leave()
+                self._runner.receive(task, now=now)
+        self._turn(now)
+
+    def stop(self, reason: str, *, now: float) -> None:
+        """Leave off; a list is paused."""
+        self._runner.receive(Interrupted(reason), now=now)
+        self._turn(now)
+        self._leave(reason)
+
+    def lost(self, reason: str, *, now: float) -> None:
+        """The operator is lost: stop or go on, as the policy says."""
+        self._runner.receive(Lost(reason), now=now)
+        self._turn(now)
+        if self.loss is OperatorLoss.STOP:
+            self._leave(reason)
+
+    def drive(self, posture: Posture, before: Drive, *, now: float) -> Drive | None:
+        """What to drive in the next period.
+
+        Args:
+            posture: Where the robot takes itself to be.
+            before: What it was told to drive last.
+            now: [s].
+
+        Returns:
+            A drive, whose limits are for the caller to keep; None to come to rest, and stay there.
+        """
+        self._turn(now)
+        if self._next is not None:
+            if not is_still(before):
+                return None
+            goal, self._next = self._next, None
+            self._pilot.go(goal, posture)
+        if self._pilot.state not in GOING:
+            return None
+        return self._pilot.drive(posture, before)
+
+    def report(self) -> TaskReport:
+        """How far it is."""
+        pilot, state, reason = self._pilot, self._pilot.state, self._pilot.reason
+        goal, route = pilot.goal, pilot.route
+        if self._next is not None:
+            state, reason, goal, route = JourneyState.DRIVING, "", self._next, ()
+        elif self._aside is not None:
+            state, reason = self._aside
+        progress, loss = self._runner.progress, self.loss
+        return TaskReport(state, reason, goal, route, self._digest, progress, loss, self._shows, self._says)
+
+    def _set_out(self, goal: Goal) -> None:
+        """Drive to a goal, from where the robot comes to rest."""
+        self._pilot.end()
+        self._next, self._aside = goal, None
+
+    def _leave(self, reason: str = "") -> None:
+        """End a journey, also one that was to begin."""
+        if self._next is not None:
+            self._next, self._aside = None, (JourneyState.ENDED, reason)
+        self._pilot.end()
+
+    def _turn(self, now: float) -> None:
+        """Tell the runner what has come to its end, and begin what it asks for, until there's nothing new."""
+        requests = self._answered(now)
+        while requests:
+            for request in requests:
+                self._begin(request, now)
+            requests = self._answered(now)
+
+    def _answered(self, now: float) -> tuple[Request, ...]:
+        pilot, hands, runner = self._pilot, self._hands, self._runner
+        if self._move and self._next is None and pilot.state not in GOING:
+            attempt, self._move = self._move, 0
+            well = pilot.state is JourneyState.ARRIVED
+            runner.receive(Done(attempt) if well else Failed(attempt, pilot.reason or "it was ended"), now=now)
+        if self._voice and not hands.speaker.is_speaking(now=now):
+            attempt, self._voice, self._says = self._voice, 0, ""
+            runner.receive(Done(attempt), now=now)
+        outcome = hands.arm.outcome(now=now) if self._work else None
+        if outcome is not None:
+            attempt, self._work = self._work, 0
+            runner.receive(Failed(attempt, outcome) if outcome else Done(attempt), now=now)
+        return runner.advance(now=now)
+
+    def _begin(self, request: Request, now: float) -> None:
+        hands = self._hands
+        match request:
+            case MoveTo(attempt, goal):
+                self._move = attempt
+                self._set_out(goal)
+            case Speak(attempt, text):
+                self._voice, self._says = attempt, text
+                hands.speaker.speak(text, now=now)
+            case Show(text):
+                self._shows = text
+                hands.screen.show(text)
+            case RunArm(attempt, program, source):
+                refusal = hands.arm.run(program, source, now=now)
+                if refusal:
+                    self._runner.receive(Failed(attempt, refusal), now=now)
+                else:
+                    self._work = attempt
+            case End(attempt):
+                self._end(attempt, now)
+
+    def _end(self, attempt: int, now: float) -> None:
+        """Leave off what an attempt began."""
+        if attempt == self._move:
+            self._move = 0
+            self._leave()
+        elif attempt == self._voice:
+            self._voice, self._says = 0, ""
+            self._hands.speaker.hush()
+        elif attempt == self._work:
+            self._work = 0
+            self._hands.arm.end(now=now)

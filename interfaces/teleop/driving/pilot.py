@@ -1,0 +1,104 @@
+"""Lets a journey drive a robot, with its surroundings between both, by the robot's own time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from interfaces.teleop.architectures import RobotSurroundings
+from robots.onboard.driving import STAND, Drive, Posture
+from robots.onboard.journey import GOING, Goal, Journey, JourneyState
+from robots.onboard.routes import Point
+
+
+class Pilot(Protocol):
+    """Whatever takes a robot to a goal by itself."""
+
+    @property
+    def state(self) -> JourneyState:
+        """How far it is."""
+
+    @property
+    def reason(self) -> str:
+        """Why it waits or has failed."""
+
+    @property
+    def goal(self) -> Goal | None:
+        """Where to; None before the first."""
+
+    @property
+    def route(self) -> tuple[Point, ...]:
+        """The way that's being driven [m]."""
+
+    @property
+    def left(self) -> float:
+        """Of that way [m]."""
+
+    def go(self, goal: Goal, posture: Posture) -> None:
+        """Set out for a goal, from where the robot stands."""
+
+    def end(self) -> None:
+        """Leave off."""
+
+    def drive(self, posture: Posture, before: Drive) -> Drive:
+        """What to drive in the next period, after what was driven before."""
+
+
+class JourneyPilot:
+    """A journey, and what keeps the robot from touching anything on it."""
+
+    def __init__(
+        self, journey: Journey, clock: Callable[[], float], surroundings: RobotSurroundings | None = None
+    ) -> None:
+        """Stand.
+
+        Args:
+            journey: What finds the way.
+            clock: Tells the robot's own time [s].
+            surroundings: Senses and avoidance, that know the journey as their aim.
+        """
+        self._journey, self._clock, self._surroundings = journey, clock, surroundings
+
+    @property
+    def state(self) -> JourneyState:
+        """See `Pilot`."""
+        return self._journey.state
+
+    @property
+    def reason(self) -> str:
+        """See `Pilot`."""
+        return self._journey.reason
+
+    @property
+    def goal(self) -> Goal | None:
+        """See `Pilot`."""
+        return self._journey.goal
+
+    @property
+    def route(self) -> tuple[Point, ...]:
+        """See `Pilot`."""
+        route = self._journey.route
+        return () if route is None else route.points
+
+    @property
+    def left(self) -> float:
+        """See `Pilot`."""
+        return self._journey.way_left
+
+    def go(self, goal: Goal, posture: Posture) -> None:
+        """See `Pilot`."""
+        self._journey.go(goal, posture, now=self._clock())
+
+    def end(self) -> None:
+        """See `Pilot`."""
+        self._journey.end()
+
+    def drive(self, posture: Posture, before: Drive) -> Drive:
+        """See `Pilot`."""
+        now, journey = self._clock(), self._journey
+        wanted = journey.control(posture, now=now, v_before=before.v)
+        if journey.state not in GOING:
+            return STAND
+        if self._surroundings is None:
+            return wanted
+        return self._surroundings.drive(wanted, posture, now=now, v_before=before.v)

@@ -1,0 +1,111 @@
+"""Lists of jobs in files: what is written is read again, and what is damaged is kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from interfaces.jobs import (
+    Arm,
+    Command,
+    Entry,
+    Job,
+    JobFile,
+    JobList,
+    JobProgress,
+    JobRunner,
+    Load,
+    Message,
+    Move,
+    Progress,
+    Stage,
+    Voice,
+    Wait,
+    read_jobs,
+    written_jobs,
+)
+from robots.onboard.journey import Goal
+from vrs.errors import FormatError
+
+NUMBERS = st.floats(-1000, 1000)
+GOALS = st.builds(Goal, NUMBERS, NUMBERS, st.none() | NUMBERS)
+TEXTS = st.text(min_size=1, max_size=30).filter(str.strip)
+JOBS: st.SearchStrategy[Job] = st.one_of(
+    st.builds(Move, GOALS | st.just("here")),
+    st.builds(Voice, TEXTS),
+    st.builds(Message, TEXTS),
+    st.builds(Wait, st.none() | st.floats(0, 86400)),
+    st.builds(Arm, TEXTS, st.text(max_size=100)),
+)
+
+
+@given(jobs=st.lists(JOBS, max_size=8), goal=GOALS, data=st.data())
+def test_what_is_written_is_read_again_to_the_bit(jobs: list[Job], goal: Goal, data: st.DataObject) -> None:
+    numbers = data.draw(st.permutations(range(1, len(jobs) + 1)))
+    entries = tuple(Entry(number, job) for number, job in zip(numbers, jobs, strict=True))
+    stages = data.draw(st.lists(st.sampled_from(Stage), min_size=len(jobs), max_size=len(jobs)))
+    listed = JobList(entries, {"here": goal})
+    progress = Progress(
+        Stage.PAUSED, tuple(JobProgress(n, s, "so") for n, s in zip(numbers, stages, strict=True)), "why"
+    )
+    assert read_jobs(written_jobs(listed, progress), "x") == (listed, progress)
+
+
+def test_a_list_survives_a_restart(tmp_path: Path) -> None:
+    file = JobFile(tmp_path / "deep" / "jobs.json")
+    runner = JobRunner(JobList.of(Move("B"), Wait(), places={"B": Goal(1.0, 2.0, 0.5)}))
+    runner.receive(Command.RUN, now=0.0)
+    file.save(runner.jobs, runner.progress)
+    again = JobRunner()
+    again.receive(Load(*JobFile(file.path).load()), now=0.0)
+    assert again.jobs == runner.jobs
+    assert again.progress.stage is Stage.PAUSED
+    assert [path.name for path in file.path.parent.iterdir()] == ["jobs.json"]
+    assert '"do": "move"' in file.path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "is no list of jobs"),
+        ('{"schema": "vrs.jobs", "version": 1, "list": {"jobs": [{"do": "mo', "is no list of jobs"),
+        ('{"schema": "vrs.jobs", "version": 2}', "version 2; version 1 is read"),
+        ('{"schema": "vrs.jobs", "version": 1, "list": {"jobs": [{"do": "fly", "number": 1}]}}', "fly"),
+        ('{"schema": "vrs.jobs", "version": 1, "list": {"jobs": [{"do": "move", "number": 1, "to": "B"}]}}', "B"),
+        ('{"schema": "vrs.jobs", "version": 1, "list": {"jobs": [{"do": "wait", "number": 0}]}}', "number"),
+        ("[" * 100_000, "is no list of jobs"),
+    ],
+)
+def test_what_is_damaged_says_so_and_is_kept(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "jobs.json"
+    path.write_text(text)
+    file = JobFile(path)
+    with pytest.raises(FormatError, match=says):
+        file.load()
+    assert path.read_text() == text
+    jobs = JobList.of(Wait(1.0))
+    file.save(jobs, Progress.of(jobs))
+    assert (tmp_path / "jobs.json.damaged").read_text() == text
+    assert JobFile(path).load() == (jobs, Progress.of(jobs))
+
+
+def test_there_neednt_be_a_file(tmp_path: Path) -> None:
+    assert JobFile(tmp_path / "none.json").load() == (JobList(), Progress())
+
+
+def test_a_file_that_cant_be_written_says_so(tmp_path: Path) -> None:
+    (tmp_path / "plain").write_text("")
+    with pytest.raises(FormatError, match="can't be written"):
+        JobFile(tmp_path / "plain" / "jobs.json").save(JobList(), Progress())
+
+
+def test_a_directory_in_its_place_is_left_alone(tmp_path: Path) -> None:
+    file = JobFile(tmp_path)
+    with pytest.raises(FormatError, match="can't be read"):
+        file.load()
+    with pytest.raises(FormatError, match="can't be written"):
+        file.save(JobList(), Progress())
+    assert tmp_path.is_dir()

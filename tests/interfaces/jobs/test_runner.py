@@ -1,0 +1,306 @@
+"""The machine that does a list of jobs: what it asks for, what it's told, and laws for whatever comes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from interfaces.jobs import (
+    Arm,
+    Command,
+    Done,
+    End,
+    Failed,
+    Interrupted,
+    Job,
+    JobList,
+    JobRunner,
+    Load,
+    Lost,
+    Message,
+    Move,
+    MoveTo,
+    OperatorLoss,
+    Progress,
+    Request,
+    RunnerConfig,
+    Show,
+    Speak,
+    Stage,
+    Voice,
+    Wait,
+)
+from robots.onboard.journey import Goal
+from vrs.errors import InvalidValueError
+
+A, B = Goal(1.0, 1.0, 0.0), Goal(4.0, 2.0)
+SCENARIO = JobList.of(
+    Move("B"), Voice("Hello!"), Message("Please put the book on my top side!"), Wait(), Move("A"),
+    places={"A": A, "B": B},
+)  # fmt: skip
+
+
+def stages(runner: JobRunner) -> list[str]:
+    return [job.stage.value for job in runner.progress.jobs]
+
+
+def asked(runner: JobRunner, kind: type[Request], now: float) -> Any:
+    """The one request that's due now, of a kind."""
+    (request,) = runner.advance(now=now)
+    assert isinstance(request, kind)
+    return request
+
+
+def test_the_papers_scenario() -> None:
+    runner = JobRunner(SCENARIO)
+    assert runner.receive(Command.RUN, now=0.0) == ""
+    there = asked(runner, MoveTo, 0.0)
+    assert there.goal == B
+    runner.receive(Done(there.attempt), now=9.0)
+    said = asked(runner, Speak, 9.0)
+    assert said.text == "Hello!"
+    runner.receive(Done(said.attempt), now=10.0)
+    assert runner.advance(now=10.0) == (Show("Please put the book on my top side!"),)
+    assert stages(runner) == ["done", "done", "done", "running", "planned"]
+    assert runner.waits_for_key
+    assert runner.next_deadline() is None
+    assert runner.advance(now=5000.0) == ()
+    assert runner.receive(Command.KEY, now=5000.0) == ""
+    back = asked(runner, MoveTo, 5000.0)
+    assert back.goal == A
+    runner.receive(Done(back.attempt), now=5010.0)
+    assert runner.progress.stage is Stage.DONE
+    assert set(stages(runner)) == {"done"}
+    assert "done: run it" in runner.receive(Command.RESUME, now=5011.0)
+
+
+@pytest.mark.parametrize("job", [Move(A), Voice("Hello!"), Wait(5.0), Wait(), Arm("pick")])
+@pytest.mark.parametrize(
+    "how", [Command.ABORT, Command.PAUSE, Interrupted("it touches a chair"), Lost("link loss")]
+)
+def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how: Any) -> None:
+    jobs = JobList.of(Message("Hm"), job, Move(B))
+    runner = JobRunner(jobs)
+    runner.receive(Command.RUN, now=0.0)
+    begun = [request for request in runner.advance(now=0.0) if not isinstance(request, Show)]
+    assert runner.receive(how, now=1.0) == ""
+    ended = [request for request in runner.advance(now=1.0) if not isinstance(request, Show)]
+    assert ended == [End(request.attempt) for request in begun]
+    stage = "aborted" if how is Command.ABORT else "paused"
+    assert stages(runner) == ["done", stage, "planned"]
+    assert runner.progress.stage == stage
+    assert runner.jobs == jobs
+    # Late answers count for nothing.
+    for request in begun:
+        runner.receive(Done(request.attempt), now=2.0)
+    assert runner.advance(now=100.0) == ()
+    assert stages(runner) == ["done", stage, "planned"]
+    # And it can go on.
+    assert runner.receive(Command.RESUME, now=100.0) == ""
+    assert stages(runner) == ["done", "running", "planned"]
+    again = runner.advance(now=100.0)
+    assert [type(request) for request in again] == [type(request) for request in begun]
+
+
+def test_a_wait_that_was_paused_goes_on_with_what_was_left() -> None:
+    runner = JobRunner(JobList.of(Wait(10.0), Voice("Now")))
+    runner.receive(Command.RUN, now=0.0)
+    assert runner.next_deadline() == 10.0
+    runner.receive(Command.PAUSE, now=4.0)
+    assert runner.next_deadline() is None
+    runner.receive(Command.RESUME, now=100.0)
+    assert runner.next_deadline() == 106.0
+    assert runner.advance(now=105.9) == ()
+    assert asked(runner, Speak, 106.0).text == "Now"
+
+
+def test_waits_end_when_they_were_to_however_late_somebody_looks() -> None:
+    runner = JobRunner(JobList.of(Wait(1.0), Wait(2.0), Wait(4.0)))
+    runner.receive(Command.RUN, now=0.0)
+    runner.advance(now=3.5)
+    assert stages(runner) == ["done", "done", "running"]
+    assert runner.next_deadline() == 7.0
+
+
+def test_what_takes_too_long_has_failed_and_is_ended() -> None:
+    runner = JobRunner(JobList.of(Voice("Hello!")), RunnerConfig(longest_voice=30.0))
+    runner.receive(Command.RUN, now=0.0)
+    said = asked(runner, Speak, 0.0)
+    assert runner.advance(now=30.0) == (End(said.attempt),)
+    assert runner.progress.stage is Stage.FAILED
+    assert "longer" in runner.progress.reason
+
+
+def test_a_job_that_fails_says_why_and_can_be_tried_again() -> None:
+    runner = JobRunner(SCENARIO)
+    runner.receive(Command.RUN, now=0.0)
+    first = asked(runner, MoveTo, 0.0)
+    runner.receive(Failed(first.attempt, "there's no way"), now=3.0)
+    assert runner.progress.stage is Stage.FAILED
+    assert runner.progress.reason == "there's no way"
+    assert runner.advance(now=4.0) == ()
+    runner.receive(Command.RESUME, now=5.0)
+    assert asked(runner, MoveTo, 5.0).attempt > first.attempt
+
+
+@pytest.mark.parametrize("loss", OperatorLoss)
+def test_losing_the_operator_follows_the_policy(loss: OperatorLoss) -> None:
+    runner = JobRunner(SCENARIO, RunnerConfig(loss=loss))
+    runner.receive(Command.RUN, now=0.0)
+    first = asked(runner, MoveTo, 0.0)
+    runner.receive(Lost("the link is lost"), now=1.0)
+    if loss is OperatorLoss.STOP:
+        assert runner.advance(now=1.0) == (End(first.attempt),)
+        assert (runner.progress.stage, runner.progress.reason) == (Stage.PAUSED, "the link is lost")
+    else:
+        assert runner.advance(now=1.0) == ()
+        runner.receive(Done(first.attempt), now=2.0)
+        assert asked(runner, Speak, 2.0)
+
+
+def test_a_list_is_edited_where_it_stands_still() -> None:
+    runner = JobRunner(SCENARIO)
+    runner.receive(Command.RUN, now=0.0)
+    first = asked(runner, MoveTo, 0.0)
+    assert "pause or abort" in runner.receive(Load(SCENARIO.removed(3)), now=0.5)
+    runner.receive(Done(first.attempt), now=1.0)
+    runner.receive(Command.PAUSE, now=1.5)
+    edited = SCENARIO.moved(5, 0).changed(2, Voice("Good day!"))
+    assert runner.receive(Load(edited), now=2.0) == ""
+    # The job that was paused is another one now: the list has nothing that's half done.
+    assert runner.progress.stage is Stage.PLANNED
+    runner.receive(Command.RESUME, now=3.0)
+    runner.advance(now=3.0)
+    # What is done stays done, wherever it was put; what was put before it comes first.
+    assert [(entry.number, job.stage) for entry, job in zip(edited.entries, runner.progress.jobs, strict=True)] == [
+        (5, Stage.RUNNING), (1, Stage.DONE), (6, Stage.PLANNED), (3, Stage.PLANNED), (4, Stage.PLANNED)
+    ]  # fmt: skip
+
+
+def test_a_list_that_was_being_done_when_it_was_saved_is_paused() -> None:
+    runner = JobRunner(SCENARIO)
+    runner.receive(Command.RUN, now=0.0)
+    other = JobRunner()
+    assert other.receive(Load(runner.jobs, runner.progress), now=0.0) == ""
+    assert other.progress.stage is Stage.PAUSED
+    assert "anew" in other.progress.reason
+    assert other.advance(now=1.0) == ()
+    assert other.receive(Command.RESUME, now=2.0) == ""
+    assert asked(other, MoveTo, 2.0).goal == B
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [(Command.RUN, "no job"), (Command.PAUSE, "isn't being done"), (Command.RESUME, "no job"),
+     (Command.ABORT, "isn't being done"), (Command.KEY, "waits for the key")],
+)  # fmt: skip
+def test_what_cant_be_done_now_says_why(command: Command, says: str) -> None:
+    assert says in JobRunner().receive(command, now=0.0)
+
+
+def test_edits_make_lists_that_are_whole() -> None:
+    jobs = SCENARIO.added(Wait(1.0), 0)
+    assert [entry.number for entry in jobs.entries] == [6, 1, 2, 3, 4, 5]
+    assert jobs.moved(6, 5).entries[5].job == Wait(1.0)
+    assert jobs.removed(6) == SCENARIO
+    with pytest.raises(InvalidValueError, match="place of this list"):
+        jobs.added(Move("C"))
+    with pytest.raises(InvalidValueError, match="of this list"):
+        jobs.removed(77)
+    with pytest.raises(InvalidValueError, match="at most 64"):
+        JobList.of(*[Wait(1.0)] * 65)
+
+
+JOBS = st.sampled_from([Move(A), Move("A"), Voice("Hi"), Message("Look"), Wait(), Wait(0.0), Wait(3.0), Arm("p")])
+
+
+class Doing(RuleBasedStateMachine):
+    """Whatever is asked and answered, in whatever order, what is asked for is ended, answered or running."""
+
+    @initialize(jobs=st.lists(JOBS, max_size=5), loss=st.sampled_from(OperatorLoss))
+    def begin(self, jobs: list[Job], loss: OperatorLoss) -> None:
+        self.runner = JobRunner(JobList.of(*jobs, places={"A": A}), RunnerConfig(loss=loss, longest_move=20.0))
+        self.now = 0.0
+        self.open: set[int] = set()
+        self.over: set[int] = set()
+
+    def take(self) -> None:
+        for request in self.runner.advance(now=self.now):
+            if isinstance(request, End):
+                assert request.attempt in self.open
+                self.open.remove(request.attempt)
+                self.over.add(request.attempt)
+            elif not isinstance(request, Show):
+                assert request.attempt not in self.open | self.over
+                self.open.add(request.attempt)
+
+    @rule(command=st.sampled_from(Command))
+    def command(self, command: Command) -> None:
+        before = self.runner.progress
+        refused = self.runner.receive(command, now=self.now)
+        if refused:
+            assert self.runner.progress == before
+        elif command is Command.ABORT:
+            assert self.runner.progress.stage is Stage.ABORTED
+        self.take()
+
+    @precondition(lambda self: self.open)
+    @rule(well=st.booleans())
+    def answer(self, well: bool) -> None:
+        attempt = self.open.pop()
+        self.over.add(attempt)
+        self.runner.receive(Done(attempt) if well else Failed(attempt, "so"), now=self.now)
+        self.take()
+
+    @precondition(lambda self: self.over)
+    @rule(data=st.data(), well=st.booleans())
+    def answer_late(self, data: st.DataObject, well: bool) -> None:
+        before = self.runner.progress
+        attempt = data.draw(st.sampled_from(sorted(self.over)))
+        self.runner.receive(Done(attempt) if well else Failed(attempt, "so"), now=self.now)
+        assert self.runner.progress == before
+
+    @rule(message=st.sampled_from([Lost("gone"), Interrupted("touched")]))
+    def trouble(self, message: Lost | Interrupted) -> None:
+        self.runner.receive(message, now=self.now)
+        self.take()
+        if isinstance(message, Interrupted) or self.runner.config.loss is OperatorLoss.STOP:
+            assert not self.open
+
+    @rule(dt=st.sampled_from([0.1, 1.0, 10.0]))
+    def wait(self, dt: float) -> None:
+        self.now += dt
+        self.take()
+
+    @precondition(lambda self: not self.runner.running)
+    @rule(job=JOBS)
+    def add(self, job: Job) -> None:
+        assert not self.runner.receive(Load(self.runner.jobs.added(job)), now=self.now)
+
+    @precondition(lambda self: not self.runner.running)
+    @rule()
+    def restart(self) -> None:
+        progress = self.runner.progress
+        assert not self.runner.receive(Load(self.runner.jobs, progress), now=self.now)
+        assert self.runner.progress == progress
+
+    @invariant()
+    def whole(self) -> None:
+        if not hasattr(self, "runner"):
+            return
+        progress: Progress = self.runner.progress
+        assert [job.number for job in progress.jobs] == [entry.number for entry in self.runner.jobs.entries]
+        running = [job for job in progress.jobs if job.stage is Stage.RUNNING]
+        assert len(running) == (1 if self.runner.running else 0)
+        assert len(self.open) <= len(running)
+        deadline = self.runner.next_deadline()
+        assert deadline is None or deadline > self.now or deadline == -math.inf
+
+
+TestDoing = Doing.TestCase
+TestDoing.settings = settings(max_examples=60, stateful_step_count=25, deadline=None)

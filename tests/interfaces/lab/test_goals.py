@@ -1,0 +1,89 @@
+"""`vrs lab goals`: small cases of its trips, its yardstick, and the same bytes with one worker and two."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from interfaces.cli.main import app
+from interfaces.lab import Study, reproduce
+from interfaces.lab.claims import Paper, Part
+from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, setting
+from interfaces.lab.goals.shortest import Shortest
+from interfaces.lab.goals.study import EACH, conclude_asked, measure, study_of, write
+from robots.bullet.rooms import Block, Room
+from vrs.errors import InvalidValueError
+
+
+def test_the_shortest_way_round_a_box_is_that_of_geometry() -> None:
+    square = Room("square", 6.0, 6.0, blocks=(Block("box", 3.0, 3.0, 2.0, 2.0, 0.0, 1.0),))
+    radius = 0.3
+    found = Shortest(square, radius).length((1.0, 3.0), (5.0, 3.0))
+    # A tangent to the circle about each corner, its arc, and the side between them.
+    far = math.hypot(1.0, 1.0)
+    arc = math.pi / 4 + math.asin(radius / far)
+    exact = 2 * math.sqrt(far**2 - radius**2) + 2.0 + 2 * radius * arc
+    assert found == pytest.approx(exact, rel=0.02)
+    assert Shortest(square, 2.0).length((1.0, 3.0), (5.0, 3.0)) == math.inf
+    assert Shortest(square, 0.1).length((0.5, 0.5), (5.5, 0.5)) == pytest.approx(5.0, abs=0.03)
+
+
+def test_settings_repeat_and_are_what_their_group_says() -> None:
+    for group in (FURNITURE, ROUND):
+        one, other = setting(group, 3, 1), setting(group, 3, 1)
+        assert (one.start, one.goal, one.room) == (other.start, other.goal, other.room)
+        assert setting(group, 4, 1).start != one.start
+    closed = setting(ROUND, 3, 1).room
+    assert sum(door.share(100.0) == 0.0 for door in closed.doors) == 3
+    late = setting(LATE, 3, 1).room
+    assert sum(door.share(0.0) < door.share(100.0) for door in late.doors) == 1
+    assert setting(PHYSICS, 3, 0).robot == "ipr"
+
+
+@pytest.mark.parametrize("group", [FURNITURE, PHYSICS])
+def test_a_goal_is_reached_and_nothing_is_touched(group: str) -> None:
+    found = measure(Study(11), f"{group}:2")
+    assert found.trip.arrived, found.trip.reason
+    assert not found.trip.touched
+    assert 0.98 <= found.ratio <= 1.15
+    assert found.trip.lost < 0.06
+    assert np.hypot(*(found.trip.track[-1, :2] - (found.setting.goal.x, found.setting.goal.y))) == found.trip.off
+
+
+def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
+    paper = Paper(
+        "goals",
+        "two trips",
+        (Part("goals", measure, conclude_asked, (f"{FURNITURE}:0", f"{ROUND}:1")),),
+    )
+    written = []
+    for workers in (1, 2):
+        out = tmp_path / str(workers)
+        out.mkdir()
+        write(reproduce(paper, Study(5), workers=workers), out)
+        written.append({file.name: file.read_bytes() for file in sorted(out.iterdir())})
+    assert written[0] == written[1]
+    assert {"summary.json", "runs.csv", "goals_furniture.svg", "goals_round.svg"} <= set(written[0])
+    rows = written[0]["runs.csv"].decode().splitlines()
+    assert rows[0] == ",".join(EACH)
+    assert len(rows) == 3
+    claims = json.loads(written[0]["summary.json"])["claims"]
+    assert claims[0]["measured"] == 2
+
+
+def test_a_study_has_as_many_goals_as_are_asked_for() -> None:
+    for goals in (2, 10, 100):
+        assert len(study_of(goals).parts[0].cases) == max(goals, 3)
+
+
+@pytest.mark.parametrize("option", [["--architecture", "III"], ["--length", "20"], ["--record"]])
+def test_options_of_other_experiments_are_refused(tmp_path: Path, option: list[str]) -> None:
+    found = CliRunner().invoke(app, ["lab", "goals", "--out", str(tmp_path / "o"), *option])
+    assert isinstance(found.exception, InvalidValueError)
+    assert "goals" in str(found.exception)
+    assert not (tmp_path / "o").exists()

@@ -1,0 +1,160 @@
+"""Goals and jobs in a real browser: clicked on the map, listed, tried, done, and there again after a restart."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_core_python.sync_playwright import Axe
+
+from robots import ipr
+from tests.interfaces.live_rig import Child, child
+from tests.interfaces.station.opened import Page, paged, station
+
+SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--port", "0")
+A, B = (4.7, 5.3), (4.8, 6.1, math.pi / 2)
+"""Of the scenario, in the hall: B is before the front door."""
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("jobs") / "jobs.json"
+
+
+@pytest.fixture(scope="module")
+def server(kept: Path) -> Iterator[Child]:
+    home = (Path(ipr.__file__).parent / "rooms" / "home.room").read_text()
+    room = kept.with_name("hall.room")
+    hall = home.replace("start 1.2 5.4 0", "start 4.65 5.0 90").replace("place A 1.2 5.4 0", "place A 4.7 5.3")
+    room.write_text(hall)
+    with child(*SERVE, "--room", str(room), "--jobs", str(kept)) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, server: Child) -> Iterator[Page]:
+    with paged(browser, station(server)) as opened:
+        opened.open()
+        opened.wait("Boolean(station.session.state.real && station.session.plan && station.session.tasks.loss)")
+        yield opened
+
+
+def on_map(page: Page, x: float, y: float) -> tuple[float, float]:
+    """Where a place of the map is on the page."""
+    found = page.get(
+        f"(() => {{ const p = new DOMPoint({x}, {y}).matrixTransform("
+        "document.querySelector('#map g').getScreenCTM()); return [p.x, p.y]; })()"
+    )
+    return found[0], found[1]
+
+
+def real(page: Page) -> list[float]:
+    found: list[float] = page.get("station.session.state.real")
+    return found
+
+
+def accessible(page: Page) -> None:
+    found = Axe().run(page.page, context="#side")["violations"]
+    assert found == [], [(v["id"], v["nodes"][0]["html"]) for v in found]
+
+
+def test_a_click_on_the_map_sends_the_robot_there_and_a_drag_says_how_it_stands(page: Page) -> None:
+    page.page.click("#tab-map")
+    page.wait("Boolean(document.querySelector('.plan-things')?.getAttribute('d'))")
+    page.page.mouse.click(*on_map(page, 4.65, 5.5))
+    assert "Take control first" in page.page.locator("#goal-fault").text_content()
+    page.take_control()
+    page.page.mouse.move(*on_map(page, 4.65, 5.5))
+    page.page.mouse.down()
+    page.page.mouse.move(*on_map(page, 4.4, 6.3), steps=4)
+    page.page.mouse.up()
+    page.wait("station.session.tasks.doing === 'goal'")
+    page.wait("station.session.tasks.route?.length >= 2")
+    page.shoot("map")
+    accessible(page)
+    assert "On its way" in page.page.locator("#journey").text_content()
+    page.wait("station.session.tasks.journey === 'arrived'")
+    x, y, theta = real(page)
+    # A pixel of this map is 3 cm.
+    assert math.dist((x, y), (4.65, 5.5)) < 0.08
+    assert abs(math.remainder(theta - math.atan2(0.8, -0.25), math.tau)) < math.radians(6)
+    page.wait("Boolean(station.session.seen?.points?.length > 20 && station.session.seen.doubt)")
+    # A typed goal in a wall is refused with a reason, and the space bar ends one that's under way.
+    page.page.fill("#goal-x", "4.7")
+    page.page.fill("#goal-y", "4.3")
+    page.page.click("#goal-go")
+    page.wait("station.session.tasks.doing === 'goal'")
+    page.page.evaluate("document.activeElement.blur()")
+    page.page.keyboard.press("Space")
+    page.wait("(station.session.tasks.doing ?? 'nothing') === 'nothing'")
+    page.wait("!station.session.state.halted")
+    page.page.fill("#goal-x", "3.6")
+    page.page.fill("#goal-y", "4.0")
+    page.page.click("#goal-go")
+    # It may wait a while first: what stands there may go.
+    page.wait("['waiting', 'failed'].includes(station.session.tasks.journey)")
+    assert "can't turn" in page.page.locator("#journey").text_content()
+
+
+def add(page: Page, kind: str, text: str) -> None:
+    count = page.page.locator("#jobs li").count()
+    page.page.select_option("#job-kind", kind)
+    page.page.fill("#job-text", text)
+    page.page.click("#job-add-it")
+    page.until(lambda: page.page.locator("#jobs li").count() == count + 1)
+
+
+def stages(page: Page) -> list[str | None]:
+    return [item.get_attribute("data-stage") for item in page.page.locator("#jobs li").all()]
+
+
+def stands_at(page: Page, place: tuple[float, float, float]) -> bool:
+    x, y, theta = real(page)
+    return math.dist((x, y), place[:2]) < 0.05 and abs(math.remainder(theta - place[2], math.tau)) < math.radians(2)
+
+
+def test_the_papers_scenario_is_listed_tried_and_done(page: Page, kept: Path) -> None:
+    page.page.click("#theme")
+    page.page.click("#tab-jobs")
+    add(page, "wait", "key")
+    add(page, "move", "B")
+    add(page, "voice", "Hello!")
+    add(page, "message", "Please put the book on my top side!")
+    add(page, "move", "A")
+    for place in (1, 2, 3):
+        page.page.click(f"[aria-label='Later job {place}']")
+    page.wait("station.session.tasks.jobs.jobs.map((job) => job.do).join() === 'move,voice,message,wait,move'")
+    page.page.fill("#job-text", "nowhere")
+    page.page.click("#job-add-it")
+    assert "no place of this list" in page.page.locator("#jobs-fault").text_content()
+    page.page.click("#jobs-dry-run")
+    page.wait("station.session.tasks.forecast?.length === 5")
+    assert "and what nobody knows" in page.page.locator("#jobs-stage").text_content()
+    page.page.evaluate(
+        "window.said = new Set(); setInterval(() => said.add(station.shared.camera.facts?.saying), 20)"
+    )
+    page.page.click("#jobs-run")
+    page.wait("station.session.tasks.progress.jobs[3].stage === 'running'")
+    page.wait("!document.getElementById('jobs-key').disabled")
+    assert stands_at(page, B)
+    assert page.page.locator("#jobs-shows").text_content() == "Please put the book on my top side!"
+    page.wait("said.has('Hello!')")
+    page.wait("document.getElementById('robot-screen').textContent === 'Please put the book on my top side!'")
+    page.shoot("jobs")
+    accessible(page)
+    page.page.evaluate("document.activeElement.blur()")
+    page.page.keyboard.press("Enter")
+    page.wait("station.session.tasks.progress.jobs[4].stage === 'running'")
+    page.page.click("#jobs-pause")
+    page.wait("station.session.tasks.progress.stage === 'paused'")
+    page.page.click("#jobs-resume")
+    page.wait("station.session.tasks.progress.stage === 'done'")
+    assert math.dist(real(page)[:2], A) < 0.05
+    page.until(lambda: stages(page) == ["done"] * 5)
+    written = json.loads(kept.read_text())
+    assert [job["do"] for job in written["list"]["jobs"]] == ["move", "voice", "message", "wait", "move"]
+    assert written["progress"]["stage"] == "done"

@@ -1,0 +1,302 @@
+"""A mobile robot that drives to goals and does jobs by itself, in virtual time: orders, stops, a lost operator."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+
+from interfaces.jobs import (
+    Arm,
+    Command,
+    Job,
+    JobList,
+    Load,
+    Message,
+    Move,
+    OperatorLoss,
+    RunnerConfig,
+    Stage,
+    Voice,
+    Wait,
+)
+from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
+from interfaces.teleop.architectures import DriveOrders, Packet
+from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
+from interfaces.teleop.tasks import Doing, Go
+from robots.ipr.parameters import IPR_LIMITS
+from robots.onboard.driving import Posture
+from robots.onboard.journey import Goal, JourneyState
+from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
+
+THERE = Goal(2.0, 4.0, math.pi / 2)
+FAR = Goal(7.0, 1.0, 0.0)
+
+
+def stands(rig: Rig) -> bool:
+    """Whether the body stays where it is for a second."""
+    before = rig.truth
+    rig.run(1.0)
+    return math.dist(before[:2], rig.truth[:2]) < 1e-3
+
+
+def within_limits(rig: Rig) -> bool:
+    most = IPR_LIMITS.a_max * CONTROL * TURN + 1e-9
+    return all(abs(b[0] - a[0]) <= most for a, b in pairwise(rig.drives))
+
+
+def report(rig: Rig) -> tuple[JourneyState, str]:
+    tasks = rig.operator.tasks
+    assert tasks is not None
+    return tasks.journey, tasks.reason
+
+
+def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
+    rig = Rig()
+    rig.begin()
+    assert rig.operator.order(Go(THERE)) == ""
+    rig.run(2.0)
+    assert rig.operator.halted == BY_ITSELF
+    assert rig.operator.doing is Doing.GOAL
+    assert rig.operator.tasks is not None
+    assert rig.operator.tasks.route[-1] == (THERE.x, THERE.y)
+    assert rig.operator.virtual(rig.now) == rig.operator.report.posture  # type: ignore[union-attr]
+    rig.run(25.0)
+    assert report(rig) == (JourneyState.ARRIVED, "")
+    assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) < 0.05
+    assert abs(math.remainder(rig.truth[2] - math.pi / 2, math.tau)) < math.radians(2)
+    assert within_limits(rig)
+    assert rig.operator.halted == STOPPED
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(2.0, rig.wish(-0.3, 0.0))
+    assert rig.truth[1] < 3.9
+
+
+def test_a_goal_behind_a_wall_is_driven_round_it_and_one_in_it_is_refused_with_a_reason() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.operator.order(Go(FAR))
+    rig.run(60.0)
+    assert report(rig)[0] is JourneyState.ARRIVED
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(0.5)
+    rig.operator.order(Go(Goal(4.1, 1.0)))
+    rig.run(1.0)
+    state, reason = report(rig)
+    assert state is JourneyState.FAILED
+    assert "can't turn" in reason
+    assert stands(rig)
+
+
+def test_a_goal_given_while_driving_waits_until_the_robot_rests_and_the_wheel_takes_over() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.run(2.0, rig.wish(0.4, 0.3))
+    rig.operator.order(Go(THERE))
+    rig.run(4.0)
+    assert rig.operator.doing is Doing.GOAL
+    assert within_limits(rig)
+    # A wish to stand takes nothing over; one to drive does.
+    rig.operator.wish(0.0, 0.0, issued_at=rig.now, now=rig.now)
+    assert rig.operator.doing is Doing.GOAL
+    assert STOPPED in rig.operator.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
+    rig.run(3.0)
+    assert rig.autonomy.doing is Doing.NOTHING
+    assert stands(rig)
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(1.0, rig.wish(0.2, 0.0))
+
+
+def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None:
+    rig = Rig(hold=True)
+    way = Conditions(delay=delay_profile("mon"), loss=loss_model("0.3"))
+    rig.begin()
+    rig.line.change(LinkConditions.symmetric(way), now=rig.now)
+    jobs = JobList.of(Voice("Hello!"), Move(THERE), Wait(1.0))
+    assert rig.operator.order(Load(jobs), Command.RUN) == ""
+    rig.run(30.0)
+    tasks = rig.operator.tasks
+    assert tasks is not None
+    assert tasks.progress.stage is Stage.DONE
+    assert rig.operator.doing is Doing.NOTHING
+
+
+@pytest.mark.parametrize("job", [Move(THERE), Voice("A rather long text that takes a while"), Wait(30.0), Wait()])
+@pytest.mark.parametrize("stop", ["abort", "pause", "stop", "wheel", "touch"])
+def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_intact(job: Job, stop: str) -> None:
+    rig = Rig()
+    rig.begin()
+    jobs = JobList.of(Message("Look"), job, Move(FAR))
+    rig.operator.order(Load(jobs), Command.RUN)
+    rig.run(2.0)
+    assert rig.operator.doing is Doing.JOBS
+    if stop in {"abort", "pause"}:
+        rig.operator.order(Command(stop))
+    elif stop == "stop":
+        rig.operator.stop()
+    elif stop == "wheel":
+        rig.operator.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
+    else:
+        rig.host.halt("the robot touches something: chair", now=rig.now + rig.AHEAD)
+    rig.run(1.5)
+    assert stands(rig)
+    assert within_limits(rig)
+    tasks = rig.operator.tasks
+    assert tasks is not None
+    assert tasks.progress.stage is (Stage.ABORTED if stop == "abort" else Stage.PAUSED)
+    assert rig.autonomy._runner.jobs == jobs
+    assert not rig.hands.speaker.is_speaking(now=rig.now)
+    assert not tasks.says
+    # And it goes on under a new drive.
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(0.5)
+    assert rig.operator.order(Command.RESUME) == ""
+    rig.run(1.0)
+    assert rig.operator.doing is Doing.JOBS
+
+
+def test_a_job_without_an_arm_fails_and_says_so() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.operator.order(Load(JobList.of(Arm("pick"), Move(THERE))), Command.RUN)
+    rig.run(1.0)
+    tasks = rig.operator.tasks
+    assert tasks is not None
+    assert (tasks.progress.stage, tasks.progress.jobs[0].stage) == (Stage.FAILED, Stage.FAILED)
+    assert "no arm" in tasks.progress.reason
+    assert stands(rig)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+@pytest.mark.parametrize("loss", OperatorLoss)
+@pytest.mark.parametrize("jobs", [True, False])
+def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, jobs: bool) -> None:
+    rig = Rig(hold=hold, jobs=RunnerConfig(loss=loss))
+    rig.begin()
+    listed = JobList.of(Move(THERE), Wait(), Voice("Hi"))
+    rig.operator.order(*((Load(listed), Command.RUN) if jobs else (Go(THERE),)))
+    rig.run(2.0)
+    rig.line.connected = False
+    rig.run(4.0)
+    if loss is OperatorLoss.STOP:
+        assert stands(rig)
+        assert rig.autonomy.doing is Doing.NOTHING
+        assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) > 0.3
+        rig.line.connected = True
+        rig.run(2.0)
+        assert stands(rig)
+        if jobs:
+            assert rig.operator.tasks is not None
+            assert rig.operator.tasks.progress.stage is Stage.PAUSED
+    else:
+        rig.run(20.0)
+        assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) < 0.05
+        rig.line.connected = True
+        rig.run(2.0)
+        if jobs:
+            # It's heard again, and may end its waiting.
+            assert rig.operator.doing is Doing.JOBS
+            assert rig.operator.order(Command.KEY) == ""
+            rig.run(3.0)
+            assert rig.operator.tasks is not None
+            assert rig.operator.tasks.progress.stage is Stage.DONE
+        assert rig.autonomy.doing is Doing.NOTHING
+    # Nothing moves any more before somebody says so.
+    rig.run(1.0)
+    assert stands(rig)
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(1.0)
+    assert rig.operator.order(Go(FAR)) == ""
+    rig.run(2.0)
+    assert rig.operator.doing is Doing.GOAL
+
+
+def test_what_was_told_just_before_the_link_broke_doesnt_begin_when_it_is_back() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.line.connected = False
+    rig.operator.order(Go(THERE))
+    rig.run(3.0)
+    rig.line.connected = True
+    rig.run(3.0)
+    assert stands(rig)
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(2.0)
+    assert rig.autonomy.doing is Doing.NOTHING
+    assert stands(rig)
+
+
+def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_takes_long() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.operator.order(Load(JobList.of(Move(THERE))), Command.RUN)
+    rig.run(4.0)
+    rig.operator.order(Command.PAUSE)
+    while rig.operator.halted != STOPPED:
+        rig.run(0.05)
+    assert rig.operator.order(Command.RESUME) == ""
+    assert rig.operator.doing is Doing.NOTHING
+    rig.run(2.0)
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(1.0)
+    assert rig.operator.doing is Doing.JOBS
+    rig.operator.stop()
+    rig.operator.order(Go(FAR))
+    rig.run(6.0)
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(1.0)
+    assert rig.operator.doing is Doing.NOTHING
+    # A stop forgets it.
+    rig.operator.stop()
+    rig.operator.order(Go(FAR))
+    rig.operator.stop()
+    rig.run(1.0)
+    assert rig.operator.resume(now=rig.now) == ""
+    rig.run(1.0)
+    assert rig.operator.doing is Doing.NOTHING
+
+
+def test_what_stops_counts_however_old_it_is_and_nothing_else_does() -> None:
+    rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
+    rig.begin()
+    rig.operator.order(Load(JobList.of(Wait(), Move(FAR))), Command.RUN)
+    rig.run(1.0)
+    rig.line.change(LinkConditions.symmetric(Conditions(delay=delay_profile("constant:1.0"))), now=rig.now)
+    rig.run(4.0)
+    assert rig.autonomy.doing is Doing.JOBS
+    rig.operator.order(Command.KEY)
+    rig.run(3.0)
+    assert rig.autonomy.report().progress.jobs[0].stage is Stage.RUNNING, "too old to move anything"
+    rig.operator.order(Command.ABORT)
+    rig.run(3.0)
+    assert rig.autonomy.report().progress.stage is Stage.ABORTED
+    assert stands(rig)
+
+
+def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> None:
+    rig = Rig(hold=True)
+    rig.begin()
+    rig.operator.order(Load(JobList.of(Wait())), Command.RUN)
+    rig.run(1.0)
+    robot, (x, y, theta) = rig.robot, rig.truth
+    epoch = robot.epoch
+    start = Posture(x, y, theta)
+    robot.receive(DriveOrders(epoch + 1, 1, rig.now, rig.now, start, Packet((), 0.0)), now=rig.now)
+    assert robot.epoch == epoch
+    assert rig.autonomy.doing is Doing.JOBS
+
+
+def test_another_operator_finds_the_list_paused() -> None:
+    rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
+    rig.begin()
+    rig.operator.order(Load(JobList.of(Move(THERE))), Command.RUN)
+    rig.run(2.0)
+    rig.line.connected = False
+    rig.run(2.5)
+    assert rig.autonomy.doing is Doing.JOBS
+    assert rig.host.hello("another", now=rig.now + rig.AHEAD) == ""
+    rig.run(3.0)
+    assert rig.autonomy.doing is Doing.NOTHING
+    assert rig.autonomy.report().progress.stage is Stage.PAUSED
+    assert stands(rig)

@@ -1,0 +1,143 @@
+"""A mobile robot live, driven and sent about by `connect_mobile`; losing the operator follows the policy."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from interfaces import connect_mobile
+from interfaces.jobs import Command, Forecast, JobFile, JobList, Move, OperatorLoss, RunnerConfig, Stage, Wait
+from interfaces.lab.driving.run import CONTROL
+from interfaces.link import LinkConditions
+from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
+from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
+from interfaces.runtime.live.robot_server import LARGEST
+from interfaces.stream import sockets
+from interfaces.stream.access import OPEN, Access, hosts
+from interfaces.stream.control import Lease, Problem, Role
+from interfaces.stream.line import UnreachableError
+from interfaces.stream.mobile_connect import MobileConnection
+from interfaces.stream.server import application
+from interfaces.stream.tasks import Tasks
+from interfaces.teleop.driving import DrivenConfig
+from interfaces.teleop.tasks import Doing
+from robots import ipr
+from robots.bullet.rooms import EMPTY
+from robots.ipr.robot import place
+from robots.onboard.journey import Goal, JourneyState
+from tests.interfaces.stream.served import served
+from tests.interfaces.stream.serving import Serving, beside
+from vrs.errors import InvalidValueError
+
+ROOM = place("empty")
+HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
+
+
+@asynccontextmanager
+async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
+    """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
+    robot_at, at = (sockets.bind("127.0.0.1", 0) for _ in range(2))
+    config = LiveMobileConfig(ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
+    robot = LiveMobileRobot(config, Access(free={Role.SITE}))
+    port, own = robot_at.getsockname()[1], at.getsockname()[1]
+    operator = LiveMobileOperator(
+        LiveMobileOperatorConfig(
+            ipr.model(), ROOM, f"ws://127.0.0.1:{port}/site", LinkConditions(), jobs=JobFile(jobs)
+        ),
+        Access(free=OPEN),
+    )
+    async with (
+        sockets.serve(application(robot.routes, hosts(["127.0.0.1"], port)), robot_at, largest=LARGEST),
+        robot.running(),
+        sockets.serve(application(operator.routes, hosts(["127.0.0.1"], own)), at),
+        operator.running(),
+    ):
+        yield Serving(own)
+
+
+def met(url: str, name: str) -> MobileConnection:
+    """A connection whose robot has been met."""
+    robot = connect_mobile(url, name=name, timeout=20.0)
+    assert robot.wait(lambda it: it.postures is not None and it.postures.real is not None, 30.0)
+    return robot
+
+
+def controlled(robot: MobileConnection) -> None:
+    """Have control, with a drive begun or jobs going on."""
+
+    def has(_: MobileConnection) -> bool:
+        answer = robot.acquire()
+        return isinstance(answer, Lease) and answer.yours
+
+    end = time.monotonic() + 20.0
+    while not has(robot):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
+
+
+@pytest.mark.parametrize("loss", OperatorLoss)
+def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss) -> None:
+    with beside(both(loss, tmp_path / "jobs.json")) as serving:
+        with met(serving.url, "watcher") as watcher:
+            with met(serving.url, "driver") as robot:
+                assert robot.welcome.robot == "ipr"
+                assert isinstance(robot.go(THERE), Problem)
+                controlled(robot)
+                assert isinstance(watcher.go(THERE), Problem)
+                if loss is OperatorLoss.STOP:
+                    going = robot.go(Goal(1.7, 3.0))
+                    assert isinstance(going, Tasks)
+                    assert robot.wait(lambda it: it.tasks is not None and it.tasks.doing is Doing.GOAL, 10.0)
+                    # Who takes the wheel drives.
+                    robot.drive(0.0, 0.3, wait=5.0)
+                    assert robot.finished(10.0)
+                    assert robot.tasks is not None
+                    assert robot.tasks.journey is JourneyState.ENDED
+                    assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
+                assert isinstance(robot.load(JobList.of(Move(THERE), Wait())), Tasks)
+                assert isinstance(robot.dry_run(), Forecast)
+                assert isinstance(robot.do(Command.KEY), Problem)
+                assert isinstance(robot.do(Command.RUN), Tasks)
+                assert watcher.wait(lambda it: it.tasks is not None and it.tasks.left > 0, 20.0)
+                assert watcher.tasks is not None
+                assert watcher.tasks.loss is loss
+            # The driver has gone, in the middle of the move.
+            if loss is OperatorLoss.STOP:
+                assert watcher.wait(
+                    lambda it: it.tasks is not None and it.tasks.progress.stage is Stage.PAUSED, 20.0
+                )
+            else:
+                assert watcher.wait(
+                    lambda it: it.tasks is not None and it.tasks.progress.jobs[0].stage == "done", 40.0
+                )
+                assert watcher.seen is not None
+                assert watcher.plan is not None
+                # Whoever has control next takes it up.
+                controlled(watcher)
+                assert isinstance(watcher.do(Command.KEY), Tasks)
+            assert watcher.finished(20.0)
+            assert watcher.postures is not None
+            assert watcher.postures.real is not None
+            off = abs(watcher.postures.real.x - THERE.x)
+            assert off < 0.05 if loss is OperatorLoss.CARRY_ON else off > 0.1
+        jobs, progress = JobFile(tmp_path / "jobs.json").load()
+        assert jobs.entries == JobList.of(Move(THERE), Wait()).entries
+        assert progress.stage is (Stage.PAUSED if loss is OperatorLoss.STOP else Stage.DONE)
+
+
+def test_an_arm_is_no_mobile_robot() -> None:
+    with served() as serving, pytest.raises(UnreachableError, match=r"use interfaces\.connect"):
+        connect_mobile(f"127.0.0.1:{serving.port}")
+
+
+def test_a_robot_finds_its_place_by_its_laser_where_there_is_something_to_see() -> None:
+    assert LiveMobileConfig(ROOM).position == "laser"
+    assert LiveMobileConfig(EMPTY).position == "fused"
+    assert LiveMobileConfig(ROOM, position="truth").position == "truth"
+    with pytest.raises(InvalidValueError, match="odometry"):
+        LiveMobileConfig(ROOM, position="stars")
