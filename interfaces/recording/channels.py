@@ -121,6 +121,9 @@ def _plain(schema: dict[str, Any], parts: dict[str, Any]) -> dict[str, Any] | No
     if "enum" in schema:
         return {"type": "string"} if all(isinstance(one, str) for one in schema["enum"]) else None
     kept = {key: schema[key] for key in ("type", *_RANGES) if key in schema}
+    if schema.get("type") == "number":
+        # Of 0 and 0.0 in two equal types, typing knows the one that was written first.
+        kept |= {key: float(kept[key]) for key in _RANGES if key in kept}
     if abs(kept.get("maximum", 0)) >= _ENDLESS:
         kept = {"type": schema["type"]}
     kind = schema.get("type")

@@ -6,8 +6,10 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Annotated
 
 import jsonschema
+import msgspec
 import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
@@ -16,7 +18,7 @@ from mcap.stream_reader import StreamReader
 
 from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording import messages as m
-from interfaces.recording.channels import CHANNELS
+from interfaces.recording.channels import CHANNELS, Channel
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.poses import quaternions
 from tests.interfaces.recording import recorded, shown
@@ -116,6 +118,18 @@ def test_a_schema_says_what_foxglove_can_read(channel, robot) -> None:
     assert schema["title"] == channel.schema
     check(schema)
     jsonschema.Draft202012Validator.check_schema(schema)
+
+
+class _Share(msgspec.Struct):
+    """A number within whole bounds."""
+
+    share: Annotated[float, msgspec.Meta(ge=0, le=1)]
+
+
+def test_bounds_of_numbers_are_written_in_one_way() -> None:
+    """Of two that are equal, typing knows the first that was written: a file would hang on the order of imports."""
+    channel = Channel("/share", "vrs.Share", (_Share,), ())
+    assert b'"minimum":0.0,"maximum":1.0' in channel.json_schema((_Share,))
 
 
 def test_a_schema_refuses_what_is_no_such_message() -> None:
