@@ -30,14 +30,14 @@ _DENSE = 1024
 _GATHERED = 2048
 """Times whose coefficients are gathered at once from several nodes, _DENSE or more: 0.4 MB for six joints."""
 
-_CELLS = 4
+_CELLS = 2
 """Cells of an index a segment."""
 
 Columns: TypeAlias = tuple[float, float, "array[float]", "array[int]", Any]
 """An index: start of the first segment [s]; cells of the grid a second; starts [s], then NaN; how many start before
 each cell, or with it; the coefficients of each segment."""
 
-Places: TypeAlias = tuple["array[float]", list["Index"], list[Node]]
+Places: TypeAlias = tuple[list[float], list["Index"], list[Node]]
 """The nodes of height 1: when the first segment of each starts [s], their indexes, and themselves."""
 
 _Integers: TypeAlias = NDArray[np.int64]
@@ -205,7 +205,7 @@ def places_of(root: Node, height: int) -> Places:
     for node, offset in level:
         if node.index is None or node.index.offset != offset:
             node.index = Index(offset)
-    firsts = array("d", [first_start(node, 1, offset) for node, offset in level])
+    firsts = [first_start(node, 1, offset) for node, offset in level]
     return firsts, [node.index for node, _ in level], [node for node, _ in level]
 
 

@@ -168,14 +168,15 @@ class Timeline(Track[PolynomialSegment]):
                     cell = int((t - first) * scale)
                     i = grid[cell]
                     low, high = starts[i - 1], starts[i]
-                    if high <= t:
-                        i = bisect_right(starts, t, i, grid[cell + 1])
-                        low, high = starts[i - 1], starts[i]
+                    if low <= t < high:
+                        return low, high, rows[i - 1]
+                    i = bisect_right(starts, t, i, grid[cell + 1])
+                    low, high = starts[i - 1], starts[i]
+                    if low <= t < high:
+                        return low, high, rows[i - 1]
                 except (IndexError, ValueError, OverflowError):
-                    # Before or after all, or no finite number.
-                    low = high = math.nan
-                if low <= t < high:
-                    return low, high, rows[i - 1]
+                    # Before or after all, or no finite number: what follows knows.
+                    pass
         if not self._first <= t < self._end:
             if not math.isfinite(t):
                 raise NonFiniteTimeError(t)
