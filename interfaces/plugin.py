@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import sys
 from collections.abc import Callable
@@ -20,19 +21,20 @@ def is_own(text: str) -> bool:
     return bool(colon and module and name.isidentifier() and all(part for part in module.split(".")))
 
 
-def own(kind: str, text: str) -> Callable[..., Any]:
+def own(kind: str, text: str, given: tuple[str, ...]) -> Callable[..., Any]:
     """Import somebody's own part.
 
     Args:
         kind: What it's to be, for the messages: `architecture`, `operator`.
         text: `module:name`; the module may lie in the working directory.
+        given: What it's to be called with, by order.
 
     Returns:
         What the name stands for, a callable.
 
     Raises:
         FormatError: If the module can't be imported; whatever it raised is in the message.
-        InvalidValueError: If it hasn't got that name, or it can't be called.
+        InvalidValueError: If it hasn't got that name, or it can't be called so.
     """
     where, _, name = text.partition(":")
     if os.getcwd() not in sys.path:
@@ -46,6 +48,8 @@ def own(kind: str, text: str) -> Callable[..., Any]:
     if not callable(made):
         names = ", ".join(sorted(_callables(module.__dict__, where))) or "none"
         raise InvalidValueError(f"{kind} in {where}", name, f"a function or class there ({names})")
+    if not _takes(made, len(given)):
+        raise InvalidValueError(f"{kind} in {where}", name, f"a function or class that takes ({', '.join(given)})")
     found: Callable[..., Any] = made
     return found
 
@@ -59,6 +63,17 @@ def checked(kind: str, text: str, made: object, parts: tuple[str, ...]) -> None:
     missing = [part for part in parts if not hasattr(made, part)]
     if missing:
         raise InvalidValueError(f"{kind} {text}", type(made).__name__, f"something with {', '.join(parts)}")
+
+
+def _takes(made: Callable[..., Any], count: int) -> bool:
+    """Whether it can be called with so many arguments; whoever doesn't tell is believed."""
+    try:
+        inspect.signature(made).bind(*[None] * count)
+    except TypeError:
+        return False
+    except ValueError:
+        return True
+    return True
 
 
 def _callables(namespace: dict[str, Any], where: str) -> list[str]:

@@ -73,6 +73,7 @@ def test_a_seed_is_its_operator(module: str) -> None:
         ("no_such_module:Still", "No module named"),
         ("{}:Stil", r"must be a function or class there \(Ahead, Still, nothing\); given: 'Stil'"),
         ("{}:ANSWER", "must be a function or class there"),
+        ("math:sin", r"must be a function or class that takes \(constants, posture\); given: 'sin'"),
         ("{}:nothing", "must be something with receive, control, executed; given: 'NoneType'"),
     ],
 )

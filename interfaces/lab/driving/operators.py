@@ -348,7 +348,7 @@ def operator(name: str, seed: int, period: float) -> Operator:
     if kind == "inputs" and file:
         return read_inputs(Path(file))
     if is_own(name):
-        made: Operator = own("operator", name)(np.random.default_rng(seed), period)
+        made: Operator = own("operator", name, ("rng", "period"))(np.random.default_rng(seed), period)
         checked("operator", name, made, ("start", "room", "drive"))
         return made
     styles = list(STYLES)

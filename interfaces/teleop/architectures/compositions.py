@@ -67,7 +67,9 @@ def architecture(name: str) -> Architecture:
         InvalidValueError: If there's none of that name.
         FormatError: If the module can't be imported.
     """
-    return own("architecture", name) if is_own(name) else ARCHITECTURES[one_of("architecture", name, ARCHITECTURES)]
+    if is_own(name):
+        return own("architecture", name, ("constants", "posture"))
+    return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES)]
 
 
 def controller(name: str, posture: Posture, constants: Constants) -> Controller:
