@@ -16,7 +16,6 @@ from interfaces.link.link import Link
 from interfaces.link.profiles import delay_profile
 from interfaces.teleop.architectures import (
     Constants,
-    Following,
     OperatorSite,
     Packet,
     Player,
@@ -214,8 +213,7 @@ class _Run:
         made = controller(case.architecture, driver.start, case.constants)
         senses = case.architecture in SENSING
         there = operator_surroundings(body.room, body.chassis, driver.start, model) if senses else None
-        aim = made if isinstance(made, Following) else None
-        here = robot_surroundings(body, driver.start, aim, CONTROL) if senses else None
+        here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
         self._site = OperatorSite(model, driver.start, case.transport, surroundings=there)
         position = POSITIONS[case.position](body)
         self._robot = RobotSite(made, position, IPR_LIMITS, period=CONTROL, surroundings=here)

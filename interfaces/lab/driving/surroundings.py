@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
-from interfaces.teleop.architectures.surroundings import Aim
+from interfaces.teleop.architectures import Controller, Following, OperatorSurroundings, RobotSurroundings
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
@@ -66,14 +65,14 @@ def operator_surroundings(room: Room, chassis: Chassis, start: Posture, model: M
 
 
 def robot_surroundings(
-    body: MobileRobot, start: Posture, aim: Aim | None, period: float, *, since: float = 0.0
+    body: MobileRobot, start: Posture, controller: Controller, period: float, *, since: float = 0.0
 ) -> RobotSurroundings:
     """What the real robot has on board of it.
 
     Args:
         body: The real robot, with sonars.
         start: Where it begins.
-        aim: What drives it, if it knows where it wants to get.
+        controller: What drives it.
         period: Between two drives [s].
         since: The body's time that is 0 of the drive's [s].
     """
@@ -92,7 +91,7 @@ def robot_surroundings(
         avoidance,
         MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
-        aim,
+        controller if isinstance(controller, Following) else None,
     )
 
 

@@ -26,7 +26,7 @@ from interfaces.runtime.live.mobile_senses import LaserSight, NavigatorPilot
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached
-from interfaces.teleop.architectures import Constants, DriveOrders, Following, RobotSite, architecture, controller
+from interfaces.teleop.architectures import Constants, DriveOrders, RobotSite, architecture, controller
 from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands
 from interfaces.teleop.hosting import HostConfig
 from interfaces.timer import Turning
@@ -199,8 +199,7 @@ class LiveMobileRobot:
         made = controller(config.architecture, start, config.constants)
         around = None
         if config.architecture in SENSING:
-            aim = made if isinstance(made, Following) else None
-            around = robot_surroundings(body, start, aim, CONTROL, since=body.time - since)
+            around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
         return RobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
 
     def _turn(self, now: float) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from interfaces.lab.driving.surroundings import robot_surroundings
+from interfaces.teleop.architectures import Immediate
 from robots.ipr.bare import BareBody
 from robots.ipr.position import FusedPosition
 from robots.ipr.robot import place
@@ -39,7 +40,7 @@ def supervisor(known: np.ndarray | None = None, config: SupervisorConfig = AHEAD
 def test_an_unchanged_room_gives_no_new_cells(room: str, seed: int) -> None:
     """Some metres each through known rooms, with noise, lost echoes and the position that the robot has."""
     body = BareBody("ipr", room=place(room).known(), rng=seed)
-    around = robot_surroundings(body, Posture(*body.posture.tolist()), None, 0.05)
+    around = robot_surroundings(body, Posture(*body.posture.tolist()), Immediate(), 0.05)
     position, rng = FusedPosition(body), np.random.default_rng(seed)
     drive, wanted, told, way = Drive(0.0, 0.0), Drive(0.0, 0.0), 0, 0.0
     for k in range(500):
