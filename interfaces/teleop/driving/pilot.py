@@ -1,11 +1,10 @@
-"""Lets a journey drive a robot, with its surroundings between both, by the robot's own time."""
+"""Lets a journey drive a robot, by the robot's own time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Protocol
 
-from interfaces.teleop.architectures import RobotSurroundings
 from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
 from robots.onboard.routes import Point
@@ -45,19 +44,16 @@ class Pilot(Protocol):
 
 
 class JourneyPilot:
-    """A journey, and what keeps the robot from touching anything on it."""
+    """A journey by the map alone."""
 
-    def __init__(
-        self, journey: Journey, clock: Callable[[], float], surroundings: RobotSurroundings | None = None
-    ) -> None:
+    def __init__(self, journey: Journey, clock: Callable[[], float]) -> None:
         """Stand.
 
         Args:
             journey: What finds the way.
             clock: Tells the robot's own time [s].
-            surroundings: Senses and avoidance, that know the journey as their aim.
         """
-        self._journey, self._clock, self._surroundings = journey, clock, surroundings
+        self._journey, self._clock = journey, clock
 
     @property
     def state(self) -> JourneyState:
@@ -95,10 +91,5 @@ class JourneyPilot:
 
     def drive(self, posture: Posture, before: Drive) -> Drive:
         """See `Pilot`."""
-        now, journey = self._clock(), self._journey
-        wanted = journey.control(posture, now=now, v_before=before.v)
-        if journey.state not in GOING:
-            return STAND
-        if self._surroundings is None:
-            return wanted
-        return self._surroundings.drive(wanted, posture, now=now, v_before=before.v)
+        drive = self._journey.control(posture, now=self._clock(), v_before=before.v)
+        return drive if self.state in GOING else STAND
