@@ -11,9 +11,6 @@ from typing import Any
 
 from vrs.errors import FormatError, InvalidValueError
 
-SPELLED = "MODULE:NAME"
-"""How such a part is named; the module is looked for in the working directory, too."""
-
 
 def is_own(text: str) -> bool:
     """Whether a name is that of somebody's own part: `module:name`, both of them words of Python with dots."""
