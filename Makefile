@@ -28,8 +28,9 @@ bench: $(BENCH_STAMP)
 # Every claim of every paper, and what is claimed beyond them, on one page: out/reproduce/reproduce.html.
 reproduce: $(STAMP)
 	.venv/bin/vrs lab localization --out out/reproduce/localization
-	.venv/bin/vrs reproduce all --out out/reproduce \
-		--beyond out/reproduce/localization/summary.json --beyond benchmarks/results.json
+	.venv/bin/vrs lab goals --out out/reproduce/goals
+	.venv/bin/vrs reproduce all --out out/reproduce --beyond out/reproduce/localization/summary.json \
+		--beyond out/reproduce/goals/summary.json --beyond benchmarks/results.json
 
 # The documentation as a site, in out/site; a warning is an error.
 docs: $(DOCS_STAMP)

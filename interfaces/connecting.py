@@ -29,7 +29,7 @@ def connect(
         timeout: How long to wait for the first answer [s].
 
     Raises:
-        UnreachableError: If there's no answer, or the server refuses.
+        UnreachableError: If there's no answer, or the server refuses; it's a ConnectionError.
         ValueError: If role or encoding is none of those.
     """
     from interfaces.stream.codec import Encoding

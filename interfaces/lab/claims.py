@@ -10,6 +10,9 @@ from interfaces.link.conditions import whole
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
+OWN_BAR = "our own bar"
+"""The source of a claim that no paper makes."""
+
 Cell: TypeAlias = float | int | str | None
 """What stands in a table; None for nothing."""
 

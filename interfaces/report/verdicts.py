@@ -96,7 +96,7 @@ def _benchmark(name: str, part: Json) -> Verdicts:
 
 def _measured(name: str, result: Json) -> Json:
     """A benchmark's row as a claim: medians, the 99th percentile, the ratio to a peer."""
-    beside = f" beside {result['peer']}" if result["peer"] else ""
+    beside = f", beside {result['peer']}" if result["peer"] else ""
     unit, ours = result["unit"], result["ours"]
     words = [f"{ours['median']:.3g} {unit}".rstrip()]
     if ours["p99"] is not None:
@@ -104,7 +104,7 @@ def _measured(name: str, result: Json) -> Json:
     if result["ratio"] is not None:
         words.append(f"ratio {result['ratio']:.2f}")
     return {
-        "claim": f"{result['name'].replace('`', '')}{beside}" + (f" [{unit}]" if unit else ""),
+        "claim": f"{result['name']}{beside}".replace("`", "") + (f" [{unit}]" if unit else ""),
         "source": f"python -m benchmarks {name}",
         "expected": result["asked"],
         "measured": ", ".join(words),

@@ -24,7 +24,7 @@ SECTION: Final = "section 5"
 NEAR, NEAR_TURN = 0.05, 2.0
 """What counts as at B and at A [m, deg]."""
 KNOWN = 0.01
-"""Bar of the position's error there [m]; section 3 gives none, issue 10 does."""
+"""Bar of the position's error there [m]; section 3 gives none: it is our own."""
 ORDER: Final = ("MOVE B", f"VOICE {HELLO}", f"MESSAGE {PLEASE}", "MOVE A")
 """What the list has to ask for; WAIT asks for nothing."""
 _BY = 1.5

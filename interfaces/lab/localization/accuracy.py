@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.lab.claims import Cell, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Study, Table
 from interfaces.lab.localization.pictures import Scene, scenes
 from interfaces.lab.localization.trial import (
     STILL,
@@ -131,27 +131,25 @@ def _accuracy(name: str, found: tuple[RoomFound, ...]) -> list[Claim]:
     place, turn, largest = _all(name, found)
     bar, turn_bar = BARS[name]
     good = sum(_keeps(name, one.tracks[name]) for one in found)
-    source = "issue 10, It must show"
     made = [
-        Claim(f"{name}: 95 % of position errors [cm]", source, f"≤ {100 * bar:g}", 100 * place, place <= bar),
-        Claim(f"{name}: 95 % of heading errors [deg]", source, f"≤ {turn_bar:g}", turn, turn <= turn_bar),
+        Claim(f"{name}: 95 % of position errors [cm]", OWN_BAR, f"≤ {100 * bar:g}", 100 * place, place <= bar),
+        Claim(f"{name}: 95 % of heading errors [deg]", OWN_BAR, f"≤ {turn_bar:g}", turn, turn <= turn_bar),
     ]
     if name != BUILT:
         least = math.ceil(ROOMS * len(found) - 1e-9)
         what = f"{name}: rooms of {len(found)} in which both are kept"
-        made.append(Claim(what, source, f"≥ {least}", good, good >= least))
+        made.append(Claim(what, OWN_BAR, f"≥ {least}", good, good >= least))
         what = f"{name}: largest position error [cm]"
-        made.append(Claim(what, source, f"≤ {100 * LARGEST:g}", 100 * largest, largest <= LARGEST))
+        made.append(Claim(what, OWN_BAR, f"≤ {100 * LARGEST:g}", 100 * largest, largest <= LARGEST))
     return made
 
 
 def _honesty(name: str, found: tuple[RoomFound, ...]) -> list[Claim]:
     mean, inside = _nees(name, found)
-    source = "issue 10, It must show"
     return [
-        Claim(f"{name}: mean squared normalised error, 3 if honest", source, "2 to 4", mean, 2 <= mean <= 4),
+        Claim(f"{name}: mean squared normalised error, 3 if honest", OWN_BAR, "2 to 4", mean, 2 <= mean <= 4),
         Claim(
-            f"{name}: normalised errors inside the 95 % bound [%]", source, "90 to 99.5",
+            f"{name}: normalised errors inside the 95 % bound [%]", OWN_BAR, "90 to 99.5",
             100 * inside, 0.9 <= inside <= 0.995,
         ),
     ]  # fmt: skip

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from interfaces.lab.claims import Cell, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Study, Table
 from interfaces.lab.localization.distinctive import distinctive
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from robots.bullet.rooms import Room, read_room
@@ -34,7 +34,6 @@ CARRIED = 8.0
 """When the robot is carried off [s]."""
 NOTICED, RECOVERED = 3.0, 40.0
 """It has to notice within [s]; and to be found again within [s]."""
-SOURCE = "issue 10, It must show"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +121,8 @@ def conclude_starts(study: Study, found: tuple[tuple[Start, ...], ...]) -> Findi
     )
     return Findings(
         (
-            Claim(f"of {len(starts)} starts found [%]", SOURCE, "≥ 95", 100 * right, right >= 0.95),
-            Claim("wrong and confident [%]", SOURCE, "≤ 1", 100 * wrong, wrong <= 0.01),
+            Claim(f"of {len(starts)} starts found [%]", OWN_BAR, "≥ 95", 100 * right, right >= 0.95),
+            Claim("wrong and confident [%]", OWN_BAR, "≤ 1", 100 * wrong, wrong <= 0.01),
         ),
         (Table("starts", f"starts anywhere, {STARTS} an apartment at most", ("apartment", *count), rows),),
     )  # fmt: skip
@@ -175,7 +174,7 @@ def conclude_symmetric(study: Study, found: tuple[Twofold, ...]) -> Findings:  #
     columns = ("room", "answer", "places that look the same", "named", "nearest off [cm]")
     what = f"of {len(found)} symmetric rooms called ambiguous, with all places that look the same"
     return Findings(
-        (Claim(what, SOURCE, len(found), good, good == len(found)),),
+        (Claim(what, OWN_BAR, len(found), good, good == len(found)),),
         (Table("symmetric", "rooms that look the same from several places", columns, rows),),
     )
 
@@ -231,8 +230,8 @@ def conclude_carried(study: Study, found: tuple[Carried, ...]) -> Findings:  # n
     columns = ("apartment", "carried [m]", "noticed after [s]", "found after [s]", "off at the end [cm]")
     claims = (
         Claim(
-            f"of {len(found)} carried off, noticed within 3 s", SOURCE, len(found), noticed, noticed == len(found)
+            f"of {len(found)} carried off, noticed within 3 s", OWN_BAR, len(found), noticed, noticed == len(found)
         ),
-        Claim("and found again", SOURCE, len(found), recovered, recovered == len(found)),
+        Claim("and found again", OWN_BAR, len(found), recovered, recovered == len(found)),
     )
     return Findings(claims, (Table("carried", "robots that were carried off", columns, rows),))
