@@ -13,7 +13,7 @@ from operator import add
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from vrs.chunk import HOLD
-from vrs.commands import Lateness, MotionCommand, PlanEdit, SteerCommand, Stop
+from vrs.commands import DriveCommand, Lateness, MotionCommand, PlanEdit, SteerCommand, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Edit
 from vrs.ledger import ARRIVED, Change, Entry, Ledger
@@ -59,18 +59,35 @@ class Agenda(Generic[TrackT]):
         Raises:
             PlanningError: If it's late and the policy rejects, or if it was to act before it was issued.
         """
-        issued, t = command.issued_at, command.execute_at
-        if now is None:
-            return Moment(soonest if t is None else t, issued, t, Status.ACCEPTED, "")
-        issued, asked = now if issued is None else issued, t
-        t = max(now, issued) if t is None else t
-        if t < issued:
-            raise PlanningError(before_issue(t, issued))
-        if t >= now:
-            return Moment(t, issued, asked, Status.ACCEPTED, "")
+        asked = _as_asked(command, now, soonest if now is None else now)
+        if now is None or asked.t >= now:
+            return asked
+        late = _passed(asked.t, now)
         if self.lateness is Lateness.REJECT and not isinstance(command, Stop):
-            raise PlanningError(passed(t, now))
-        return Moment(now, issued, asked, Status.POSTPONED, f"{passed(t, now)}: at once")
+            raise PlanningError(late)
+        return asked._replace(t=now, status=Status.POSTPONED, reason=f"{late}: at once")
+
+    def beginning(self, command: MotionCommand | DriveCommand, now: float | None, soonest: float) -> Moment:
+        """When a motion begins: as asked, else as soon as it can; a late one after the segment that is under way.
+
+        By the other policy a late one doesn't begin at all.
+
+        Args:
+            command: The motion.
+            now: Present time [s]; None offline.
+            soonest: As soon as it can, offline [s]; with a clock not before now, nor before it was issued.
+
+        Raises:
+            PlanningError: If it's late and the policy rejects, or if it was to begin before it was issued.
+        """
+        asked = _as_asked(command, now, soonest)
+        if now is None or asked.t >= now:
+            return asked
+        late = _passed(asked.t, now)
+        if self.lateness is Lateness.REJECT:
+            raise PlanningError(late)
+        t = self.end_of_active(now)
+        return asked._replace(t=t, status=Status.POSTPONED, reason=f"{late}: postponed to {t:.9g} s")
 
     def touched(self, edit: Edit[TrackT], t: float) -> tuple[Names, Names]:
         """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
@@ -158,11 +175,29 @@ def _names(ledger: Ledger[Any], timeline: Track[Any], index: int, t: float) -> t
     return tuple(i for i in timeline.owners(index, len(timeline)) if not ledger.arrived(i, t, timeline.version + 1))
 
 
-def before_issue(t: float, issued: float) -> str:
-    """Say that a command is to be executed before it was issued."""
-    return f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s"
+def _as_asked(
+    command: MotionCommand | DriveCommand | SteerCommand | PlanEdit, now: float | None, soonest: float
+) -> Moment:
+    """When a command is to act, be that late or not.
+
+    Args:
+        command: The command.
+        now: Present time [s]; None offline.
+        soonest: When, if it doesn't say so [s]; with a clock not before now, nor before it was issued.
+
+    Raises:
+        PlanningError: If it was to act before it was issued.
+    """
+    issued, asked = command.issued_at, command.execute_at
+    if now is None:
+        return Moment(soonest if asked is None else asked, issued, asked, Status.ACCEPTED, "")
+    issued = now if issued is None else issued
+    t = max(soonest, now, issued) if asked is None else asked
+    if t < issued:
+        raise PlanningError(f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s")
+    return Moment(t, issued, asked, Status.ACCEPTED, "")
 
 
-def passed(t: float, now: float) -> str:
+def _passed(t: float, now: float) -> str:
     """Say that a command is late."""
     return f"t_exec = {t:.9g} s had passed at {now:.9g} s"

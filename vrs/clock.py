@@ -6,7 +6,7 @@ import math
 import time
 from typing import Protocol
 
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.errors import InvalidValueError
 
 

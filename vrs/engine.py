@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from vrs.analyzer import check
 from vrs.archive import Keeper
+from vrs.checks import finite_array
 from vrs.clock import Clock
 from vrs.commands import (
     Cancel,
@@ -31,7 +32,6 @@ from vrs.commands import (
     SteerCommand,
     Stop,
     Target,
-    finite_array,
 )
 from vrs.errors import InvalidValueError
 from vrs.ledger import Ledger

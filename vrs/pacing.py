@@ -43,7 +43,7 @@ _MARGINS = (1.0, 0.99, 0.97, 0.93, 0.85, 0.7, 0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Law:
+class TimeScaling:
     """Timeline time s before, as polynomials of the time after."""
 
     durations: tuple[float, ...]
@@ -89,7 +89,7 @@ class Law:
         return c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2 * c2 + 3 * u * c3), 2 * c2 + 6 * u * c3, 6 * c3
 
 
-def change(s: float, wait: float, goal: float, ramp: float, pace: float = 1.0) -> Law:
+def change(s: float, wait: float, goal: float, ramp: float, pace: float = 1.0) -> TimeScaling:
     """Go on at a pace for `wait` seconds, then change to another within `ramp` seconds."""
     half, step = 0.5 * ramp, goal - pace
     begin = s + wait * pace
@@ -97,11 +97,11 @@ def change(s: float, wait: float, goal: float, ramp: float, pace: float = 1.0) -
     rising = (begin, pace, 0.0, 2.0 * step / (3.0 * ramp * ramp))
     falling = (middle, 0.5 * (pace + goal), step / ramp, -2.0 * step / (3.0 * ramp * ramp))
     if wait > 0:
-        return Law((wait, half, half), ((s, pace), rising, falling))
-    return Law((half, half), (rising, falling))
+        return TimeScaling((wait, half, half), ((s, pace), rising, falling))
+    return TimeScaling((half, half), (rising, falling))
 
 
-def composed(timeline: Timeline, law: Law) -> Iterator[Piece]:
+def composed(timeline: Timeline, law: TimeScaling) -> Iterator[Piece]:
     """Polynomials of q(s(t)) along a law, a piece for each run of segments of one command."""
     for duration, c in zip(law.durations, law.coefficients, strict=True):
         tau = 0.0
@@ -133,7 +133,7 @@ def remainder(timeline: Timeline, s: float, pace: float) -> Iterator[Piece]:
         yield Piece([duration / pace], [b], owner)
 
 
-def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bool) -> Law:
+def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bool) -> TimeScaling:
     """The quickest smooth change of pace from s on that keeps the limits.
 
     Where it can't begin at once, as in a deceleration that needs all the acceleration there is, it begins at a
@@ -148,9 +148,9 @@ def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bo
     """
     state = timeline.state_before(s)
     if not state.qd.any() and not state.qdd.any():
-        return Law((), ())
+        return TimeScaling((), ())
     rest = rest_after(timeline, s)
-    best = Law((rest - s,), ((s, 1.0),))
+    best = TimeScaling((rest - s,), ((s, 1.0),))
     for wait in _waits(timeline, s, rest):
         if wait >= best.duration:
             break
@@ -171,7 +171,7 @@ def paced(timeline: Timeline, s: float, goal: float, limits: Limits, *, jerk: bo
     return best
 
 
-def halting(timeline: Timeline, s: float, limits: Limits, *, jerk: bool) -> Law:
+def halting(timeline: Timeline, s: float, limits: Limits, *, jerk: bool) -> TimeScaling:
     """Come to rest along the way, as fast as the limits allow: at the latest where the motion rests anyway.
 
     Args:
@@ -189,7 +189,7 @@ def halting(timeline: Timeline, s: float, limits: Limits, *, jerk: bool) -> Law:
         law = _halting(timeline, s, rest, limits, margin)
         if certified(timeline, law, limits, jerk=False) is None:
             return law
-    return Law((rest - s,), ((s, 1.0),))
+    return TimeScaling((rest - s,), ((s, 1.0),))
 
 
 def straight_until(timeline: Timeline, s: float) -> float | None:
@@ -208,7 +208,7 @@ def straight_until(timeline: Timeline, s: float) -> float | None:
     return rest
 
 
-def certified(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> str | None:
+def certified(timeline: Timeline, law: TimeScaling, limits: Limits, *, jerk: bool) -> str | None:
     """Say which limit the motion along a law passes; None if it keeps them all."""
     return violation(as_plan(composed(timeline, law), timeline.dof), limits, jerk=jerk)
 
@@ -220,7 +220,7 @@ def as_plan(pieces: Iterable[Piece], n: int) -> Plan:
     return stacked(durations, [a for part in parts for a in part.coefficients], n)
 
 
-def _halting(timeline: Timeline, s: float, rest: float, limits: Limits, margin: float) -> Law:
+def _halting(timeline: Timeline, s: float, rest: float, limits: Limits, margin: float) -> TimeScaling:
     qd = np.abs(timeline.state_before(s).qd)
     step = float((qd / limits.qdd_max).max()) / 10.0
     durations: list[float] = []
@@ -248,7 +248,7 @@ def _halting(timeline: Timeline, s: float, rest: float, limits: Limits, margin: 
             break
         if s >= end - 1e-12:
             s, index = end, index + 1
-    return Law(tuple(durations), tuple(coefficients))
+    return TimeScaling(tuple(durations), tuple(coefficients))
 
 
 def _lowest_rate(timeline: Timeline, s: Array, pace: Array, limits: Limits) -> float:
@@ -262,7 +262,7 @@ def _lowest_rate(timeline: Timeline, s: Array, pace: Array, limits: Limits) -> f
     return min(float(lowest.max()), 0.0)
 
 
-def seems_kept(timeline: Timeline, law: Law, limits: Limits, *, jerk: bool) -> bool:
+def seems_kept(timeline: Timeline, law: TimeScaling, limits: Limits, *, jerk: bool) -> bool:
     """Whether samples of the motion along a law keep the limits; where they don't, it has no certificate."""
     s, *derivatives = law(np.linspace(0.0, law.duration, _LOOKS))
     p, r, third = (value[:, None] for value in derivatives)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from vrs.agenda import Agenda, before_issue, passed
+from vrs.agenda import Agenda
 from vrs.commands import (
     Insertion,
     Lateness,
@@ -85,19 +85,10 @@ class Scheduler(Agenda[Timeline]):
         """
         issued = command.issued_at if command.issued_at is not None else now
         asked, end = command.execute_at, self.timeline.end
-        status, reason = Status.ACCEPTED, ""
-        if now is None:
-            t = end if asked is None else asked
-        else:
-            t = max(now, issued if issued is not None else now) if asked is None else asked
-            if issued is not None and t < issued:
-                return self.reject(issued, asked, before_issue(t, issued))
-            if t < now:
-                reason = passed(t, now)
-                if self.lateness is Lateness.REJECT:
-                    return self.reject(issued, asked, reason)
-                t = self.end_of_active(now)
-                status, reason = Status.POSTPONED, f"{reason}: postponed to {t:.9g} s"
+        try:
+            t, _, _, status, reason = self.beginning(command, now, end if now is None else now)
+        except PlanningError as error:
+            return self.reject(issued, asked, str(error))
         if command.insertion is Insertion.APPEND and t < end:
             t = end
             if asked is not None:
@@ -171,7 +162,7 @@ class Scheduler(Agenda[Timeline]):
                 raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
             state = self.timeline.state_before(t)
             plan, note = steering.steer(
-                state, command.rates, command.twist, command.frame.value, hold, self.model, self.limits
+                state, command.rates, command.twist, command.frame, hold, self.model, self.limits
             )
         except REFUSALS as error:
             return self.reject(issued, asked, str(error))

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.commands import finite, finite_array
+from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError, NonFiniteTimeError
 from vrs.model import Array
 

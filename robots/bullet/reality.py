@@ -7,8 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import number_in
-from vrs.commands import finite, finite_array
+from vrs.checks import finite, finite_array, number_in
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -24,7 +23,7 @@ class Reality:
     torque_limits: bool = True
     """Whether the drives' torques end at their limits."""
     encoder_counts: int | None = 1000
-    """Encoder counts a motor turn, 1 to 10,000,000; None reads positions exactly."""
+    """Encoder counts a motor turn, after quadrature, 1 to 10,000,000; None reads positions exactly."""
     gravity: float = 9.81
     """Acceleration of free fall [m/s²], along -z of the base, 0 to 100; the servo knows it."""
     dt: float = 1e-3

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from robots.bullet.things import Block, Column, Door, DoorKind, Person
+from robots.text_files import bounded_text
 from vrs.checks import one_of
 from vrs.errors import FormatError
 
@@ -133,14 +134,7 @@ def read_room(text: str, where: str = "room") -> Room:
 def load_room(path: Path | str) -> Room:
     """Read a floor plan from a file; raises as `read_room`, and OSError if there's no such file."""
     path = Path(path)
-    with path.open("rb") as file:
-        data = file.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise FormatError(path.name, f"longer than {MOST_BYTES} bytes")
-    try:
-        return read_room(data.decode("utf-8"), path.name)
-    except UnicodeDecodeError as error:
-        raise FormatError(path.name, f"no UTF-8 at byte {error.start}") from None
+    return read_room(bounded_text(path, MOST_BYTES), path.name)
 
 
 _Options = dict[str, tuple[float, float, float]]

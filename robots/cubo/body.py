@@ -5,7 +5,6 @@ It plans nothing and decides nothing: a thin client's body.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from typing import Final
 
@@ -21,7 +20,6 @@ from robots.ipr.reality import MobileReality
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import clipped
-from vrs.model import Array, frozen_array
 
 Values = tuple[float, ...]
 BUTTONS: Final = ("service", "message")
@@ -165,11 +163,6 @@ class CuboBody(MobileBody):
         states = self._world.bullet.getJointStates(self._body, joints, physicsClientId=self._world.client)
         return tuple(float(state[0]) for state in states)
 
-    def wheel_angles(self) -> Array:
-        """Angles that the right and the left wheel have turned by [rad], (2,)."""
-        states = self._world.bullet.getJointStates(self._body, [0, 1], physicsClientId=self._world.client)
-        return frozen_array([state[0] for state in states])
-
     @property
     def step(self) -> float:
         """Of its physics [s]."""
@@ -214,14 +207,3 @@ class CuboBody(MobileBody):
             maxVelocity=min(max(speed, 1e-3), limb.speed),
             physicsClientId=self._world.client,
         )
-
-
-def upright(angle: float, joint: tuple[float, float, float], axis: tuple[float, float, float]) -> Array:
-    """Pose of a limb in the robot's frame at an angle [rad], (4, 4)."""
-    x, y, z = axis
-    c, s = math.cos(angle), math.sin(angle)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
-    X = np.eye(4)
-    X[:3, :3] = np.eye(3) + s * K + (1 - c) * K @ K
-    X[:3, 3] = joint
-    return X

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.cubo import parameters as p
-from robots.cubo.body import upright as limb_pose
 from robots.ipr.drive_train import as_posture
 from robots.ipr.shapes import DARK, GLASS, STEEL, WHITE, box, caster, rounded, upright, wheel
 from robots.solids import Builder, LinkShape, drum, loft, slab
@@ -147,3 +146,20 @@ def links(posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), limbs: Sequence[fl
         X_WR @ limb_pose(angle, limb.joint, limb.axis) for angle, limb in zip(angles, p.CUBO.limbs, strict=True)
     ]
     return frozen_array(np.stack(poses))
+
+
+def limb_pose(angle: float, joint: tuple[float, float, float], axis: tuple[float, float, float]) -> Array:
+    """Return the pose of a limb in the robot's frame, (4, 4).
+
+    Args:
+        angle: Of its joint [rad].
+        joint: Where the axis is, in the robot's frame [m].
+        axis: A unit vector along it, in the robot's frame.
+    """
+    x, y, z = axis
+    c, s = math.cos(angle), math.sin(angle)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
+    X = np.eye(4)
+    X[:3, :3] = np.eye(3) + s * K + (1 - c) * K @ K
+    X[:3, 3] = joint
+    return X

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.ways import Ways
+from robots.ipr.ways import CELL, Ways
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
@@ -161,16 +161,16 @@ class _Maker:
     def _pillar(self, leaf: Box) -> tuple[str, Box]:
         """A pillar in a corner or at a wall, on the map."""
         a, b = self._uniform(0.2, 0.6), self._uniform(0.2, 0.5)
-        box, _ = self._at_wall(leaf, a, b, 0.0)
-        return self._boxed(box, 0.0, "height=2.4"), box
+        box = self._at_wall(leaf, a, b, 0.0)
+        return self._boxed(box, "height=2.4"), box
 
     def _piece(self, leaf: Box) -> tuple[str, Box]:
         known = "" if self._rng.random() < self._config.known else " unknown"
         kind = self._rng.random()
         height = f"height={self._uniform(0.4, 2.0)}"
         if kind < 0.6:
-            box, _ = self._at_wall(leaf, self._uniform(0.5, 2.0), self._uniform(0.3, 0.9), self._uniform(0.0, 0.06))
-            return self._boxed(box, 0.0, height + known), box
+            box = self._at_wall(leaf, self._uniform(0.5, 2.0), self._uniform(0.3, 0.9), self._uniform(0.0, 0.06))
+            return self._boxed(box, height + known), box
         x, y = self._uniform(leaf[0] + 0.8, leaf[2] - 0.8), self._uniform(leaf[1] + 0.8, leaf[3] - 0.8)
         if kind < 0.8:
             r = self._uniform(0.12, 0.3)
@@ -178,9 +178,9 @@ class _Maker:
         a, b = self._uniform(0.5, 1.4), self._uniform(0.4, 0.9)
         r = math.hypot(a, b) / 2
         turned = f"angle_deg={self._uniform(0, 180)} {height}{known}"
-        return self._boxed((x - a / 2, y - b / 2, x + a / 2, y + b / 2), 0.0, turned), (x - r, y - r, x + r, y + r)
+        return self._boxed((x - a / 2, y - b / 2, x + a / 2, y + b / 2), turned), (x - r, y - r, x + r, y + r)
 
-    def _at_wall(self, leaf: Box, length: float, depth: float, gap: float) -> tuple[Box, int]:
+    def _at_wall(self, leaf: Box, length: float, depth: float, gap: float) -> Box:
         """A rectangle along one of the four walls of a room."""
         x0, y0, x1, y1 = leaf[0] + WALL / 2, leaf[1] + WALL / 2, leaf[2] - WALL / 2, leaf[3] - WALL / 2
         side = int(self._rng.integers(4))
@@ -188,17 +188,16 @@ class _Maker:
             length = min(length, x1 - x0)
             a = self._uniform(x0, max(x0, x1 - length))
             b = y0 + gap if side == 0 else y1 - gap - depth
-            return (a, b, a + length, b + depth), side
+            return a, b, a + length, b + depth
         length = min(length, y1 - y0)
         b = self._uniform(y0, max(y0, y1 - length))
         a = x0 + gap if side == 3 else x1 - gap - depth
-        return (a, b, a + depth, b + length), side
+        return a, b, a + depth, b + length
 
     @staticmethod
-    def _boxed(box: Box, margin: float, rest: str) -> str:
+    def _boxed(box: Box, rest: str) -> str:
         x0, y0, x1, y1 = box
-        length, width = x1 - x0 + margin, y1 - y0 + margin
-        return f"box {(x0 + x1) / 2:.4f} {(y0 + y1) / 2:.4f}  {length:.4f} {width:.4f} {rest}"
+        return f"box {(x0 + x1) / 2:.4f} {(y0 + y1) / 2:.4f}  {x1 - x0:.4f} {y1 - y0:.4f} {rest}"
 
     def _try(self, made: tuple[str, Box], taken: list[Box]) -> None:
         """Put something there, unless it's in the way."""
@@ -212,7 +211,7 @@ class _Maker:
         except InvalidValueError:
             return
         # What the thing itself and its surroundings take is gone; what else is lost was cut off.
-        gone = (x1 - x0 + 2 * _ROBOT + 0.2) * (y1 - y0 + 2 * _ROBOT + 0.2) / 0.05**2
+        gone = (x1 - x0 + 2 * _ROBOT + 0.2) * (y1 - y0 + 2 * _ROBOT + 0.2) / CELL**2
         if int(after.free.sum()) < _REACHED * (int(self._free.free.sum()) - gone):
             return
         if not all(self._reaches(after, leaf) for leaf in self._leaves):
@@ -224,7 +223,7 @@ class _Maker:
     @staticmethod
     def _reaches(ways: Ways, leaf: Box) -> bool:
         """Whether somebody can stand somewhere in a room."""
-        i0, j0, i1, j1 = (int(edge / 0.05) for edge in leaf)
+        i0, j0, i1, j1 = (int(edge / CELL) for edge in leaf)
         return int(ways.free[i0:i1, j0:j1].sum()) > 100
 
     def _populate(self) -> None:

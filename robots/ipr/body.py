@@ -249,9 +249,8 @@ class MobileBody(MobileRobot):
         return self._angles
 
     def _put(self, posture: tuple[float, float, float]) -> None:
+        # With it PyBullet takes the base's speed away.
         self._move(posture)
-        bullet, client, still = self._world.bullet, self._world.client, [0.0, 0.0, 0.0]
-        bullet.resetBaseVelocity(self._body, still, still, physicsClientId=client)
         self._truth = posture
 
     def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:

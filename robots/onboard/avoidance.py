@@ -24,6 +24,7 @@ from robots.onboard.free_ways import CREEP, ROUNDING, Outline, free_ways
 from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
+from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array
 
 _CURVATURES = np.array([0.0, *(s * k for k in (0.2, 0.4, 0.7, 1.0, 1.4, 1.9, 2.5, 3.3, 4.5) for s in (1, -1))])
@@ -317,7 +318,7 @@ class ObstacleAvoidance:
         ways = self._ways(points, curvatures)
         reach = np.minimum(ways, config.lookahead)
         turned = np.clip(curvatures * reach, -math.pi, math.pi)
-        off = np.abs(np.remainder(turned - towards + math.pi, math.tau) - math.pi) / math.pi
+        off = np.abs(all_wrapped(turned - towards)) / math.pi
         cost = off + 1.5 * (1 - reach / config.lookahead) + 0.06 * np.abs(curvatures - self._curvature)
         least = max(v_before - limits.a_max * config.period, 0.0)
         # So much is left that the robot's corners have room to turn on the spot where it comes to a stand.

@@ -12,6 +12,7 @@ import math
 from pathlib import Path
 
 from robots.onboard.curve import LARGEST, MOST_POINTS, Curve, CurveKind
+from robots.text_files import bounded_text
 from vrs.errors import FormatError, InvalidValueError
 
 VERSION = 1
@@ -26,16 +27,10 @@ def load_curve(path: Path | str) -> Curve:
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+        text = bounded_text(path, MOST_BYTES, "utf-8-sig")
     except OSError as error:
         raise FormatError(path.name, f"can't be read: {error.strerror}") from None
-    if len(data) > MOST_BYTES:
-        raise FormatError(path.name, f"longer than {MOST_BYTES} bytes")
-    try:
-        return read_curve(data.decode("utf-8-sig"), path.name)
-    except UnicodeDecodeError as error:
-        raise FormatError(path.name, f"no UTF-8 at byte {error.start}") from None
+    return read_curve(text, path.name)
 
 
 def read_curve(text: str, where: str = "path") -> Curve:

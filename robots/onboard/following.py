@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.commands import finite, finite_array
+from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
 

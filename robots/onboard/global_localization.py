@@ -21,6 +21,7 @@ from robots.onboard.line_matching import MatchingConfig, matched
 from robots.onboard.scan_check import Evidence, expected_ranges, judged
 from vrs.checks import number_in
 from vrs.mobile import wrapped
+from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array, frozen_array
 
 
@@ -192,7 +193,7 @@ def guesses(known: Lines, seen: Lines, config: SearchConfig) -> Array:
 def _guessed(known: Lines, two: Lines, corner: float, config: SearchConfig) -> Array:
     """Postures for two lines, against all pairs of the map that cross at the same angle."""
     directions = known.poses[:, 2]
-    angle = np.remainder(directions[None, :] - directions[:, None] - corner + math.pi, math.tau) - math.pi
+    angle = all_wrapped(directions[None, :] - directions[:, None] - corner)
     fits = np.abs(angle) < config.agree
     fits &= (two.lengths[0] <= known.lengths + 2 * config.slack)[:, None]
     fits &= (two.lengths[1] <= known.lengths + 2 * config.slack)[None, :]
@@ -236,7 +237,7 @@ def _voted(found: Array, config: SearchConfig) -> Array:
     first = np.full(len(votes), len(at))
     np.minimum.at(first, at, np.arange(len(at)))
     base = found[first, 2]
-    turn = np.remainder(found[:, 2] - base[at] + math.pi, math.tau) - math.pi
+    turn = all_wrapped(found[:, 2] - base[at])
     sums = [np.bincount(at, found[:, 3] * value) / votes for value in (found[:, 0], found[:, 1], turn)]
     order = np.argsort(-votes, kind="stable")[: 8 * config.refined]
     return np.column_stack([sums[0], sums[1], base + sums[2]])[order]

@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robots.text_files import bounded_text
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
@@ -236,14 +237,7 @@ def save_map(built: GspMap, path: Path | str) -> None:
 def load_map(path: Path | str) -> GspMap:
     """Read a map from a file; raises as `read_map`, and OSError if there's no such file."""
     path = Path(path)
-    with path.open("rb") as file:
-        data = file.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise FormatError(path.name, f"longer than {MOST_BYTES} bytes")
-    try:
-        return read_map(data.decode("utf-8"), path.name)
-    except UnicodeDecodeError as error:
-        raise FormatError(path.name, f"no UTF-8 at byte {error.start}") from None
+    return read_map(bounded_text(path, MOST_BYTES), path.name)
 
 
 def cast_lines(ends: Array, origins: Array, ways: Array) -> Array:

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from robots.onboard.stamps import LARGEST, whole
-from vrs.checks import number_in
-from vrs.commands import finite
+from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
 
 _NAME = 100

@@ -8,9 +8,9 @@ import numpy as np
 
 from robots.onboard.play import PlayState
 from vrs.model import Array
-from vrs.pacing import Law
+from vrs.pacing import TimeScaling
 
-STEADY = Law((), ())
+STEADY = TimeScaling((), ())
 """No change of pace."""
 
 
@@ -19,7 +19,7 @@ class Leg(NamedTuple):
 
     begin: float
     """By the robot's clock [s]."""
-    law: Law
+    law: TimeScaling
     p: float
     """Where the law ends [s]."""
     pace: float
@@ -41,6 +41,6 @@ def along(leg: Leg, t: Array) -> PlayState:
     return PlayState(p, pace, rate)
 
 
-def braking(p: float, pace: float, duration: float) -> Law:
+def braking(p: float, pace: float, duration: float) -> TimeScaling:
     """Slow down evenly to a stop."""
-    return Law((duration,), ((p, pace, -0.5 * pace / duration),))
+    return TimeScaling((duration,), ((p, pace, -0.5 * pace / duration),))

@@ -23,7 +23,7 @@ from robots.onboard.gsp_map import GspMap, Lines
 from vrs.checks import finite_array, number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
-from vrs.mobile.kinematics import sinc
+from vrs.mobile.kinematics import all_wrapped, sinc
 from vrs.model import Array, frozen_array
 
 OWN = 6
@@ -210,7 +210,7 @@ class LineFilter:
         H[:, 0, 0], H[:, 0, 1], H[:, 0, 2] = -ty, tx, ty * ry + tx * rx
         H[:, 0, 3], H[:, 0, 4] = -1.0, -along
         H[:, 1, 2], H[:, 1, 4] = 1.0, -1.0
-        turn = np.remainder(theta + angle - direction + math.pi, math.tau) - math.pi
+        turn = all_wrapped(theta + angle - direction)
         return Innovation(tx * dy - ty * dx, turn, along, H)
 
     def doubts(self, found: Innovation, sights: Sights) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from robots.onboard.gsp_map import Lines
 from robots.onboard.line_filter import LineFilter, Sights
 from vrs.checks import number_in
+from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array
 
 
@@ -65,7 +66,7 @@ def _candidates(
     """Pairs of lines that face the same way, near each other, one beside the other."""
     known = filter_.lines
     placed = seen.moved(filter_.posture)
-    turn = np.remainder(placed.poses[:, None, 2] - known.poses[:, 2] + np.pi, 2 * np.pi) - np.pi
+    turn = all_wrapped(placed.poses[:, None, 2] - known.poses[:, 2])
     delta = placed.poses[:, None, :2] - known.poses[:, :2]
     along = np.sum(delta * known.directions, axis=-1)
     off = np.sum(delta * known.normals, axis=-1)

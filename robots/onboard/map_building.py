@@ -23,6 +23,7 @@ from robots.onboard.line_filter import LineFilter, Sights
 from robots.onboard.localization import LocalizationConfig, Tracker
 from vrs.checks import number_in
 from vrs.mobile import wrapped
+from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array, frozen_array
 
 _EXACT = 1e-12
@@ -168,7 +169,7 @@ def _same_as(held: LineFilter, i: int, config: BuildingConfig) -> int | None:
     later = np.arange(i + 1, len(lines))
     if not len(later):
         return None
-    turn = np.remainder(lines.poses[later, 2] - pose[2] + math.pi, math.tau) - math.pi
+    turn = all_wrapped(lines.poses[later, 2] - pose[2])
     delta = lines.poses[later, :2] - pose[:2]
     c, s = math.cos(pose[2]), math.sin(pose[2])
     along, off = delta @ (c, s), delta @ (-s, c)

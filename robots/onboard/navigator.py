@@ -23,6 +23,7 @@ from robots.onboard.movers import MoversConfig, MoverTracker
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.routes import RouteMap
 from robots.onboard.yielding import Yielding, YieldingConfig
+from vrs.mobile.kinematics import all_wrapped
 from vrs.mobile.rays import Grid
 from vrs.model import Array
 
@@ -84,7 +85,7 @@ class Navigator:
         self._now = -math.inf
         self._seen = self._heard = -math.inf
         angles = np.array([mount.angle for mount in config.avoidance.mounts])
-        self._astern = np.abs(np.remainder(angles + math.pi, math.tau) - math.pi) > _ASTERN
+        self._astern = np.abs(all_wrapped(angles)) > _ASTERN
 
     def go(self, goal: Goal, posture: Posture, *, now: float) -> JourneyState:
         """Set out for a goal; see `Journey.go`."""
@@ -177,7 +178,7 @@ class Navigator:
             mount = config.mounts[k]
             dx, dy = (places - (x + c * mount.x - s * mount.y, y + s * mount.x + c * mount.y)).T
             far = np.hypot(dx, dy)
-            aside = np.abs(np.remainder(np.arctan2(dy, dx) - theta - mount.angle + math.pi, math.tau) - math.pi)
+            aside = np.abs(all_wrapped(np.arctan2(dy, dx) - theta - mount.angle))
             near = np.abs(far - ranges[k]) < _EXPLAINED
             found[k] = bool((near & (aside < config.half_cone + 0.05)).any())
         return found

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from robots.onboard.laser import LaserScan, OdometryTrack, beam_angles, deskewed
 from vrs.checks import number_in
+from vrs.mobile.kinematics import all_wrapped
 from vrs.mobile.rays import Grid
 from vrs.model import Array
 
@@ -158,7 +159,7 @@ class ObstacleMap:
         dy = (at[1] + (np.arange(low[1], high[1]) + 0.5) * grid.cell - origin[1])[None, :]
         far = np.hypot(dx, dy)
         middle = len(bearings) // 2
-        ahead = np.remainder(np.arctan2(dy, dx) - bearings[middle] + math.pi, math.tau) - math.pi + bearings[middle]
+        ahead = all_wrapped(np.arctan2(dy, dx) - bearings[middle]) + bearings[middle]
         beam = np.clip(np.searchsorted(bearings, ahead), 0, len(bearings) - 1)
         step = (bearings[-1] - bearings[0]) / (len(bearings) - 1)
         # A cell's half diagonal, as an angle, in beams on either side of its middle.

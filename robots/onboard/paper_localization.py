@@ -25,6 +25,7 @@ from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.localization import step_between
 from vrs.checks import number_in
 from vrs.mobile import advanced
+from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array
 
 
@@ -51,7 +52,7 @@ class PaperConfig:
 def differences(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array:
     """Δp̃ of seen lines in the world frame and the map's lines that they are, (k, 3)."""
     delta = known.poses[of] - placed.poses
-    delta[:, 2] = np.remainder(delta[:, 2] + math.pi, math.tau) - math.pi
+    delta[:, 2] = all_wrapped(delta[:, 2])
     return delta
 
 
@@ -79,7 +80,7 @@ def injected_update(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array
 
 def nearest_lines(known: Lines, placed: Lines, config: PaperConfig) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Seen lines, in the world frame, and the nearest lines of the map that they may be."""
-    turn = np.remainder(placed.poses[:, None, 2] - known.poses[:, 2] + np.pi, 2 * np.pi) - np.pi
+    turn = all_wrapped(placed.poses[:, None, 2] - known.poses[:, 2])
     delta = placed.poses[:, None, :2] - known.poses[:, :2]
     along, off = np.sum(delta * known.directions, axis=-1), np.abs(np.sum(delta * known.normals, axis=-1))
     beside = (along >= known.spans[:, 0]) & (along <= known.spans[:, 1])

@@ -26,7 +26,7 @@ from robots.onboard.legs import STEADY, Leg, along, braking
 from robots.onboard.play import PlayState, play_of
 from vrs.checks import number_in
 from vrs.model import Array, Limits
-from vrs.pacing import Law, certified, change, rest_after, seems_kept
+from vrs.pacing import TimeScaling, certified, change, rest_after, seems_kept
 from vrs.planning import violation
 from vrs.planning.plan import stacked
 from vrs.timeline import Timeline
@@ -86,7 +86,7 @@ class _Escape(NamedTuple):
     """Where play must slow down at the latest, and how."""
 
     p: float
-    law: Law | None = None
+    law: TimeScaling | None = None
     """None where the arm rests at p by itself."""
 
 
@@ -236,7 +236,7 @@ class Playout:
         self._legs.append(self._leg)
         self._due = t + min((escape.p - p) / pace, longest) if pace > 0 else None
 
-    def _change(self, t: float, law: Law, pace: float, escape: _Escape) -> None:
+    def _change(self, t: float, law: TimeScaling, pace: float, escape: _Escape) -> None:
         """Change the pace by a law."""
         self._leg, self._escape = Leg(t, law, law.end, pace), escape
         self._legs.append(self._leg)
@@ -274,7 +274,7 @@ class Playout:
             self.stretches.append(Stretch(self._slowed[0], t + law.duration, self._slowed[1]))
             self._slowed = None
 
-    def _resumption(self, p: float) -> tuple[Law, float, _Escape] | None:
+    def _resumption(self, p: float) -> tuple[TimeScaling, float, _Escape] | None:
         """The change from pace 0 to the highest pace that keeps the limits, and the escape after it."""
         for pace in _GO_ON:
             for ramp in _RAMPS:
@@ -347,7 +347,7 @@ class Playout:
         first, last = timeline.index_at(low), timeline.index_at(high)
         return any(self._smooth(owner) for owner in timeline.owners(max(first, 0), last + 1))
 
-    def _keeps(self, law: Law) -> bool:
+    def _keeps(self, law: TimeScaling) -> bool:
         """Whether the motion along a law keeps the limits."""
         jerk = self._smooth_on(law.coefficients[0][0], law.end)
         # Most that are tried don't, and samples tell so in a fraction of a certificate's time.

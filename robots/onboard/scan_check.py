@@ -19,6 +19,8 @@ CLOSE = 0.03
 """A beam that ends so near where it should, or within three deviations of the noise, is explained [m]."""
 THROUGH = 0.15
 """One that goes so much too far, and more than five deviations, contradicts [m]."""
+MOST_BEAMS = 91
+"""Beams of a scan that are looked at."""
 
 
 class Evidence(NamedTuple):
@@ -34,9 +36,7 @@ class Evidence(NamedTuple):
     """Look where the map has nothing."""
 
 
-def evidence(
-    lines: Lines, points: Points, posture: tuple[float, float, float], noise: float, *, most: int = 91
-) -> Evidence:
+def evidence(lines: Lines, points: Points, posture: tuple[float, float, float], noise: float) -> Evidence:
     """Hold a scan against a map.
 
     Args:
@@ -44,9 +44,8 @@ def evidence(
         points: What was seen, in the robot's frame.
         posture: Where the robot would be, (x, y, θ) [m, m, rad].
         noise: Standard deviation of a range [m].
-        most: Beams that are looked at.
     """
-    step = max(1, math.ceil(len(points.beams) / most))
+    step = max(1, math.ceil(len(points.beams) / MOST_BEAMS))
     ranges = points.ranges[::step]
     if not len(ranges):
         return Evidence(0.0, 0.0, 0.0, 1.0)

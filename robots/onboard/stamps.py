@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.errors import InvalidValueError
 
 LARGEST = 2**64 - 1

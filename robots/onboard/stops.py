@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vrs.checks import finite, finite_array
 from vrs.chunk import State
-from vrs.commands import Profile, finite, finite_array
+from vrs.commands import Profile
 from vrs.insertion import piece
 from vrs.model import Array, Limits, frozen_array
 from vrs.pacing import composed, halting

@@ -13,7 +13,7 @@ from robots.onboard.lease import Answer, Ended, Grant, Lease, LeaseConfig, Lease
 from robots.onboard.stamps import Stamp, Verdict
 from robots.onboard.values import Refusal, ValueGuard
 from robots.onboard.watchdog import Action, Manner, StopReason, Watchdog, WatchdogConfig, WatchdogState
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.errors import InvalidValueError
 
 Output: TypeAlias = Action | Ended | Grant

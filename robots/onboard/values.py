@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vrs.commands import JointTarget, MotionCommand, PoseTarget, SteerCommand, finite
+from vrs.checks import finite
+from vrs.commands import JointTarget, MotionCommand, PoseTarget, SteerCommand
 from vrs.errors import InvalidValueError
 from vrs.model import Array, Limits
 

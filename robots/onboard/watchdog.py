@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from robots.onboard.stamps import LARGEST, Kind, SequenceWindow, Stamp, Verdict, whole
-from vrs.checks import number_in
-from vrs.commands import finite
+from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
 
 _ROUNDING = 1e-6

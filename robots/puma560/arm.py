@@ -32,7 +32,7 @@ from robots.puma560.branches import (
 )
 from robots.puma560.kinematics import geometric_jacobian, link_poses
 from robots.puma560.parameters import A2, DOF, POSES, TOOL_SPEED, TOOL_TURN_SPEED, default_limits
-from vrs.commands import finite, finite_array
+from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError, UnreachablePoseError
 from vrs.model import Array, Limits
 

@@ -20,7 +20,7 @@ from robots.puma560.branches import (
     Asked,
 )
 from robots.puma560.parameters import A2, A3, D3, D4, DOF
-from vrs.commands import finite_array
+from vrs.checks import finite_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 

@@ -24,7 +24,7 @@ from robots.onboard.servo import Servo, ServoGains
 from robots.puma560 import dynamics
 from robots.puma560.dynamics import NominalArm
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, DOF, FLANGE, POSES
-from vrs.commands import finite_array
+from vrs.checks import finite_array
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array, frozen_array
 
@@ -350,11 +350,6 @@ class RealArm:
             self._world.bullet.resetJointState(
                 self._body, j, x, targetVelocity=v, physicsClientId=self._world.client
             )
-
-
-def real_arm(reality: Reality | None = None, q: ArrayLike | None = None, payload: Payload | None = None) -> RealArm:
-    """Make a real arm: see `RealArm`."""
-    return RealArm(reality, q, payload)
 
 
 def _references(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[Array, Array, Array]:

@@ -54,8 +54,6 @@ COULOMB: Final = (
 """Coulomb friction, motor side [N m]: opposes positive joint speed, opposes negative joint speed."""
 TORQUE_MAX: Final = (97.6, 186.4, 89.4, 24.2, 20.1, 21.3)
 """Largest joint torques [N m] (Armstrong, Khatib, Burdick 1986, table of motor and drive parameters)."""
-ENCODER_COUNTS: Final = 1000
-"""Encoder counts a motor turn, after quadrature: 62,611 counts a turn of joint 1."""
 
 _G: Final = np.array(GEAR)
 

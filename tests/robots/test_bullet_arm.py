@@ -10,7 +10,7 @@ from roboticstoolbox.models.DH import Puma560
 from robots.bullet import Payload, Reality, WorldClosedError
 from robots.onboard import ServoGains
 from robots.puma560 import dynamics
-from robots.puma560.body import RealArm, real_arm
+from robots.puma560.body import RealArm
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, FLANGE, default_limits
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -219,10 +219,14 @@ def test_free_swing_converges_to_an_independent_simulation() -> None:
     assert 1.7 < errors[0] / errors[1] < 2.3
 
 
-def test_torque_limits_hold_and_are_counted() -> None:
-    refs = [np.tile(np.array(START) + 1.0, (50, 1)), np.zeros((50, 6)), np.zeros((50, 6))]
+@pytest.mark.parametrize("step", [1.0, -1.0])
+def test_torque_limits_hold_either_way_and_are_counted(step: float) -> None:
+    refs = [np.tile(np.array(START) + step, (50, 1)), np.zeros((50, 6)), np.zeros((50, 6))]
     with RealArm(q=START) as arm:
         measured = arm.run(*refs)
+    # From the second step on it knows that it's far away.
+    assert (measured.tau[1] == step * np.array(dynamics.TORQUE_MAX)).any()
+    assert (measured.tau[1] * step > 0).all()
     assert (np.abs(measured.tau) <= dynamics.TORQUE_MAX).all()
     assert (measured.saturated == (np.abs(measured.tau) == dynamics.TORQUE_MAX).sum(axis=0)).all()
     assert measured.saturated.any()
@@ -273,7 +277,7 @@ def test_no_reference_is_no_step() -> None:
 
 
 def test_a_closed_arm_has_given_its_client_back() -> None:
-    with real_arm() as arm:
+    with RealArm() as arm:
         bullet, client = arm._world.bullet, arm._world.client
         assert bullet.getConnectionInfo(client)["isConnected"] == 1
     assert arm.closed

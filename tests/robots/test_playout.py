@@ -222,3 +222,22 @@ def test_rejects_what_makes_no_sense() -> None:
         PlayoutConfig(slew=0.5)
     with pytest.raises(InvalidValueError, match="buffer"):
         PlayoutConfig(buffer=float("nan"))
+
+
+def test_in_mid_motion_it_goes_on_only_with_enough_ahead() -> None:
+    """Else each message would let it start and stop again."""
+    engine = Engine(MODEL, q=MODEL.poses["nominal"])
+    engine.execute(MotionCommand(JointTarget(MODEL.poses["ready"]), None, 0.5, 0.2))
+    playout = Playout(engine.timeline, LIMITS, now=0.0, p=0.0, config=PlayoutConfig(buffer=1.5))
+    playout.aim(0.0, now=0.0)
+
+    def hear(complete: float, now: float, until: float) -> float:
+        playout.hear(complete, engine.timeline, now=now)
+        while (due := playout.next_deadline()) is not None and due <= until:
+            playout.advance(now=due)
+        return float(playout.at(np.array([until])).p[0])
+
+    stood = hear(2.0, 0.0, 4.0)
+    assert 1.5 < stood <= 2.0
+    assert hear(stood + 1.4, 4.0, 6.0) == stood
+    assert hear(stood + 1.6, 6.0, 8.0) > stood + 0.5

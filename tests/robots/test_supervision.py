@@ -124,6 +124,14 @@ def test_a_free_robot_that_is_stopping_isnt_given_away() -> None:
 def test_a_lease_shorter_than_the_timeout_would_be_a_second_timeout() -> None:
     with pytest.raises(InvalidValueError, match="lease timeout"):
         Supervision(WatchdogConfig(timeout=1.0), LeaseConfig(timeout=0.9))
+    assert Supervision(WatchdogConfig(timeout=1.0), LeaseConfig(timeout=1.0)).holder is None
+
+
+def test_only_an_admin_takes_over_a_lease_that_is_free() -> None:
+    guard = Supervision()
+    assert guard.take_over("eve", admin=False, now=0.0) is LeaseRefusal.NOT_ADMIN
+    assert guard.holder is None
+    assert guard.take_over("eve", admin=True, now=0.0) == Grant(1, "eve", 0.0)
 
 
 def test_the_next_deadline_is_the_earlier() -> None:

@@ -159,6 +159,8 @@ def test_finish_lets_the_accepted_motion_be_the_stop_and_no_longer() -> None:
     assert stop_of(armed(**values), 0.5, rest_at=1.001).manner is Manner.COMMANDED
     assert stop_of(armed(**values), 0.5).manner is Manner.COMMANDED
     assert stop_of(armed(), 0.5, rest_at=0.6).manner is Manner.COMMANDED
+    # Looked at only when the time to finish is over, too.
+    assert stop_of(armed(**values), 1.001, rest_at=0.9).manner is Manner.COMMANDED
     dog = armed(**values)
     first = stop_of(dog, 0.5, rest_at=0.9)
     assert dog.next_deadline() == 1.0

@@ -128,3 +128,14 @@ def test_noise_on_a_slow_path_does_not_bias_the_time_difference():
 def test_the_match_is_causal():
     result = compare_paths(t, figure_eight(t), figure_eight(t + 1.0))
     assert -0.06 < result.time_difference_mean < 0.06
+
+
+def test_a_follower_that_is_now_slower_and_now_quicker_has_a_speed_error():
+    """The differences of both halves don't make good for each other."""
+
+    def line(t):
+        return np.stack((0.2 * t, 0 * t), axis=1)
+
+    slow = 0.15 * np.minimum(t, 20) + 0.25 * np.clip(t - 20, 0, 20)
+    result = compare_paths(t, line(np.minimum(t, 40)), np.stack((slow, 0 * t), axis=1))
+    assert result.speed_error == pytest.approx(0.05, abs=0.005)

@@ -125,6 +125,16 @@ class TestPace:
         lawful(engine)
         assert np.abs(engine.timeline.sample(engine.timeline.end) - C).max() < 1e-9
 
+    def test_an_arm_that_was_too_fast_goes_on_at_the_pace(self):
+        ends = []
+        for pace in (0.2, 0.1):
+            engine = Engine(MODEL, q=A)
+            engine.execute(MotionCommand(JointTarget(B)))
+            answer = engine.execute(MotionCommand(JointTarget(C), execute_at=0.6, pace=pace))
+            assert "too fast for the command's pace" in answer.reason
+            ends.append(answer.end - answer.execute_at)
+        assert ends[1] > 1.5 * ends[0]
+
     @pytest.mark.parametrize("seed", [6, 11, 14])
     def test_no_state_is_too_fast_to_be_answered(self, seed):
         """States far beyond the limits of the pace, of which Ruckig would make an error of its own."""

@@ -9,6 +9,7 @@ import pytest
 
 from robots import puma560
 from vrs.chunk import Piece, State
+from vrs.commands import Frame
 from vrs.errors import InvalidValueError
 from vrs.planning import Profile, move
 from vrs.planning.parabolic import brake
@@ -39,7 +40,7 @@ class Hand:
         self.notes = 0
         self.worst = 0.0
 
-    def give(self, t: float, *, rates=None, twist=None, frame="base", hold=HOLD) -> Plan:
+    def give(self, t: float, *, rates=None, twist=None, frame=Frame.BASE, hold=HOLD) -> Plan:
         state = self.timeline.state_before(t)
         plan, note = steer(state, rates, twist, frame, hold, MODEL, LIMITS)
         assert violation(plan, LIMITS, jerk=True) is None
@@ -94,7 +95,7 @@ def test_laws_hold_for_inputs_at_any_interval(kind: str, seed: int):
             rates = rng.uniform(-1.3, 1.3, 6) * LIMITS.qd_max * (rng.random(6) < 0.5)
             twist = np.concatenate([rng.uniform(-0.4, 0.4, 3), rng.uniform(-1, 1, 3) * (rng.random() < 0.5)])
             twist *= rng.random() < 0.8
-        asked = {"rates": rates} if kind == "rates" else {"twist": twist, "frame": kind}
+        asked = {"rates": rates} if kind == "rates" else {"twist": twist, "frame": Frame(kind)}
         plan = hand.give(t, **asked)
         assert plan.duration < HOLD + 1.0
         t += 10 ** rng.uniform(-3, 0)
@@ -118,7 +119,7 @@ def test_it_takes_over_from_any_state_of_a_move(profile: Profile):
         asked = {"rates": rng.uniform(-1, 1, 6) * LIMITS.qd_max, "twist": None}
         if rng.random() < 0.5:
             asked = {"rates": None, "twist": rng.uniform(-0.3, 0.3, 6)}
-        made, note = steer(state, asked["rates"], asked["twist"], "base", HOLD, MODEL, LIMITS)
+        made, note = steer(state, asked["rates"], asked["twist"], Frame.BASE, HOLD, MODEL, LIMITS)
         assert violation(made, LIMITS, jerk=True) is None
         end = end_state(made)
         assert max(np.abs(end.qd).max(), np.abs(end.qdd).max() if not note else 0.0) < 1e-9
@@ -135,7 +136,7 @@ def test_where_no_bounded_jerk_can_stop_it_brakes_with_parabolas_and_says_so():
     q[0] = LIMITS.q_max[0] - 0.5 * V * V / A - 1e-6
     qd = np.array([V, 0, 0, 0, 0, 0])
     state = State(q, qd, ZERO)
-    plan, note = steer(state, qd, None, "base", HOLD, MODEL, LIMITS)
+    plan, note = steer(state, qd, None, Frame.BASE, HOLD, MODEL, LIMITS)
     assert note == BRAKED_ONLY
     assert np.array_equal(plan.durations, brake(state, LIMITS).durations)
     assert violation(plan, LIMITS, jerk=False) is None
@@ -144,7 +145,7 @@ def test_where_no_bounded_jerk_can_stop_it_brakes_with_parabolas_and_says_so():
 def test_rates_are_reached_in_the_least_time_and_the_stop_begins_with_the_hold():
     J, A = LIMITS.qddd_max[0], LIMITS.qdd_max[0]
     u = 0.5 * A * A / J
-    plan, _ = steer(State(ZERO, ZERO, ZERO), [u, 0, 0, 0, 0, 0], None, "base", 0.5, MODEL, LIMITS)
+    plan, _ = steer(State(ZERO, ZERO, ZERO), [u, 0, 0, 0, 0, 0], None, Frame.BASE, 0.5, MODEL, LIMITS)
     ramp = 2.0 * (u / J) ** 0.5
     assert np.cumsum(plan.durations) == pytest.approx([ramp / 2, ramp, 0.5, 0.5 + ramp / 2, 0.5 + ramp])
     assert end_state(plan).q[0] == pytest.approx(0.5 * u, rel=1e-12)
@@ -214,15 +215,15 @@ def test_inputs_that_stop_coming_end_in_rest():
 @pytest.mark.parametrize(
     ("rates", "twist", "frame", "hold"),
     [
-        (None, None, "base", 0.2),
-        (ZERO, ZERO, "base", 0.2),
-        (np.full(6, np.nan), None, "base", 0.2),
-        (np.zeros(5), None, "base", 0.2),
-        (None, [0, 0, np.inf, 0, 0, 0], "base", 0.2),
-        (None, np.zeros((6, 1)), "base", 0.2),
-        (None, "up", "base", 0.2),
+        (None, None, Frame.BASE, 0.2),
+        (ZERO, ZERO, Frame.BASE, 0.2),
+        (np.full(6, np.nan), None, Frame.BASE, 0.2),
+        (np.zeros(5), None, Frame.BASE, 0.2),
+        (None, [0, 0, np.inf, 0, 0, 0], Frame.BASE, 0.2),
+        (None, np.zeros((6, 1)), Frame.BASE, 0.2),
+        (None, "up", Frame.BASE, 0.2),
         (None, ZERO, "world", 0.2),
-        (ZERO, None, "base", np.nan),
+        (ZERO, None, Frame.BASE, np.nan),
     ],
 )
 def test_bad_input_is_refused(rates, twist, frame, hold):
@@ -234,7 +235,7 @@ def test_huge_and_tiny_inputs_make_finite_plans():
     state = State(MODEL.poses["nominal"], ZERO, ZERO)
     for size in (1e-310, 1e-12, 1e12, 1e308):
         for asked in ((np.full(6, size), None), (None, np.full(6, size))):
-            plan, _ = steer(state, *asked, "tool", HOLD, MODEL, LIMITS)
+            plan, _ = steer(state, *asked, Frame.TOOL, HOLD, MODEL, LIMITS)
             assert violation(plan, LIMITS, jerk=True) is None
 
 
@@ -288,7 +289,7 @@ def test_the_tool_frame_turns_with_the_tool():
     hand = Hand(MODEL.poses["nominal"])
     twist = np.array([0.05, 0.0, 0.05, 0.0, 0.6, 0.0])
     for k in range(6):
-        hand.give(HOLD * k, twist=twist, frame="tool")
+        hand.give(HOLD * k, twist=twist, frame=Frame.TOOL)
     t = np.array([0.59, 0.79, 0.99])
     for moment in t:
         q, qd = hand.timeline.sample(moment), hand.timeline.sample(moment, derivative=1)

@@ -13,12 +13,12 @@ from vrs.mobile.kinematics import advanced, increment, rotation, speeds, wheel_s
 from vrs.mobile.limiting import braking, clipped, limited
 from vrs.mobile.model import DriveLimits, MobileModel, Wheels
 from vrs.mobile.rays import Grid, cast
-from vrs.mobile.timeline import ArcTimeline, Drive
+from vrs.mobile.timeline import ArcPiece, ArcTimeline
 
 __all__ = [
+    "ArcPiece",
     "ArcTimeline",
     "Avoidance",
-    "Drive",
     "DriveLimits",
     "Feedback",
     "Grid",

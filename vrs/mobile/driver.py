@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vrs.agenda import Agenda, before_issue, passed
+from vrs.agenda import Agenda
 from vrs.chunk import HOLD
 from vrs.commands import DriveCommand, Insertion, Lateness, Stop
 from vrs.errors import PlanningError
@@ -12,8 +12,8 @@ from vrs.insertion import Edit, tail_at
 from vrs.ledger import Ledger
 from vrs.mobile.limiting import braking
 from vrs.mobile.model import DriveLimits, MobileModel
-from vrs.mobile.timeline import ArcTimeline, Drive
-from vrs.receipt import Receipt, Status
+from vrs.mobile.timeline import ArcPiece, ArcTimeline
+from vrs.receipt import Receipt
 
 _NOWHERE = np.empty(0)
 """A drive command has no target."""
@@ -38,24 +38,15 @@ class Driver(Agenda[ArcTimeline]):
         """
         issued = command.issued_at if command.issued_at is not None else now
         asked, end = command.execute_at, self.timeline.end
-        status, reason = Status.ACCEPTED, ""
         refusal = self.limits.refusal(command.v, command.w)
         if refusal:
             return self.reject(issued, asked, refusal)
-        t = end if asked is None else asked
-        if now is not None:
-            issued = now if issued is None else issued
-            t = max(t, now, issued) if asked is None else t
-            if t < issued:
-                return self.reject(issued, asked, before_issue(t, issued))
-            if t < now:
-                reason = passed(t, now)
-                if self.lateness is Lateness.REJECT:
-                    return self.reject(issued, asked, reason)
-                t = self.end_of_active(now)
-                status, reason = Status.POSTPONED, f"{reason}: postponed to {t:.9g} s"
+        try:
+            t, _, _, status, reason = self.beginning(command, now, end)
+        except PlanningError as error:
+            return self.reject(issued, asked, str(error))
         command_id = self.ledger.newest + 1
-        edit = self._spliced(t, Drive(command.duration, command.v, command.w, command_id))
+        edit = self._spliced(t, ArcPiece(command.duration, command.v, command.w, command_id))
         appended = t >= end
         shifted, dropped = ((), ()) if appended else self.touched(edit, t)
         receipt = Receipt(
@@ -64,17 +55,17 @@ class Driver(Agenda[ArcTimeline]):
         )  # fmt: skip
         return self.accept(receipt, None, edit, t, appended=appended)
 
-    def _spliced(self, t: float, drive: Drive) -> Edit[ArcTimeline]:
+    def _spliced(self, t: float, piece: ArcPiece) -> Edit[ArcTimeline]:
         """The past, the new arc, standing while there's slack, and the tail from where the robot then is."""
         timeline = self.timeline
         tail, dropped = tail_at(timeline, t, Insertion.SPLICE)
-        arrival = t + drive.duration
+        arrival = t + piece.duration
         if tail is None:
-            return Edit(timeline.edited(t, [drive]), t, arrival, _NOWHERE, dropped=dropped)
+            return Edit(timeline.edited(t, [piece]), t, arrival, _NOWHERE, dropped=dropped)
         scheduled = timeline.start_of(tail)
         slack = scheduled - arrival
-        drives = [drive, Drive(slack, 0.0, 0.0, HOLD)] if slack > 0 else [drive]
-        after = timeline.edited(t, drives, tail, max(scheduled, arrival))
+        pieces = [piece, ArcPiece(slack, 0.0, 0.0, HOLD)] if slack > 0 else [piece]
+        after = timeline.edited(t, pieces, tail, max(scheduled, arrival))
         return Edit(after, t, arrival, _NOWHERE, max(-slack, 0.0), tail, dropped)
 
     def stop(self, command: Stop, now: float | None) -> Receipt:
@@ -99,5 +90,5 @@ class Driver(Agenda[ArcTimeline]):
     def brake(self, t: float, command_id: int) -> tuple[ArcTimeline, str]:
         """What is scheduled, with the robot braking along its arc from t [s] on, a command every period."""
         steps = braking(self.timeline.speeds_before(t), self._period, self.limits)
-        drives = [Drive(self._period, v, w, command_id) for v, w in steps]
-        return self.timeline.edited(t, drives), "stopped on its arc" if drives else "stood"
+        pieces = [ArcPiece(self._period, v, w, command_id) for v, w in steps]
+        return self.timeline.edited(t, pieces), "stopped on its arc" if pieces else "stood"

@@ -24,6 +24,11 @@ def wrapped(angle: float) -> float:
     return remainder(angle, tau)
 
 
+def all_wrapped(angles: Array) -> Array:
+    """The same angles [rad], of any shape, in [−π, π)."""
+    return np.remainder(angles + pi, tau) - pi
+
+
 def speeds(wheels: ArrayLike, base: float) -> Array:
     """Speeds (v, ω) of wheel speeds (v_R, v_L), (2,) or (k, 2).
 

@@ -30,7 +30,7 @@ _SPARSE = 8
 """Segments in between for each time asked for, from which on the times are looked up one by one."""
 
 
-class Drive(NamedTuple):
+class ArcPiece(NamedTuple):
     """A new arc for an edit: it begins where the one before it ends."""
 
     duration: float
@@ -134,7 +134,7 @@ class ArcTimeline(Track[ArcSegment]):
         return advanced((x, y, theta), v, w, t - start)
 
     def edited(
-        self, cut: float, drives: Sequence[Drive], tail: int | None = None, tail_start: float = 0.0
+        self, cut: float, pieces: Sequence[ArcPiece], tail: int | None = None, tail_start: float = 0.0
     ) -> ArcTimeline:
         """Keep what lies before `cut`, put arcs there, and let the segments from `tail` on follow.
 
@@ -144,18 +144,18 @@ class ArcTimeline(Track[ArcSegment]):
         Args:
             cut: Time of the cut [s]; the arc that it falls into is shortened. After the end the robot stands
                 until then; before the start the timeline begins at the cut.
-            drives: What comes instead.
+            pieces: What comes instead.
             tail: Index, in this timeline, of the first segment that stays after the new ones; None for none.
             tail_start: Time at which the tail starts [s].
         """
         start, height = self._start, len(self._levels)
         left, last = self._cut(cut)
         here = self._last() if cut >= self._end else self.posture_at(cut)
-        begin, made = cut, list(drives)
+        begin, made = cut, list(pieces)
         if self._root is None or not self._first <= cut < self._end:
             start = min(start, cut)
             if cut > self._end:
-                made.insert(0, Drive(cut - self._end, 0.0, 0.0, HOLD))
+                made.insert(0, ArcPiece(cut - self._end, 0.0, 0.0, HOLD))
                 begin = self._end
         starts, durations, owners, rows = array("d"), array("d"), array("q"), list[bytes]()
         for duration, v, w, owner in made:

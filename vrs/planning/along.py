@@ -13,7 +13,7 @@ from vrs.model import Array, Limits, RobotModel
 from vrs.planning.fit import fit_parts
 from vrs.planning.path import Path
 from vrs.planning.plan import Plan, slowed, violation
-from vrs.planning.time_law import Law, fastest, few_knots, parabolas, smoothed
+from vrs.planning.time_law import TimeLaw, fastest, few_knots, parabolas, smoothed
 
 TOLERANCE: Final = 1e-10
 """Largest deviation of the polynomials from the path [rad]."""
@@ -39,7 +39,7 @@ _STRETCHES: Final = (0.0, 1e-6, 1e-4, 1e-3, 1e-2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Grid:
+class Samples:
     """Samples of a path, pieces' ends included, increasing."""
 
     s: Array
@@ -48,21 +48,21 @@ class Grid:
     """q and its first three derivatives by the parameter, (k, 4, n)."""
 
 
-def grid(path: Path) -> Grid:
+def sampled(path: Path) -> Samples:
     """Sample a path densely enough to judge it."""
     m = len(path.edges) - 1
     x = np.linspace(-1.0, 1.0, max(8, -(-_SAMPLES // m)) + 1)
     s, joints = path.sample(x)
     inner = joints[:, :-1].reshape(-1, *joints.shape[2:])
-    return Grid(np.append(s[:, :-1].ravel(), path.edges[-1]), np.concatenate([inner, joints[-1:, -1]]))
+    return Samples(np.append(s[:, :-1].ravel(), path.edges[-1]), np.concatenate([inner, joints[-1:, -1]]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Journey:
+class Traversal:
     """A path to travel, and under which limits."""
 
     path: Path
-    grid: Grid
+    samples: Samples
     start: Array
     """q at the beginning [rad], (n,)."""
     end: Array
@@ -83,7 +83,7 @@ class Journey:
 
         On a blend the arm may be faster than v allows: it was when it came.
         """
-        s, first = self.grid.s, np.abs(self.grid.joints[:, 1])
+        s, first = self.samples.s, np.abs(self.samples.joints[:, 1])
         linear, angular = self.path.course.speeds(s)
         v = np.full(len(s), self.speed)
         tool, turn = np.full(len(s), self.model.tool_speed), np.full(len(s), self.model.tool_turn_speed)
@@ -101,7 +101,7 @@ class Journey:
         cap: Array = speed * speed
         return cap
 
-    def law(self, margin: float, slower: float = _SLOWER) -> Law:
+    def law(self, margin: float, slower: float = _SLOWER) -> TimeLaw:
         """The fastest time law, of few parabolas.
 
         Args:
@@ -111,7 +111,7 @@ class Journey:
         Raises:
             PlanningError: If the arm is too fast for the path.
         """
-        s, first, second = self.grid.s, self.grid.joints[:, 1], self.grid.joints[:, 2]
+        s, first, second = self.samples.s, self.samples.joints[:, 1], self.samples.joints[:, 2]
         acceleration = self.limits.qdd_max * (1.0 - margin)
         cap, square = self.caps(margin), self.rate**2
         edges = self.path.course.edges
@@ -130,7 +130,7 @@ class Journey:
                 return law
         return least
 
-    def polynomials(self, law: Law) -> Plan:
+    def polynomials(self, law: TimeLaw) -> Plan:
         """The joints under a time law, not certified."""
         edges = self.path.edges
         law = split(law, edges)
@@ -214,7 +214,7 @@ class Journey:
             if self._factors([law])[0] > 1.0 + _ROOM:
                 continue
             blend = [0.0, self.rate, 0.0, 0.0]
-            whole = Law(
+            whole = TimeLaw(
                 np.append(1.0 / self.rate, law.durations), np.vstack([blend, law.coefficients]), smooth=True
             )
             plan = self.polynomials(whole)
@@ -223,20 +223,20 @@ class Journey:
                 return plan
         raise PlanningError(f"no smooth blend onto the line: {problem}")
 
-    def _onward(self, width: float, margin: float) -> Law:
+    def _onward(self, width: float, margin: float) -> TimeLaw:
         """The law from the end of a blend on: smooth, begun at the blend's rate and without acceleration."""
         lead = 1.0 + 0.5 * width * self.rate
-        later = self.grid.s > lead + 1e-9
+        later = self.samples.s > lead + 1e-9
         if np.count_nonzero(later) < _LEAST:
             raise PlanningError("the line is too short for its blend")
         begin = np.array([lead])
-        s = np.concatenate([begin, self.grid.s[later]])
-        joints = np.concatenate([self.path.value(begin), self.grid.joints[later]])
-        after = replace(self, grid=Grid(s, joints)).law(margin, _SLOWER_SMOOTH)
+        s = np.concatenate([begin, self.samples.s[later]])
+        joints = np.concatenate([self.path.value(begin), self.samples.joints[later]])
+        after = replace(self, samples=Samples(s, joints)).law(margin, _SLOWER_SMOOTH)
         durations = np.append(0.5 * width, after.durations)
-        return smoothed(Law(durations, np.vstack([[1.0, self.rate, 0.0, 0.0], after.coefficients])), width)
+        return smoothed(TimeLaw(durations, np.vstack([[1.0, self.rate, 0.0, 0.0], after.coefficients])), width)
 
-    def _factors(self, laws: list[Law]) -> Array:
+    def _factors(self, laws: list[TimeLaw]) -> Array:
         """By how much smooth laws must be slowed to keep the limits, at least 1; judged at samples, (m,)."""
         x = np.linspace(0.0, 1.0, _LOOKS)
         values = []
@@ -262,10 +262,10 @@ class Journey:
 
     def between(self, s: Array) -> tuple[Array, Array, Array]:
         """First three derivatives of q by the parameter at s, (k,), between samples: good enough to choose by."""
-        at = self.grid.s
+        at = self.samples.s
         i = np.searchsorted(at[1:-1], s, side="right")
         share = ((s - at[i]) / (at[i + 1] - at[i]))[:, None, None]
-        joints = self.grid.joints[:, 1:]
+        joints = self.samples.joints[:, 1:]
         low = joints[i]
         low += share * (joints[i + 1] - low)
         return low[:, 0], low[:, 1], low[:, 2]
@@ -290,7 +290,7 @@ class Journey:
         raise PlanningError(f"no time law along the line: {problem}")
 
 
-def split(law: Law, edges: Array) -> Law:
+def split(law: TimeLaw, edges: Array) -> TimeLaw:
     """Divide pieces of a law that run through several pieces of a path: no one polynomial would do for those."""
     m = len(law.durations)
     ends = law.value(np.arange(m), law.durations)[0]
@@ -303,7 +303,7 @@ def split(law: Law, edges: Array) -> Law:
     u = h * (np.arange(len(part)) - np.repeat(np.cumsum(counts) - counts, counts))
     s = law.value(part, u)
     factorials = np.array([1.0, 1.0, 2.0, 6.0])
-    return Law(h, (s / factorials[:, None]).T, law.smooth)
+    return TimeLaw(h, (s / factorials[:, None]).T, law.smooth)
 
 
 def _peak(plan: Plan, bounds: tuple[Array, ...]) -> float:

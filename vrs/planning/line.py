@@ -17,7 +17,7 @@ from vrs.commands import Profile
 from vrs.errors import PlanningError, UnresolvedError
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning import parabolic
-from vrs.planning.along import Grid, Journey, grid
+from vrs.planning.along import Samples, Traversal, sampled
 from vrs.planning.course import Course, rotation_vector
 from vrs.planning.jerk_limited import rest_to_rest as smooth_rest_to_rest
 from vrs.planning.joining import courses, smooth_stop
@@ -134,7 +134,7 @@ def _from_rest(q: Array, task: _Task) -> tuple[Plan, str]:
                 raise PlanningError(_other(q, other, task))
         return empty(len(q)), ""
     path = _traced(course, start, task, hardness, free=free)
-    samples = grid(path)
+    samples = sampled(path)
     begin, end = samples.joints[[0, -1], 0]
     if np.abs(begin - q).max() > _SAME and not free:
         raise PlanningError(_other(q, begin, task))
@@ -147,8 +147,8 @@ def _from_rest(q: Array, task: _Task) -> tuple[Plan, str]:
     else:
         begin = q
     end = _check_arrival(end, task)
-    journey = Journey(path, samples, begin, end, task.speed, model, task.limits)
-    plan = journey.jerk_limited() if task.profile is Profile.JERK_LIMITED else journey.parabolic()
+    traversal = Traversal(path, samples, begin, end, task.speed, model, task.limits)
+    plan = traversal.jerk_limited() if task.profile is Profile.JERK_LIMITED else traversal.parabolic()
     return turn.then(plan), note
 
 
@@ -182,7 +182,7 @@ def _traced(course: Course, q: Array, task: _Task, hardness: float, *, free: boo
     return trace(graded, q, task.model, task.configuration, pieces=4, halvings=24, free=free, tolerance=tolerance)
 
 
-def _check(path: Path, samples: Grid, task: _Task) -> None:
+def _check(path: Path, samples: Samples, task: _Task) -> None:
     problem = obstacle(path, samples.s, samples.joints[:, 0], task.model, task.limits)
     if problem is not None:
         raise PlanningError(f"no straight line: {problem}")
@@ -255,15 +255,15 @@ def _blended(state: State, task: _Task) -> tuple[Plan, str] | None:
             path = trace(
                 course, state.q, model, task.configuration, pieces=3, halvings=8, free=False, tolerance=RESOLVED
             )
-            samples = grid(path)
+            samples = sampled(path)
             _check(path, samples, task)
             begin, end = samples.joints[[0, -1], 0]
             if np.abs(begin - state.q).max() > _SAME:
                 return None
             end = _check_arrival(end, task)
             growth = state.qdd if smooth else None
-            journey = Journey(path, samples, state.q, end, task.speed, model, limits, state.qd, growth, 1.0 / b)
-            plan = journey.joined_smoothly() if smooth else journey.parabolic()
+            traversal = Traversal(path, samples, state.q, end, task.speed, model, limits, state.qd, growth, 1.0 / b)
+            plan = traversal.joined_smoothly() if smooth else traversal.parabolic()
         except PlanningError:
             continue
         return plan, f"on the line from {_met(course)} on"

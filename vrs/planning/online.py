@@ -33,10 +33,10 @@ _ROUNDED = 1e-15
 """Share of a duration that's only rounding."""
 _END_ERROR = 2e-10
 """Root of the sum of squares of position [rad], speed [rad/s] and acceleration [rad/s²] missing at a plan's end."""
-_DEPENDENT = 1e-12
-"""Share of a row of weights that's only rounding."""
 _AIM = 1e-11
 """The same, where repairs can reach it; in moves of minutes rounding leaves more."""
+_DEPENDENT = 1e-12
+"""Share of a row of weights that's only rounding."""
 
 
 def online(start: State, goal: State, speed: float, limits: Limits, *, order: int) -> Plan | None:

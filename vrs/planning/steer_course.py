@@ -16,8 +16,6 @@ SLOW_FROM = 30.0
 """Condition number from which approaching a singularity slows the tool."""
 STOP_AT = 100.0
 """Condition number at which approaching ends, and above which rates are damped."""
-LENGTH = 0.4318
-"""Characteristic length [m] of a model that doesn't state one."""
 _NODES = np.array([0.0, 0.3, 1.0])
 _FINE = np.linspace(0.0, 1.0, 25)
 FREE = np.ones_like(_FINE)
@@ -65,7 +63,7 @@ def _cross(a: Array, b: Array) -> Array:
 def weighted_jacobian(model: RobotModel, q: Array) -> Array:
     """Jacobians of joint positions (k, n), linear rows over the characteristic length: (k, 6, n)."""
     J = np.array(model.jacobian(q))
-    J[:, :3] /= float(getattr(model, "characteristic_length", LENGTH))
+    J[:, :3] /= model.characteristic_length
     return J
 
 
@@ -129,7 +127,7 @@ def rates_to_limits(q: Array, limits: Limits) -> tuple[Array, Array]:
     return -low, high
 
 
-class Course(NamedTuple):
+class TwistCourse(NamedTuple):
     """The joint rates along the twist, as functions of the way s [s at full speed]."""
 
     u: Array
@@ -148,7 +146,7 @@ class Course(NamedTuple):
 
 def course(
     model: RobotModel, q: Array, u: Array, aside: Array, twist: Twist, reach: float, limits: Limits
-) -> Course:
+) -> TwistCourse:
     """Sample rates and condition numbers on the way.
 
     Args:
@@ -187,7 +185,7 @@ def course(
         ahead = np.interp(grid, ways, near)
         ahead += np.maximum(grid - seen, 0.0) * float(near[2] - near[1]) / float(ways[2] - ways[1])
         caps = np.minimum(caps, _share(ahead, grid, sqrt(float(u @ u))))
-    return Course(u, slope, curve, offset, seen, grid, caps)
+    return TwistCourse(u, slope, curve, offset, seen, grid, caps)
 
 
 def _share(near: Array, way: Array, rate: float) -> Array:

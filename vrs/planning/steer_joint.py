@@ -17,7 +17,7 @@ from vrs.chunk import State
 from vrs.model import Array, Limits
 from vrs.planning.plan import Plan, empty, packed
 
-Profile: TypeAlias = list[tuple[float, float, float]]
+JerkProfile: TypeAlias = list[tuple[float, float, float]]
 """(duration [s], jerk [rad/s³], acceleration at its end [rad/s²]) of each phase."""
 Moving: TypeAlias = tuple[float, float, float]
 """Position, rate, acceleration of one joint."""
@@ -33,7 +33,7 @@ _NEAR = 1e-10
 """Distance from a position limit [rad] that isn't worth a motion."""
 
 
-def change(v: float, a: float, u: float, A: float, J: float) -> Profile:
+def change(v: float, a: float, u: float, A: float, J: float) -> JerkProfile:
     """Change a rate in the least time.
 
     Args:
@@ -66,9 +66,9 @@ def change(v: float, a: float, u: float, A: float, J: float) -> Profile:
     return [phase for phase in phases if phase[0] > 0.0]
 
 
-def cut(profile: Profile, a: float, t: float) -> Profile:
+def cut(profile: JerkProfile, a: float, t: float) -> JerkProfile:
     """What of a profile that starts at acceleration a lies before t; without acceleration after its end."""
-    kept: Profile = []
+    kept: JerkProfile = []
     for h, j, after in profile:
         if h >= t:
             if t > 0.0:
@@ -82,7 +82,7 @@ def cut(profile: Profile, a: float, t: float) -> Profile:
     return kept
 
 
-def run(x: Moving, profile: Profile) -> tuple[Moving, float, float]:
+def run(x: Moving, profile: JerkProfile) -> tuple[Moving, float, float]:
     """Where a profile ends, and the lowest and highest position on the way."""
     q, v, a = x
     low = high = q
@@ -120,7 +120,7 @@ def one_joint(
     A: float,
     J: float,
     share: float = 1.0,
-) -> Profile | None:
+) -> JerkProfile | None:
     """Bring a joint to a rate, hold it, then stop; or stop earlier, exactly at a position limit.
 
     Args:
@@ -145,7 +145,7 @@ def one_joint(
         share = 1.0
     ramp = change(v, a, u, share * A, share * J)
 
-    def until(t: float) -> tuple[Profile, float]:
+    def until(t: float) -> tuple[JerkProfile, float]:
         return _then_stop(x, cut(ramp, a, t), low, high, A, J)
 
     held, over = until(hold)
@@ -161,7 +161,9 @@ def one_joint(
     return _largest(until, hold, stop, least, over)
 
 
-def _then_stop(x: Moving, begun: Profile, low: float, high: float, A: float, J: float) -> tuple[Profile, float]:
+def _then_stop(
+    x: Moving, begun: JerkProfile, low: float, high: float, A: float, J: float
+) -> tuple[JerkProfile, float]:
     """A profile and the stop after it, and how far they pass the nearer position limit [rad]."""
     end, least, most = run(x, begun)
     stop = change(end[1], end[2], 0.0, A, J)
@@ -170,8 +172,12 @@ def _then_stop(x: Moving, begun: Profile, low: float, high: float, A: float, J: 
 
 
 def _largest(
-    make: Callable[[float], tuple[Profile, float]], too_late: float, best: Profile, under: float, over: float
-) -> Profile:
+    make: Callable[[float], tuple[JerkProfile, float]],
+    too_late: float,
+    best: JerkProfile,
+    under: float,
+    over: float,
+) -> JerkProfile:
     """The profile that just doesn't pass: make(t) passes by `under` < 0 at t = 0 and by `over` > 0 at too_late."""
     early, late, f_early, f_late = 0.0, too_late, under, over
     for _ in range(80):
@@ -192,14 +198,14 @@ def _largest(
     return best
 
 
-def _turned_back(x: Moving, low: float, high: float, V: float, A: float, J: float) -> Profile | None:
+def _turned_back(x: Moving, low: float, high: float, V: float, A: float, J: float) -> JerkProfile | None:
     """Where stopping comes too late: brake on into the opposite direction, as little as keeps the limit."""
     _, v, a = x
     stop = change(v, a, 0.0, A, J)
     _, _, most = run(x, stop)
     away = -1.0 if most > high else 1.0
 
-    def back(w: float) -> tuple[Profile, float]:
+    def back(w: float) -> tuple[JerkProfile, float]:
         return _then_stop(x, change(v, a, away * w, A, J), low, high, A, J)
 
     best, over = back(V)
@@ -250,7 +256,7 @@ def rates_plan(
     return joined(state, qdd, profiles), dropped
 
 
-def joined(state: State, a: Sequence[float], profiles: list[Profile]) -> Plan:
+def joined(state: State, a: Sequence[float], profiles: list[JerkProfile]) -> Plan:
     """All joints' profiles on one grid.
 
     Args:

@@ -13,8 +13,8 @@ import numpy as np
 from vrs.chunk import State
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning.plan import Plan, violation
-from vrs.planning.steer_course import FREE, Course, Twist, course
-from vrs.planning.steer_joint import Profile, change, cut, from_accelerations
+from vrs.planning.steer_course import FREE, Twist, TwistCourse, course
+from vrs.planning.steer_joint import JerkProfile, change, cut, from_accelerations
 
 STANDING = 1e-9
 """Share of the speed limits below which a joint doesn't move."""
@@ -81,7 +81,7 @@ def _kept(v: float, a: float, A: float, step: float, T: float) -> bool:
     return max(abs(first), abs(second)) <= A and most <= step
 
 
-class Law(NamedTuple):
+class SpeedLaw(NamedTuple):
     """s(t): share of the asked-for speed, in phases of constant jerk."""
 
     starts: Array
@@ -97,7 +97,7 @@ class Law(NamedTuple):
         return x + u * (v + u * (a / 2 + u * j / 6)), v + u * (a + u * j / 2), a + u * j
 
 
-def reachable(way: Course, A: float, J: float) -> Array:
+def reachable(way: TwistCourse, A: float, J: float) -> Array:
     """Largest share at each place of the grid from which the caps ahead can still be kept, (k,).
 
     Args:
@@ -116,7 +116,9 @@ def reachable(way: Course, A: float, J: float) -> Array:
     return np.asarray(share)
 
 
-def time_law(s: float, ds: float, goal: float, hold: float, way: Course, A: float, J: float) -> tuple[Law, float]:
+def speed_law(
+    s: float, ds: float, goal: float, hold: float, way: TwistCourse, A: float, J: float
+) -> tuple[SpeedLaw, float]:
     """Bring the share from s to its goal, keep under the caps on the way, stop after `hold`.
 
     Args:
@@ -138,7 +140,7 @@ def time_law(s: float, ds: float, goal: float, hold: float, way: Course, A: floa
     parts: list[tuple[float, float]] = [(goal, hold)] if steps == 1 else [(-1.0, hold / steps)] * steps
     for target, lasting in [*parts, (0.0, np.inf)] if hold > 0.0 else [(0.0, np.inf)]:
         u = target if target >= 0.0 else min(goal, float(np.interp(x, way.grid, allowed)))
-        phases: Profile = change(v, a, u, A, J)
+        phases: JerkProfile = change(v, a, u, A, J)
         for h, j, after in cut(phases, a, lasting) if lasting < np.inf else phases:
             starts.append(t)
             states.append((x, v, a, j))
@@ -148,7 +150,7 @@ def time_law(s: float, ds: float, goal: float, hold: float, way: Course, A: floa
             t += h
     starts.append(t)
     states.append((x, 0.0, 0.0, 0.0))
-    return Law(np.array(starts), np.array(states).T), float(allowed[0])
+    return SpeedLaw(np.array(starts), np.array(states).T), float(allowed[0])
 
 
 def along(
@@ -200,7 +202,7 @@ def along(
     for for_law, for_transient, part in _BUDGETS:
         A = for_law / max(float((size / limits.qdd_max).max()), 10.0 * sharpest)
         J = 0.7 * for_law / float((size / limits.qddd_max).max())
-        law, share = time_law(s, ds, goal, part * hold, way, A, J)
+        law, share = speed_law(s, ds, goal, part * hold, way, A, J)
         if for_transient != _BUDGETS[0][1]:
             T = shortest(dv, da, limits, for_transient)
         if blocked or max(T, float(law.starts[-1])) > hold + _STOP:
@@ -212,7 +214,7 @@ def along(
     return None, share
 
 
-def _composed(state: State, way: Course, law: Law, s: float, ds: float, T: float) -> Plan:
+def _composed(state: State, way: TwistCourse, law: SpeedLaw, s: float, ds: float, T: float) -> Plan:
     """The course under the law, and a transient of duration T that meets the state."""
     # The offset comes as 1 − (1 − t/T)².
     du = s * s * way.slope + (2.0 * s / T) * way.offset

@@ -7,19 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import hypot
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vrs.checks import finite, finite_array
 from vrs.chunk import State
-from vrs.commands import finite, finite_array
+from vrs.commands import Frame
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, violation
 from vrs.planning.steer_course import (
-    LENGTH,
     Twist,
     damped_rates,
     rates_to_limits,
@@ -29,12 +28,8 @@ from vrs.planning.steer_course import (
 from vrs.planning.steer_joint import rates_plan
 from vrs.planning.steer_tool import STANDING, along
 
-Frame = Literal["base", "tool"]
-
 BRAKED_ONLY = "braked with parabolas: no jerk-limited plan from this state keeps the limits"
 DROPPED = "accelerations dropped at the start: bounded jerk would pass a speed limit from this state"
-TOOL_TURN_SPEED = 1.5707963267948966
-"""Nominal angular speed of the tool [rad/s] of a model that doesn't state one."""
 
 
 def steer(
@@ -53,7 +48,7 @@ def steer(
         rates: Joint rates [rad/s], (n,); beyond the speed limits all are scaled alike. None with a twist.
         twist: Of the tool, (6,): linear [m/s], then angular [rad/s], of the last link's frame; beyond the model's
             nominal speeds scaled. None with rates.
-        frame: Axes of the twist: `base`, or `tool` for axes that turn with the tool.
+        frame: Axes of the twist; those of the tool turn with it.
         hold: How long to go on [s]; 0 or less stops.
         model: The arm.
         limits: Limits that hold at every instant.
@@ -68,7 +63,7 @@ def steer(
     """
     n = limits.dof
     lasting = max(finite("hold", hold, "finite seconds"), 0.0)
-    if frame not in {"base", "tool"}:
+    if not isinstance(frame, Frame):
         raise InvalidValueError("frame", frame, "base or tool")
     if rates is not None and twist is None:
         u = finite_array("rates", rates, (n,), f"finite joint rates [rad/s], shape ({n},)")
@@ -96,13 +91,12 @@ def _by_rates(
 def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twist:
     """The twist in the base frame, not faster than nominal, its linear part over the characteristic length."""
     v, w = given[:3], given[3:]
-    turn = float(getattr(model, "tool_turn_speed", TOOL_TURN_SPEED))
-    scale = max(1.0, hypot(*v.tolist()) / model.tool_speed, hypot(*w.tolist()) / turn)
-    scale_linear = scale * float(getattr(model, "characteristic_length", LENGTH))
-    if frame == "tool":
+    scale = max(1.0, hypot(*v.tolist()) / model.tool_speed, hypot(*w.tolist()) / model.tool_turn_speed)
+    scale_linear = scale * model.characteristic_length
+    if frame is Frame.TOOL:
         R = model.forward(state.q)[:3, :3]
         v, w = R @ v, R @ w
-    return Twist(v / scale_linear, w / scale, frame == "tool")
+    return Twist(v / scale_linear, w / scale, frame is Frame.TOOL)
 
 
 def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, str]:

@@ -22,7 +22,7 @@ _ROUNDS: Final = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Law:
+class TimeLaw:
     """A parameter over time, piece by piece."""
 
     durations: Array
@@ -144,15 +144,15 @@ def _largest(p: Array, g: Array, x: float, top: float) -> float:
     return x
 
 
-def parabolas(s: Array, squares: Array) -> Law:
+def parabolas(s: Array, squares: Array) -> TimeLaw:
     """The law of squares of speed at knots s, (m + 1,) each."""
     speed = np.sqrt(squares)
     h = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
     half = 0.25 * np.diff(squares) / np.diff(s)
-    return Law(h, np.stack([s[:-1], speed[:-1], half, np.zeros_like(half)], axis=1))
+    return TimeLaw(h, np.stack([s[:-1], speed[:-1], half, np.zeros_like(half)], axis=1))
 
 
-def smoothed(law: Law, width: float) -> Law:
+def smoothed(law: TimeLaw, width: float) -> TimeLaw:
     """The moving average of a law that ends at rest over a time [s]: cubic pieces, continuous acceleration.
 
     A law that begins at a speed must keep it for half that time; it's then begun there and at that speed.
@@ -190,4 +190,4 @@ def smoothed(law: Law, width: float) -> Law:
     average = (both[:, : len(knots)] - both[:, len(knots) :]) / width
     steps = np.diff(knots)
     jerk = np.diff(average[2]) / steps
-    return Law(steps, np.stack([*average[:2, :-1], 0.5 * average[2, :-1], jerk / 6.0], axis=1), smooth=True)
+    return TimeLaw(steps, np.stack([*average[:2, :-1], 0.5 * average[2, :-1], jerk / 6.0], axis=1), smooth=True)

@@ -9,7 +9,7 @@ from interfaces.changes import SAME, first_unlike
 from interfaces.recording.driving.messages import ArcChange, ArcEntry, ArcHistory
 from vrs.chunk import HOLD
 from vrs.errors import InvalidValueError
-from vrs.mobile import ArcTimeline, Drive, wrapped
+from vrs.mobile import ArcPiece, ArcTimeline, wrapped
 from vrs.segment import ArcSegment
 
 PART = 256
@@ -96,7 +96,7 @@ def changed(base: ArcTimeline, entry: ArcChange) -> ArcTimeline:
     """
     if not 0 <= entry.first <= len(base):
         raise InvalidValueError("first", entry.first, f"0 to {len(base)}")
-    drives = [Drive(arc.duration, arc.v, arc.w, arc.command_id or HOLD) for arc in entry.segments]
+    drives = [ArcPiece(arc.duration, arc.v, arc.w, arc.command_id or HOLD) for arc in entry.segments]
     made = base.edited(base.start_of(entry.first), drives).with_version(entry.version)
     for k, arc in enumerate(entry.segments, entry.first):
         x, y, theta = made.segment(k).posture

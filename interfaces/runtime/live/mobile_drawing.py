@@ -15,7 +15,7 @@ from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.tasks import Doing, Point
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
-from vrs.mobile import ArcTimeline, Drive, Grid, MobileModel, wrapped
+from vrs.mobile import ArcPiece, ArcTimeline, Grid, MobileModel, wrapped
 from vrs.mobile.kinematics import advanced
 from vrs.mobile.limiting import braking
 
@@ -39,13 +39,13 @@ def route_timeline(route: Sequence[Point]) -> ArcTimeline:
     Args:
         route: Two points or more [m].
     """
-    drives: list[Drive] = []
+    drives: list[ArcPiece] = []
     first = theta = math.atan2(route[1][1] - route[0][1], route[1][0] - route[0][0])
     for a, b in pairwise(route):
         if math.dist(a, b) > 0:
             aim = math.atan2(b[1] - a[1], b[0] - a[0])
-            drives.append(Drive(_CORNER, 0.0, wrapped(aim - theta) / _CORNER, 0))
-            drives.append(Drive(math.dist(a, b) / ROUTE_SPEED, ROUTE_SPEED, 0.0, 0))
+            drives.append(ArcPiece(_CORNER, 0.0, wrapped(aim - theta) / _CORNER, 0))
+            drives.append(ArcPiece(math.dist(a, b) / ROUTE_SPEED, ROUTE_SPEED, 0.0, 0))
             theta = aim
     return ArcTimeline((*route[0], first)).edited(0.0, drives)
 
@@ -153,6 +153,6 @@ class MobileDrawing:
         if known is None or known[0] != operator.steps:
             timeline, T = operator.site.engine.timeline, self._model.period
             steps = braking(operator.site.before, T, self._model.limits)
-            tail = [Drive(T, v, w, 0) for v, w in steps]
+            tail = [ArcPiece(T, v, w, 0) for v, w in steps]
             known = self._committed = operator.steps, timeline.edited(timeline.end, tail) if tail else timeline
         return known[1]

@@ -90,3 +90,11 @@ def test_the_maps_lines_face_the_free_side_and_unknown_things_are_not_on_it() ->
         before, behind = (FloorPlan(room).clearance(*(pose[:2] + side * normal), 20.0) for side in (0.01, -0.01))
         assert before > 0
         assert behind == 0
+
+
+def test_ways_are_those_of_the_part_in_which_they_start() -> None:
+    divided = read_room("room 1\nsize 6 4\nstart 1 2 0\nwall 2 0  2 4\n")
+    largest, smaller = Ways(divided, 0.3), Ways(divided, 0.3, start=(1.0, 2.0))
+    assert (largest.places[:, 0] > 2.0).all()
+    assert (smaller.places[:, 0] < 2.0).all()
+    assert largest.free.sum() > smaller.free.sum() > 100

@@ -15,6 +15,7 @@ from robots.ipr.chassis import CHASSES, CameraModel, Senses, SonarModel, chassis
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import MobileRobot
+from robots.ipr.sensing import SonarRing
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced
 from vrs.model import Array
@@ -257,3 +258,15 @@ def test_values_are_checked() -> None:
         SonarModel(rays=0)
     drawn = MobileReality.drawn(np.random.default_rng(1))
     assert drawn == MobileReality.drawn(np.random.default_rng(1)) != MobileReality.drawn(np.random.default_rng(2))
+
+
+def test_a_sonar_tells_nothing_nearer_than_it_can_and_nothing_farther() -> None:
+    model = SonarModel(noise=0.0, noise_share=0.0, misses=0.0)
+    ring = SonarRing(chassis("ipr"), model, np.random.default_rng(0))
+    near, far = chassis("ipr").sonar_reach
+    for exact, told in ((0.0, near), (0.5 * near, near), (1.7, 1.7), (1.01 * far, math.inf), (math.inf, math.inf)):
+        distances = np.full((16, model.rays), exact)
+        assert (ring.scan(distances.ravel(), 1.0).ranges == told).all()
+    # Of a cone's rays the shortest counts.
+    distances[3, 2] = 0.8
+    assert ring.scan(distances.ravel(), 1.0).ranges[3] == 0.8

@@ -330,3 +330,21 @@ def test_a_closed_robot_is_of_no_use() -> None:
     assert body.closed
     with pytest.raises(WorldClosedError):
         body.follow(0.1, 0.0)
+
+
+@pytest.mark.parametrize("make", [MobileBody, BareBody])
+def test_who_is_lifted_in_motion_stands_where_he_is_put(make: type[MobileBody] | type[BareBody]) -> None:
+    with make("ipr", START, reality=IDEAL, senses=BLIND) as body:
+        body.drive(0.5, 0.3, 480)
+        there = (4.0, -1.0, 2.0)
+        body.carry(there)
+        assert np.abs(np.array(body.motion)).max() < 1e-9
+        assert np.abs(body.posture - there).max() < 1e-9
+        # Its wheels still turn, as nobody told them.
+        body.drive(0.0, 0.0, 480)
+        assert np.hypot(*(body.posture - there)[:2]) < 0.5
+    with make("ipr", room="furnished", senses=BLIND) as body:
+        before = body.posture
+        with pytest.raises(InvalidValueError, match="stands free"):
+            body.carry((0.0, 0.0, 0.0))
+        assert np.array_equal(body.posture, before)

@@ -173,3 +173,14 @@ def test_wrong_values_are_refused():
         Outline(0.0, 0.1, 0.1)
     with pytest.raises(InvalidValueError):
         ObstacleAvoidance(AvoidanceConfig(IPR, MOUNTS)).hear([1.0], (0, 0, 0), now=0.0)
+
+
+def test_what_is_behind_the_goal_is_nothing_to_go_round():
+    """Before a dock the robot drives straight on to it, and stops short of what stands behind."""
+    for left, acts in ((0.3, False), (2.0, True)):
+        avoidance = ObstacleAvoidance(AvoidanceConfig(IPR, MOUNTS))
+        avoidance.stand(np.array([(1.1, y) for y in np.linspace(-0.6, 0.2, 17)]))
+        wanted = Drive(0.2, 0.0)
+        drive = avoidance.drive(wanted, (0.0, 0.0, 0.0), now=0.0, towards=0.0, v_before=0.2, left=left)
+        assert avoidance.acts is acts
+        assert (drive == wanted) is not acts

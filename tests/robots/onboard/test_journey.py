@@ -13,6 +13,7 @@ from robots.ipr.parameters import IPR_LIMITS
 from robots.onboard.detours import way_out
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Goal, Journey, JourneyConfig, JourneyState
+from robots.onboard.path_following import PathFollowingConfig
 from robots.onboard.routes import Route, RouteConfig, RouteMap
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
@@ -150,3 +151,49 @@ def test_what_makes_no_sense_is_refused(bad: dict[str, float]) -> None:
         JourneyConfig(**bad)  # type: ignore[arg-type]
     with pytest.raises(InvalidValueError):
         Goal(math.nan, 0.0)
+
+
+def test_who_stands_there_but_looks_elsewhere_has_not_arrived() -> None:
+    """A controller that leaves off turning early, and a goal that's strict: it sets out again, and gives up."""
+    following = PathFollowingConfig(arrival_angle=0.4)
+    world = World(Posture(1.0, 2.0, 0.0), [], JourneyConfig(following=following, tries=3))
+    world.journey.go(Goal(3.0, 2.0, 1.0), world.posture, now=0.0)
+    world.run(30.0)
+    off = abs(wrapped(world.posture.theta - 1.0))
+    assert (world.journey.state is JourneyState.ARRIVED) == (off <= math.radians(1.2))
+    assert world.journey.routes > 1
+
+
+def test_a_journey_that_takes_too_long_is_given_up() -> None:
+    world = World(Posture(1.0, 2.0, 0.0), [], JourneyConfig(longest=2.0))
+    world.journey.go(Goal(5.0, 2.0), world.posture, now=0.0)
+    world.run(10.0)
+    assert world.journey.state is JourneyState.FAILED
+    assert world.now == pytest.approx(2.0, abs=3 * DT)
+    assert "2 s" in world.journey.reason
+
+
+def test_who_is_pushed_aside_takes_another_way() -> None:
+    """He doesn't drive back across what he was pushed over."""
+    world = World(Posture(1.0, 2.0, 0.0), [], JourneyConfig())
+    world.journey.go(Goal(5.0, 2.0), world.posture, now=0.0)
+    world.run(3.0)
+    x, _, theta = world.posture
+    world.posture = Posture(x, 2.3, theta)
+    world.run(4.0)
+    assert world.journey.routes == 2
+    assert world.journey.route is not None
+    assert world.journey.route.points[0][1] == pytest.approx(2.3, abs=0.1)
+
+
+def test_who_gets_no_further_looks_for_another_way_and_gives_up_in_the_end() -> None:
+    world = World(Posture(1.0, 2.0, 0.0), [], JourneyConfig(stuck=1.0, tries=2))
+    world.journey.go(Goal(5.0, 2.0), world.posture, now=0.0)
+    stood = world.posture
+    while world.journey.state in GOING and world.now < 20.0:
+        # Its wheels slip: it's told to drive, and doesn't.
+        world.journey.control(stood, now=world.now, v_before=0.0)
+        world.now += DT
+    assert world.journey.state is JourneyState.FAILED
+    assert "no further in 2 tries" in world.journey.reason
+    assert 2.0 < world.now < 6.0

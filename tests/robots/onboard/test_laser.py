@@ -124,3 +124,11 @@ def test_a_scan_that_the_odometry_does_not_cover_waits() -> None:
     track.add(0.05, (0.0, 0.0, 0.0))
     assert track.covers(0.0, 0.05)
     assert not track.covers(0.04, 0.07)
+
+
+def test_a_scanner_that_is_unwell_is_not_believed() -> None:
+    frame = bytearray(encode_scan(ranges(3)))
+    frame[-3] = 0x10
+    frame[-2:] = checksum(bytes(frame[1:-2])).to_bytes(2, "little")
+    with pytest.raises(FormatError, match="status 16"):
+        decode_scan(bytes(frame))

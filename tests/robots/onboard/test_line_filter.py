@@ -173,3 +173,24 @@ def test_what_is_seen_of_a_wall_counts_by_its_share_and_only_across() -> None:
     # Along itself a line may be anywhere: eq. (5) believes it, eq. (8) doesn't.
     assert np.allclose(weighted_update(SQUARE, placed, np.arange(2)), [-0.3, -0.58, 0.0])
     assert np.allclose(injected_update(SQUARE, placed, np.arange(2)), [-0.16, -0.02, 0.0])
+
+
+def test_a_wheel_base_that_is_wider_than_it_was_said_is_found() -> None:
+    """The robot turns less than its odometry says, and sees by how much."""
+    base_error = 0.02
+    held = LineFilter(START, 1e-8 * np.eye(3), KNOWN, MotionConfig(wheel=0.0, rolling=0.0, base_error=0.05))
+    truth = START
+    for _ in range(8):
+        held.move(0.0, 0.3, 0.1)
+        truth = advanced(truth, 0.0, 0.3 / (1 + base_error), 1.0)
+        held.correct(Sights(seen_from(truth, KNOWN.lines), np.arange(4)))
+    assert held.wheels[2] == pytest.approx(base_error, abs=0.005)
+
+
+def test_the_doubts_of_single_lines_are_those_of_all_together() -> None:
+    held = LineFilter(START, DOUBT, KNOWN)
+    sights = Sights(seen_from(START, KNOWN.lines), np.arange(4), turned=1e-3)
+    found = held.innovation(sights)
+    joint = held.joint(found, sights).reshape(4, 2, 4, 2)
+    for k, alone in enumerate(held.doubts(found, sights)):
+        assert np.allclose(alone, joint[k, :, k], rtol=1e-12, atol=0)

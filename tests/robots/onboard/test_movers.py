@@ -96,3 +96,13 @@ def test_wrong_values_are_refused() -> None:
         MoversConfig(())
     with pytest.raises(InvalidValueError):
         MoversConfig(MOUNTS, gate=math.inf)
+
+
+def test_nothing_is_said_of_what_was_only_just_seen() -> None:
+    """Two echoes make a speed; nobody yields to one."""
+    tracker = MoverTracker(MoversConfig(MOUNTS, doubt=0.0, start_speed=3.0))
+    seen = []
+    for k in range(6):
+        tracker.see([(2.0 - 0.06 * k, 0.0)], now=0.1 * k)
+        seen.append(bool(tracker.movers(now=0.1 * k)))
+    assert seen == [False, False, False, True, True, True]

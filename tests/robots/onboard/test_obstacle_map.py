@@ -26,10 +26,12 @@ wall 0 4  0 0
 """
 
 
-def watched(room: Room, seconds: float, w: float = 0.0) -> tuple[ObstacleMap, list[tuple[float, float]]]:
+def watched(
+    room: Room, seconds: float, w: float = 0.0, config: ObstacleMapConfig | None = None
+) -> tuple[ObstacleMap, list[tuple[float, float]]]:
     """What a robot that turns on the spot has seen, and who moved in each scan."""
     roads = route_map(room, IPR)
-    found = ObstacleMap(Grid((120, 80), 0.05), lambda places: roads.knows(places, 0.07))
+    found = ObstacleMap(Grid((120, 80), 0.05), lambda places: roads.knows(places, 0.07), config)
     body = BareBody("ipr", room=room, senses=Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02)))
     track, movers, seen = OdometryTrack(), [], -1.0
     while body.time < seconds:
@@ -87,3 +89,17 @@ def test_somebody_who_walks_moves_and_blocks_no_way() -> None:
 def test_what_makes_no_sense_is_refused(bad: dict[str, float]) -> None:
     with pytest.raises(InvalidValueError):
         ObstacleMapConfig(**bad)
+
+
+def test_what_is_out_of_sight_is_forgotten_in_the_end() -> None:
+    room = read_room(WALLS + "column 2 3 0.3 unknown until=1.0\n")
+    # As before, but nothing is remembered for so long.
+    found, _ = watched(room, 3.0, w=-0.75, config=ObstacleMapConfig(memory=1.0))
+    assert len(found.places()) == 0
+
+
+def test_where_something_has_come_to_stand_it_is_not_free() -> None:
+    room = read_room(WALLS + "column 3 2 0.3 unknown from=0.6\n")
+    before, after = np.array([(2.71, 2.01)]), np.array([(2.71, 2.01), (1.8, 2.0)])
+    assert watched(room, 0.5)[0].was_free(before).tolist() == [True]
+    assert watched(room, 1.4)[0].was_free(after).tolist() == [False, True]

@@ -219,3 +219,12 @@ def test_what_has_been_passed_stays_passed():
     path.append(Arc(0.0, 2.0))
     assert path.locate((1.0, 0.1, 0.0)).s == pytest.approx(1.0)
     assert path.locate((0.4, 0.1, 0.0)).s == pytest.approx(1.0)
+
+
+def test_pivots_to_opposite_sides_are_two():
+    """Else a turn to the left and back would be no turn, and the robot would never look aside."""
+    path = MovingPath((0, 0, 0))
+    for angle in (1.0, 0.5, -0.7):
+        path.append(Pivot(angle))
+    assert path.pieces() == [Pivot(1.5), Pivot(-0.7)]
+    assert path.end.theta == pytest.approx(0.8)

@@ -183,3 +183,24 @@ def test_the_exponent_is_between_1_and_2(c):
 def test_impossible_constants_are_refused(bad):
     with pytest.raises(InvalidValueError):
         PathFollowingConfig(**bad)
+
+
+def test_a_pivot_that_was_overshot_counts_as_driven():
+    """It isn't turned back: the field beside what follows does that on the way."""
+    path = MovingPath((0.0, 0.0, 0.0))
+    for piece in (Pivot(1.0), Arc(0.0, 2.0)):
+        path.append(piece)
+    controller = PathFollowingController(path, SLOW)
+    assert controller.control((0.0, 0.0, 0.0)).w > 0
+    assert controller.control((0.0, 0.0, 1.0 + 2 * SLOW.arrival_angle)).v > 0
+    assert controller.projection.turn is None
+
+
+def test_a_curve_is_begun_before_the_robot_is_there():
+    """By as much as the motors take to answer: else each curve is left at its beginning."""
+    for ahead, turns in ((0.02, True), (0.2, False)):
+        path = MovingPath((0.0, 0.0, 0.0))
+        for piece in (Arc(0.0, 1.0), Arc(1.5, 1.0)):
+            path.append(piece)
+        w = PathFollowingController(path, SLOW).control((1.0 - ahead, 0.0, 0.0), v_before=0.3).w
+        assert (w > 0.3) is turns

@@ -136,3 +136,24 @@ def test_what_makes_no_sense_is_refused(bad: dict[str, float]) -> None:
         RouteMap((0.0, 1.0), [], RouteConfig(0.4, 0.2))
     with pytest.raises(InvalidValueError):
         RouteMap((4.0, 4.0), [], RouteConfig(0.4, 0.2)).route((math.nan, 0.0), (1.0, 1.0))
+
+
+def test_a_door_is_driven_through_in_which_the_robot_could_not_turn() -> None:
+    wide = 2 * (CONFIG.half_width + CONFIG.margin) + 0.06
+    assert wide < 2 * CONFIG.turning
+    low, high = 3.0 - wide / 2, 6.0 - 3.0 - wide / 2
+    made = room((3.0, low / 2, 0.1, low, 0.0), (3.0, 6.0 - high / 2, 0.1, high, 0.0))
+    roads = route_map(made, IPR)
+    assert not roads.is_free((3.0, 3.0))
+    found = roads.route((1.0, 1.0), (6.0, 5.0))
+    assert isinstance(found, Route)
+    assert all(abs(x - 3.0) > 0.05 for x, _ in found.points)
+
+
+def test_what_stands_where_the_robot_will_turn_is_in_its_way() -> None:
+    """A turn takes more room than a drive: beside the way it's free, beside the corner it isn't."""
+    roads = RouteMap((8.0, 6.0), [], CONFIG)
+    way = [(1.0, 1.0), (4.0, 1.0), (4.0, 4.0)]
+    between = 0.5 * (CONFIG.half_width + CONFIG.turning)
+    assert not roads.crosses(way, [(2.0, 1.0 - between)])
+    assert roads.crosses(way, [(4.0, 1.0 - between)])

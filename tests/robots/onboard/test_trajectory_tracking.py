@@ -210,3 +210,18 @@ def test_wrong_values_are_refused():
         tracker.receive([ArcSegment(0, 1, (0, 0, 0), 0, 0), ArcSegment(2, 1, (0, 0, 0), 0, 0)], complete_until=1.0)
     with pytest.raises(InvalidValueError):
         TrackingConfig(period=0.0)
+
+
+@pytest.mark.parametrize(("leashes", "pace"), [(0.0, 1.0), (1.0, 1.0), (1.5, 0.5), (4.0, 0.2)])
+def test_play_waits_for_a_robot_that_was_left_behind(leashes, pace):
+    """From the leash on it slows down; it never stops: beside a reference that stands no robot comes nearer."""
+    tracker, posture = TrajectoryTracker((0, 0, 0), 0.0, now=0.0), (0.0, 0.0, 0.0)
+    assert tracker.receive([ArcSegment(0.0, 20.0, posture, 0.2, 0.0)], complete_until=20.0)
+    for k in range(1, 61):
+        now, before = k * CONFIG.period, tracker.reference.t_play
+        # It's never late, so that nothing is caught up.
+        tracker.aim(before - now)
+        tracker.advance(posture, now=now)
+        x, y, theta = tracker.reference.posture
+        posture = (x, y - leashes * CONFIG.leash, theta)
+    assert (tracker.reference.t_play - before) / CONFIG.period == pytest.approx(pace, abs=1e-6)

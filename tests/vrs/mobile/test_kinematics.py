@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from vrs import ArcSegment
 from vrs.mobile.kinematics import (
     advanced,
+    all_wrapped,
     constraint,
     displaced,
     increment,
@@ -121,3 +122,10 @@ def test_arcs_move_as_a_rigid_body(origin, to, v, w, t):
 def test_a_wrapped_angle_is_the_same_direction(angle):
     assert -math.pi <= wrapped(angle) <= math.pi
     assert math.cos(wrapped(angle) - angle) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_many_angles_are_wrapped_as_one_is() -> None:
+    angles = np.linspace(-20.0, 20.0, 401).reshape(-1, 1)
+    one_by_one = np.array([[wrapped(angle)] for angle in angles[:, 0].tolist()])
+    assert np.abs(all_wrapped(angles) - one_by_one).max() < 1e-14
+    assert all_wrapped(np.array([np.pi, -np.pi])).tolist() == [-np.pi, -np.pi]
