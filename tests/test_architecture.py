@@ -16,6 +16,17 @@ HOME = Path(__file__).resolve().parents[1]
 OURS = ("vrs", "robots", "interfaces")
 ALLOWED = {"vrs": {"vrs"}, "robots": {"vrs", "robots"}, "interfaces": {"vrs", "robots", "interfaces"}}
 STRANGE = {"examples", "tests", "benchmarks"}
+LOWER = {
+    "link": (),
+    "middleware": ("link",),
+    "jobs": ("val2",),
+    "teleop": ("jobs", "link", "stream.control"),
+    "stream": ("jobs", "link", "teleop"),
+    "rsp": ("link", "stream"),
+}
+"""The lower parts of `interfaces`, and what each may import of the others; of `stream`, teleop just a module."""
+STUDYING = ("lab", "report", "recording", "cli")
+"""The parts that may import the laboratory: what runs live never needs it."""
 HEAVY = {"pybullet", "pybullet_data", "pybullet_utils", "roboticstoolbox", "spatialmath", "trimesh", "matplotlib"}
 NUMPY = 0.15
 """What importing NumPy takes on a machine of usual pace [s]."""
@@ -55,6 +66,32 @@ def violations(path, package):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOME)))
 def test_imports_point_one_way(path):
     assert list(violations(path, path.relative_to(HOME).parts[0])) == []
+
+
+def upward(path, part):
+    """Imports of a file of a part of `interfaces` that the part may not have."""
+    for name, line in imports(ast.parse(path.read_text(encoding="utf-8"))):
+        root, _, inner = name.partition(".")
+        other = inner.split(".")[0]
+        if root != "interfaces" or other in ("", part) or not (HOME / "interfaces" / other).is_dir():
+            continue
+        allowed = any(f"{inner}.".startswith(f"{one}.") for one in LOWER.get(part, (other,)))
+        if not allowed or (other == "lab" and part not in STUDYING):
+            yield f"{path}:{line} imports {name}"
+
+
+@pytest.mark.parametrize("part", sorted(path.parent.name for path in (HOME / "interfaces").glob("*/__init__.py")))
+def test_the_parts_of_interfaces_build_on_lower_ones(part):
+    assert [found for path in (HOME / "interfaces" / part).rglob("*.py") for found in upward(path, part)] == []
+
+
+def test_an_import_upward_is_seen(tmp_path):
+    bad = tmp_path / "bad.py"
+    bad.write_text("from interfaces.stream.hub import Hub\nfrom interfaces.stream.control import Ping\n")
+    assert len(list(upward(bad, "teleop"))) == 1
+    bad.write_text("def f():\n    import interfaces.lab.claims\n")
+    assert len(list(upward(bad, "runtime"))) == 1
+    assert not list(upward(bad, "report"))
 
 
 @pytest.mark.parametrize("package", ["robots", "interfaces"])

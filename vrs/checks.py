@@ -70,6 +70,23 @@ def number_in(name: str, value: object, low: float, high: float, what: str = "a 
     return number
 
 
+def integer_in(name: str, value: object, low: int, high: int) -> int:
+    """Return value as an integer in [low, high].
+
+    Args:
+        name: What it's called, for the message.
+        value: To be checked.
+        low: Smallest allowed.
+        high: Largest allowed.
+
+    Raises:
+        InvalidValueError: If it is anything else.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise InvalidValueError(name, value, f"an integer in [{low}, {high}]")
+    return value
+
+
 def one_of(name: str, value: str, words: Iterable[str]) -> str:
     """Return value if it's one of some words.
 

@@ -116,11 +116,12 @@ def lab(
     from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
     from interfaces.lab.driving.pictures import drawn, pictures
     from interfaces.lab.driving.recorded import Kept, measure_recorded, paths
-    from interfaces.lab.driving.run import POSITIONS, ROBOTS
+    from interfaces.lab.driving.run import ROBOTS
     from interfaces.lab.driving.sweep import cases
     from interfaces.link.profiles import delay_profile
     from interfaces.teleop.architectures import Transport
     from interfaces.teleop.architectures import architecture as makes
+    from interfaces.teleop.architectures.equipment import POSITIONS
 
     architectures = architecture or ["III", "timeline"]
     transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]

@@ -227,12 +227,12 @@ def run_mobile(
     import uvloop
 
     from interfaces.jobs import OperatorLoss, RunnerConfig
-    from interfaces.lab.driving.run import CONTROL
     from interfaces.link.proxy import parse_address
     from interfaces.media import Aloud
     from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
     from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes
+    from interfaces.teleop.architectures.equipment import CONTROL
     from interfaces.teleop.driving import DrivenConfig, Hands
     from robots.onboard import LossPolicy, WatchdogConfig
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from interfaces.link.conditions import whole
+from vrs.checks import integer_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
@@ -29,8 +29,8 @@ class Study:
     """For how long each run's operator gives commands [s], 2 to 3600."""
 
     def __post_init__(self) -> None:
-        whole("seed", self.seed, 0, 2**32 - 1)
-        whole("runs", self.runs, 2, 1000)
+        integer_in("seed", self.seed, 0, 2**32 - 1)
+        integer_in("runs", self.runs, 2, 1000)
         if not 2 <= finite("length", self.length, "2 to 3600 s") <= 3600:
             raise InvalidValueError("length", self.length, "2 to 3600 s")
 

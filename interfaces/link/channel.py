@@ -8,10 +8,11 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from interfaces.link.conditions import MAX_COUNT, Conditions, Service, whole
+from interfaces.link.conditions import MAX_COUNT, Conditions, Service
 from interfaces.link.delay import DelayProfile
 from interfaces.link.packets import LossReason, PacketLog, PacketRecord
 from interfaces.link.path import Path
+from vrs.checks import integer_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
@@ -58,7 +59,7 @@ class Channel(Generic[T]):
         if isinstance(profile, Conditions):
             conditions = profile
         else:
-            whole("capacity", capacity, 1, MAX_COUNT)
+            integer_in("capacity", capacity, 1, MAX_COUNT)
             conditions = Conditions(delay=profile, service=Service(service), capacity=capacity)
         self._conditions = conditions
         self._path = Path(conditions, rng) if path is None else path
@@ -83,7 +84,7 @@ class Channel(Generic[T]):
         Raises:
             InvalidValueError: If now is not finite, or runs back; or size is no number of bytes.
         """
-        now, size = moment("now", now, self._sent), whole("size", size, 0, 2**31)
+        now, size = moment("now", now, self._sent), integer_in("size", size, 0, 2**31)
         self._sent = now
         number = self.log.sent(size)
         fate = self._path.fate(now, size)

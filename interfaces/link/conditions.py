@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from interfaces.link.delay import MAX_DELAY, ConstantDelay, DelayProfile
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel
-from vrs.checks import number_in
+from vrs.checks import integer_in, number_in
 from vrs.errors import InvalidValueError
 
 MAX_COUNT = 10_000_000
@@ -64,10 +64,10 @@ class Conditions:
         number_in("reorder_by", self.reorder_by, 0.0, MAX_DELAY, "seconds")
         if self.bandwidth != math.inf:
             number_in("bandwidth", self.bandwidth, 1.0, 1e15, "bit/s")
-        whole("queue_packets", self.queue_packets, 1, MAX_COUNT)
-        whole("queue_bytes", self.queue_bytes, 1, 2**40)
-        whole("capacity", self.capacity, 1, MAX_COUNT)
-        whole("attempts", self.attempts, 1, 1000)
+        integer_in("queue_packets", self.queue_packets, 1, MAX_COUNT)
+        integer_in("queue_bytes", self.queue_bytes, 1, 2**40)
+        integer_in("capacity", self.capacity, 1, MAX_COUNT)
+        integer_in("attempts", self.attempts, 1, 1000)
         number_in("retransmit_after", self.retransmit_after, 1e-3, 60.0, "seconds")
         try:
             object.__setattr__(self, "service", Service(self.service))
@@ -89,14 +89,3 @@ class LinkConditions:
     def symmetric(cls, conditions: Conditions) -> LinkConditions:
         """The same conditions both ways, each way with draws of its own."""
         return cls(conditions, conditions)
-
-
-def whole(name: str, value: object, low: int, high: int) -> int:
-    """Return value as an integer in [low, high].
-
-    Raises:
-        InvalidValueError: If it is anything else.
-    """
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise InvalidValueError(name, value, f"an integer in [{low}, {high}]")
-    return value

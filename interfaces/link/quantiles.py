@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left, bisect_right, insort
 from collections import deque
 
-from vrs.commands import finite
+from vrs.checks import finite, integer_in
 from vrs.errors import InvalidValueError
 
 MAX_CAPACITY = 100_000
@@ -34,8 +34,7 @@ class SlidingQuantiles:
     """
 
     def __init__(self, capacity: int, horizon: float = math.inf) -> None:
-        if isinstance(capacity, bool) or not isinstance(capacity, int) or not 1 <= capacity <= MAX_CAPACITY:
-            raise InvalidValueError("capacity", capacity, f"an integer in [1, {MAX_CAPACITY}]")
+        integer_in("capacity", capacity, 1, MAX_CAPACITY)
         if not horizon > 0:
             raise InvalidValueError("horizon", horizon, "seconds > 0")
         self._capacity, self._horizon = capacity, horizon

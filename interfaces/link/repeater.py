@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from interfaces.link.channel import moment
-from interfaces.link.conditions import Service, whole
+from interfaces.link.conditions import Service
 from interfaces.link.delay import MAX_DELAY
-from vrs.checks import number_in
+from vrs.checks import integer_in, number_in
 from vrs.errors import InvalidValueError
 
 T = TypeVar("T")
@@ -29,7 +29,7 @@ class Bundle(Generic[T]):
     """The messages first, first + 1, …; 1 to 1024."""
 
     def __post_init__(self) -> None:
-        whole("first", self.first, 0, 2**63)
+        integer_in("first", self.first, 0, 2**63)
         if not isinstance(self.messages, tuple) or not 1 <= len(self.messages) <= MAX_REPEATS:
             raise InvalidValueError("messages", self.messages, f"a tuple of 1 to {MAX_REPEATS}")
 
@@ -42,7 +42,7 @@ class Repeater(Generic[T]):
     """
 
     def __init__(self, repeat: int) -> None:
-        self._recent: deque[T] = deque(maxlen=whole("repeat", repeat, 1, MAX_REPEATS))
+        self._recent: deque[T] = deque(maxlen=integer_in("repeat", repeat, 1, MAX_REPEATS))
         self._count = 0
 
     def send(self, message: T) -> Bundle[T]:
@@ -72,7 +72,7 @@ class RepeatReceiver(Generic[T]):
     def __init__(self, service: Service = Service.IN_ORDER, *, patience: float = 1.0, window: int = 1024) -> None:
         self._in_order = Service(service) is Service.IN_ORDER
         self._patience = number_in("patience", patience, 0.0, MAX_DELAY, "seconds")
-        self._window = whole("window", window, 1, 2**20)
+        self._window = integer_in("window", window, 1, 2**20)
         self._next = 0
         """In order: the number to be given next. Otherwise: the oldest that may still be given."""
         self._held: dict[int, T] = {}

@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from interfaces.link.quantiles import LARGEST, MAX_CAPACITY, SlidingQuantiles
-from vrs.commands import finite
+from vrs.checks import finite, integer_in
 from vrs.errors import InvalidValueError
 
 SEQUENCE_NUMBERS = 1 << 16
@@ -100,9 +100,7 @@ class WindowConfig:
     """Time constant of the jitter [messages], ≥ 1; RFC 3550 has 16."""
 
     def __post_init__(self) -> None:
-        capacity = self.capacity
-        if isinstance(capacity, bool) or not isinstance(capacity, int) or not 1 <= capacity <= MAX_CAPACITY:
-            raise InvalidValueError("capacity", capacity, f"an integer in [1, {MAX_CAPACITY}]")
+        integer_in("capacity", self.capacity, 1, MAX_CAPACITY)
         if not self.horizon > 0:
             raise InvalidValueError("horizon", self.horizon, "seconds > 0")
         if not 1 <= self.smoothing < math.inf:
@@ -126,9 +124,7 @@ class ProbeConfig:
         for name in ("period", "timeout"):
             if not 0 < getattr(self, name) < math.inf:
                 raise InvalidValueError(name, getattr(self, name), "finite seconds > 0")
-        most = self.most_in_flight
-        if isinstance(most, bool) or not isinstance(most, int) or not 1 <= most <= SEQUENCE_NUMBERS // 2:
-            raise InvalidValueError("most_in_flight", most, f"an integer in [1, {SEQUENCE_NUMBERS // 2}]")
+        integer_in("most_in_flight", self.most_in_flight, 1, SEQUENCE_NUMBERS // 2)
 
 
 @dataclass(frozen=True, slots=True)

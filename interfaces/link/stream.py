@@ -11,9 +11,10 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from interfaces.link.channel import Delivery, moment
-from interfaces.link.conditions import Conditions, whole
+from interfaces.link.conditions import Conditions
 from interfaces.link.packets import LossReason, PacketLog, PacketRecord
 from interfaces.link.path import Path
+from vrs.checks import integer_in
 from vrs.commands import finite
 
 T = TypeVar("T")
@@ -94,7 +95,7 @@ class Stream(Generic[T]):
             InvalidValueError: If now is not finite, or runs back; or size is no number of bytes.
         """
         self._advance(moment("now", now, self._now))
-        size = whole("size", size, 0, 2**31)
+        size = integer_in("size", size, 0, 2**31)
         number = self.log.sent(size)
         if self.in_flight() >= self._conditions.capacity:
             self.lost += 1

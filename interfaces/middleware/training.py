@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from interfaces.link.conditions import whole
 from interfaces.middleware.network import Formulation, GainNetwork, Ranges, inputs
 from interfaces.middleware.performance import optimal_ways, tolerance
-from vrs.checks import number_in
+from vrs.checks import integer_in, number_in
 from vrs.model import Array
 
 _LEAST_DAMPING, _MOST_DAMPING = 1e-12, 1e10
@@ -49,7 +48,7 @@ class TrainingConfig:
         for name, low, high in (
             ("neurons", 1, 1000), ("epochs", 1, 100_000), ("factors", 3, 10_000), ("delays", 2, 1000),
         ):  # fmt: skip
-            whole(name, getattr(self, name), low, high)
+            integer_in(name, getattr(self, name), low, high)
 
 
 class Errors(NamedTuple):
@@ -71,7 +70,7 @@ def train(
         progress: Told the epoch and its mean squared error.
     """
     config = TrainingConfig() if config is None else config
-    whole("seed", seed, 0, 2**32 - 1)
+    integer_in("seed", seed, 0, 2**32 - 1)
     A, tau, K = lessons(config)
     x, middle_x, half_x = _scaled(inputs(config.formulation, A, tau))
     wanted = np.log(K) if config.formulation is Formulation.LOGARITHMIC else K

@@ -84,8 +84,6 @@ CHANNELS: Final = (
 
 NUMBER_OF: Final = {kind: number for number, channel in enumerate(CHANNELS, 1) for kind in channel.kinds}
 """Number of the channel of a kind of message."""
-TOPIC_OF: Final = {kind: channel.topic for channel in CHANNELS for kind in channel.kinds}
-"""Topic of a kind of message."""
 
 Message: TypeAlias = (
     m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.GivenEntry

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
+from interfaces.runtime.happenings import correction_text
 from interfaces.stream.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
 from vrs.model import Array
@@ -211,10 +212,7 @@ def _happened(event: Event) -> Iterator[Mark]:
 def _told(entry: CommandEntry | Anchor) -> Iterator[Mark]:
     """The mark of a command, or of what put the virtual robot elsewhere."""
     if isinstance(entry, Anchor):
-        joint = int(np.abs(entry.error).argmax())
-        off = float(np.degrees(abs(entry.error[joint])))
-        where = f"joint {joint + 1} was {off:.3g}° off"
-        text = f"the virtual robot joined the real one's plan until {entry.end:.2f} s ({where}): {entry.reason}"
+        text = correction_text(entry.end, np.asarray(entry.error), entry.reason)
         yield Mark(entry.at, MarkKind.CORRECTED, text, (entry.at, entry.end))
     elif entry.receipt is not None and not _usual(entry):
         receipt = entry.receipt

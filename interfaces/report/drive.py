@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.driving.pictures import of_drives
-from interfaces.lab.driving.run import Drive
+from interfaces.lab.driving.run import DriveRun
 from interfaces.report.driven import FIGURES, shown
 from interfaces.report.markup import card, table
 from interfaces.runtime.run import Event
@@ -20,7 +20,7 @@ FACTS: Final = ("architecture", "transport", "delay", "robot", "operator", "seed
 """What a run is, of its summary."""
 
 
-def render(drive: Drive, summary: Mapping[str, Any], events: Sequence[Event]) -> str:
+def render(drive: DriveRun, summary: Mapping[str, Any], events: Sequence[Event]) -> str:
     """Return the report as one HTML text; equal runs give equal texts.
 
     Args:

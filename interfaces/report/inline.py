@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.driving.run import Drive
+from interfaces.lab.driving.run import DriveRun
 from interfaces.runtime.run import TwinRun
 
 MOST_SAMPLES: Final = 1200
@@ -44,7 +44,7 @@ def inline_report(run: TwinRun, *, height: int = 760) -> Framed:
     return Framed(render(run, summarize(run)), height)
 
 
-def inline_drive(drive: Drive, *, height: int = 560) -> Framed:
+def inline_drive(drive: DriveRun, *, height: int = 560) -> Framed:
     """Both mobile robots from above, with a play button and a slider; it needs no network.
 
     Args:
@@ -57,7 +57,7 @@ def inline_drive(drive: Drive, *, height: int = 560) -> Framed:
     return Framed(Template(text).substitute(title=escape(f"{case.architecture}, {case.delay}"), data=data), height)
 
 
-def _drive(drive: Drive) -> dict[str, Any]:
+def _drive(drive: DriveRun) -> dict[str, Any]:
     step = max(1, -(-len(drive.t) // MOST_SAMPLES))
     both = np.concatenate([drive.virtual[:, :2], drive.real[:, :2]])
     return {

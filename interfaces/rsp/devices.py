@@ -12,7 +12,7 @@ from interfaces.rsp.errors import DeadlineError
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model.elements import Command, Effector, Event, Monitor, Sensor
 from interfaces.rsp.outbox import Outcome
-from vrs.checks import finite
+from vrs.checks import finite, integer_in
 from vrs.errors import InvalidValueError
 
 V = TypeVar("V", int, float)
@@ -320,6 +320,4 @@ class MemoryEventDevice(Device):
 
 
 def _place(name: str, index: int, count: int) -> int:
-    if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
-        raise InvalidValueError(f"index of {name}", index, f"an integer in [0, {count - 1}]")
-    return index
+    return integer_in(f"index of {name}", index, 0, count - 1)

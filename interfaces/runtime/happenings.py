@@ -84,8 +84,18 @@ def waits(t: Array, play: Array, q_reference: Array, *, slowest: float) -> Itera
 def correction_events(corrections: Sequence[Correction]) -> Iterator[Event]:
     """Tell when the virtual robot was put where the real one was going."""
     for made in corrections:
-        joint = int(np.abs(made.error).argmax())
-        off = float(np.degrees(np.abs(made.error[joint])))
-        where = f"joint {joint + 1} was {off:.3g}° off"
-        text = f"the virtual robot joined the real one's plan until {made.end:.2f} s ({where}): {made.reason}"
-        yield Event(made.t, "corrected", text)
+        yield Event(made.t, "corrected", correction_text(made.end, made.error, made.reason))
+
+
+def correction_text(end: float, error: Array, reason: str) -> str:
+    """Say that the virtual robot was put where the real one was going.
+
+    Args:
+        end: Until when it took [s].
+        error: By how much it was off [rad], (n,).
+        reason: Why.
+    """
+    joint = int(np.abs(error).argmax())
+    off = float(np.degrees(np.abs(error[joint])))
+    where = f"joint {joint + 1} was {off:.3g}° off"
+    return f"the virtual robot joined the real one's plan until {end:.2f} s ({where}): {reason}"

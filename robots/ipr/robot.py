@@ -21,7 +21,7 @@ from robots.ipr.reality import MobileReality
 from robots.ipr.scanner import LaserScanner
 from robots.ipr.sensing import Fix, OverheadCamera, SonarRing, SonarScan
 from robots.onboard.laser import LaserScan
-from vrs.checks import finite, one_of
+from vrs.checks import finite, integer_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
 from vrs.model import Array, frozen_array
@@ -211,8 +211,7 @@ class MobileRobot(ABC):
                 robot hasn't moved then.
             WorldClosedError: If it's a closed PyBullet robot.
         """
-        if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps <= 1_000_000:
-            raise InvalidValueError("steps", steps, "an integer in [0, 1000000]")
+        integer_in("steps", steps, 0, 1_000_000)
         self._ready()
         self._train.command(v, w)
         if self._steps == 0:

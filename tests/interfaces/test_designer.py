@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from interfaces import Designer, Supervisor
 from interfaces.messages import Order, Outcome
 from interfaces.ordering import OVERTAKEN
+from interfaces.ports import RemotePort
 from interfaces.servlet import Servlet
 from tests.interfaces.joined import MODEL, Joined, bad, constant, place, to
 from vrs import (
@@ -261,3 +262,31 @@ def test_over_any_link_every_command_is_carried_out_once_in_order(seed, loss, du
     assert len(receipts) == 6
     for k, receipt in enumerate(receipts):
         assert np.array_equal(receipt.q, place(k))
+
+
+def test_an_answer_that_comes_twice_is_news_once():
+    designer = Designer(RemotePort())
+    issued = designer.issue(Stop(), now=1.0)
+    for now in (2.0, 3.0):
+        designer.receive(Outcome(issued.number, None, "no", 0, now), now=now)
+        news = designer.advance(now=now)
+        assert [one.answered_at for one in news] == ([2.0] if now == 2.0 else [])
+    designer.receive(Outcome(issued.number, None, "really", 1, 4.0), now=4.0)
+    assert [one.refusal for one in designer.advance(now=4.0)] == ["really"]
+
+
+def test_through_a_long_silence_a_command_is_sent_again_and_again():
+    """More and more seldom, but never less often than each five seconds."""
+    port = RemotePort()
+    designer = Designer(port, resend=0.3)
+    designer.issue(Stop(), now=0.0)
+    port.advance(now=0.0)
+    sent, now = [0.0], 0.0
+    while now < 600.0:
+        now = designer.next_deadline()
+        designer.advance(now=now)
+        sent += [now] * len(port.advance(now=now))
+    gaps = np.diff(sent)
+    assert gaps[0] == pytest.approx(0.3)
+    assert (np.diff(gaps) >= -1e-9).all()
+    assert gaps.max() == pytest.approx(5.0)

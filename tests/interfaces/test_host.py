@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
+from interfaces.teleop import OperatorSite, Orders, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
@@ -80,7 +80,8 @@ class Ends:
         asked = np.array(self.asked)
         assert (np.abs(asked[:, 1]) <= LIMITS.qd_max * (1 + 1e-9)).all()
         assert (np.abs(asked[:, 2]) <= LIMITS.qdd_max * (1 + 1e-9)).all()
-        for (q, qd, _), (q_next, *_) in pairwise(asked):
+        for (q, qd, _), (q_next, qd_next, _) in pairwise(asked):
+            assert (np.abs(qd_next - qd) <= 1.01 * LIMITS.qdd_max * STEP).all()
             assert (np.abs(q_next - q - STEP * qd) <= 0.51 * LIMITS.qdd_max * STEP**2 * 2 + 1e-9).all()
 
 
@@ -228,3 +229,68 @@ def test_held_links_of_the_paper(delay: str) -> None:
     assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
     assert not ends.operator.corrections
     ends.check()
+
+
+def test_what_is_decided_ahead_stops_as_early_as_was_promised() -> None:
+    for timeout, lead, decided in ((0.5, 0.05, 0.45), (0.2, 0.15, 0.1)):
+        site = RobotSiteConfig(watchdog=WatchdogConfig(timeout=timeout))
+        dog = RobotHostConfig(lead=lead, site=site).decided().watchdog
+        assert dog is not None
+        assert dog.timeout == pytest.approx(decided)
+    assert RobotHostConfig().decided().watchdog is None
+
+
+def test_it_cant_be_resumed_while_the_virtual_robot_is_put_where_the_real_one_is() -> None:
+    ends = Ends(q=READY)
+    while not ends.operator.corrections:
+        ends.run(STEP)
+    assert "is being put where the real one is" in ends.operator.resume(now=ends.now)
+    ends.run(ends.operator.corrections[-1].end - ends.now + STEP)
+    assert ends.operator.resume(now=ends.now) == ""
+
+
+def test_who_comes_next_is_followed_once_the_body_stands() -> None:
+    """It still moves when it's let go: its references brake to rest, and nothing jumps."""
+    ends = Ends(site=RobotSiteConfig(fixed_offset=-0.1))
+    ends.go()
+    far = NOMINAL + np.array([2.4, 0.0, 0.0, 0.0, 0.0, 0.0])
+    ends.operator.execute(to(far, speed=0.5), now=ends.now)
+    ends.run(0.5)
+    ends.run(2.1, operator=False)
+    assert np.abs(ends.asked[-1][1]).max() > 0.5
+    ends.new_operator("second")
+    assert ends.refused == ""
+    ends.run(3.0)
+    assert ends.host.session == "second"
+    ends.check()
+
+
+def test_stamps_are_told_by_the_robots_clock_while_the_clocks_drift() -> None:
+    ends = Ends("constant:0.02")
+    ends.rate = 1.0 + 400e-6
+    ends.run(3.0)
+    site = ends.host.site
+    assert site is not None
+    taken: list[tuple[float, float]] = []
+    receive = site.receive
+
+    def noted(orders: Orders, *, now: float, correction: float, uncertainty: float) -> None:
+        stamped = orders.sent_at + correction
+        taken.append((stamped, ends.host.site_time(ends.ahead + ends.rate * orders.sent_at)))
+        receive(orders, now=now, correction=correction, uncertainty=uncertainty)
+
+    site.receive = noted  # type: ignore[method-assign]
+    ends.run(20.0)
+    stamped, read = np.array(taken).T
+    # Uncorrected it'd be 8 ms by now; the estimate of so fast a drift lags behind.
+    assert np.abs(stamped - read).max() < 6e-3
+
+
+def test_copies_of_a_message_are_told_of_once() -> None:
+    ends = Ends()
+    twice = Conditions(delay=delay_profile("constant:0.05"), duplicate=1.0)
+    ends.line.change(LinkConditions(twice, ends.conditions.backward), now=0.0)
+    ends.run(1.0)
+    told, totals = len(ends.line.messages()), ends.line.link.forward.log.totals()
+    assert totals.copies == totals.sent
+    assert 20 < told <= totals.sent

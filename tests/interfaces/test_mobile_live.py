@@ -11,7 +11,6 @@ import pytest
 
 from interfaces import connect_mobile
 from interfaces.jobs import Command, Forecast, JobFile, JobList, Move, OperatorLoss, RunnerConfig, Stage, Wait
-from interfaces.lab.driving.run import CONTROL
 from interfaces.link import LinkConditions
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
@@ -23,6 +22,7 @@ from interfaces.stream.line import UnreachableError
 from interfaces.stream.mobile_connect import MobileConnection
 from interfaces.stream.server import application
 from interfaces.stream.tasks import Tasks
+from interfaces.teleop.architectures.equipment import CONTROL
 from interfaces.teleop.driving import DrivenConfig
 from interfaces.teleop.tasks import Doing
 from robots import ipr

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from interfaces import Designer, Observer, Supervisor
 from interfaces.forecasts import Forecasts
 from interfaces.journal import Journal
-from interfaces.messages import Answer, FrameStatus
+from interfaces.messages import Answer, Frame, FrameStatus
+from interfaces.observer import PENDING
+from interfaces.ports import RemotePort
 from interfaces.site import Site, drive, engine_time
 from tests.interfaces.joined import HOME, MODEL, Joined, bad, constant, place, to
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Stop
@@ -161,6 +163,31 @@ def test_over_any_link_every_fate_comes_to_be_known_and_is_true(seed, loss, dupl
         assert true if x.status is CONFIRMED else x.frame.falsified_by in ids
 
 
+def test_a_question_that_was_given_up_is_sent_no_more():
+    port = RemotePort()
+    observer = Observer(port, resend=0.3)
+    for k in range(PENDING + 10):
+        observer.ask(float(k), now=0.001 * k)
+        port.advance(now=0.001 * k)
+    observer.advance(now=1.2)
+    assert port.advance(now=1.2)[0].t == 10.0
+
+
+def test_a_prediction_is_asked_for_again_when_its_time_has_passed_there():
+    """The engine's time may be far behind the user's."""
+    port = RemotePort()
+    observer = Observer(port, resend=0.3)
+    number = observer.ask(4.0, now=10.0)
+    port.advance(now=10.0)
+    frame = Frame(number, 4.0, 3.0, HOME, PREDICTED)
+    observer.receive(Answer(frame, 3.0), now=10.0)
+    for now in (10.0, 10.3, 10.9):
+        observer.advance(now=now)
+        assert port.advance(now=now) == ()
+    observer.advance(now=11.0)
+    assert [ask.number for ask in port.advance(now=11.0)] == [number]
+
+
 class TestForecasts:
     def test_they_agree_with_an_edit_by_edit_comparison(self):
         rng = np.random.default_rng(5)
@@ -191,6 +218,11 @@ class TestForecasts:
             assert verdict.falsified_by == truth.get(number)
             assert (verdict.status is FALSIFIED) == (number in truth)
         assert forecasts.share_falsified == len(truth) / len(shown)
+
+    def test_the_present_is_past(self):
+        forecasts = Forecasts()
+        assert forecasts.add(1, 2.0, HOME, now=2.0) is CONFIRMED
+        assert forecasts.add(2, 2.0 + 1e-9, HOME, now=2.0) is PREDICTED
 
     def test_memory_is_bounded_and_what_is_dropped_is_counted(self):
         forecasts = Forecasts(window=100)

@@ -276,3 +276,17 @@ def test_evil_texts_do_not_run(open_page: Any) -> None:
     assert page.locator("h1").text_content().startswith("</script>")
     page.evaluate("report.seek(6)")
     assert "</script>" in page.locator("#now").text_content()
+
+
+def test_the_figures_of_a_summary_belong_together() -> None:
+    run = make_run()
+    found = summarize(run)
+    behind = run.t - run.play
+    assert found["clock_offset_s"] == pytest.approx(-behind.mean())
+    assert found["behind"]["p95_s"] == pytest.approx(np.quantile(behind, 0.95))
+    assert found["behind"]["max_s"] == pytest.approx(behind.max())
+    # The user's lag is what the robot plays behind, and what its joints lag besides.
+    assert found["lag_user_s"] == pytest.approx(found["lag_timeline_s"] + behind.mean())
+    for errors in found["errors"].values():
+        worst = max(range(6), key=lambda joint: errors["joint_rms_deg"][joint])
+        assert errors["worst_joint"] == worst + 1

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from interfaces import Supervisor
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, Orders, RobotSite, RobotSiteConfig
+from interfaces.teleop import Entry, OperatorSite, Orders, RobotSite, RobotSiteConfig
+from interfaces.teleop.received import ReceivedLog
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop
@@ -262,3 +263,43 @@ def test_what_is_of_an_old_epoch_is_ignored() -> None:
     before = robot.engine.timeline
     robot.receive(old, now=4.0)
     assert robot.engine.timeline is before
+
+
+def test_what_waits_for_a_lost_entry_isnt_complete() -> None:
+    first, second, third = (Entry(k, float(k), None, k) for k in (1, 2, 3))
+    log = ReceivedLog(0.0)
+    assert log.due((third,), as_they_come=False) == []
+    log.claim(3, 9.0)
+    assert log.complete_until == 0.0
+    assert log.due((first,), as_they_come=False) == [first]
+    log.claim(1, 5.0)
+    assert log.complete_until == 5.0
+    assert log.due((second,), as_they_come=False) == [second, third]
+    log.claim(3, 8.0)
+    assert log.complete_until == 9.0
+
+
+def test_entries_that_nobody_acknowledges_are_sent_again() -> None:
+    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
+    for k in range(10):
+        operator.execute(MotionCommand(JointTarget(NOMINAL + 0.01 * k)), now=0.0)
+    sent = []
+    for _ in range(40):
+        (orders,) = operator.advance(now=operator.next_deadline())
+        sent.append([entry.number for entry in orders.entries])
+    everything = list(range(1, 11))
+    assert sent[0] == everything
+    assert sent[1] == [8, 9, 10]
+    again = next(k for k, numbers in enumerate(sent) if k and numbers == everything)
+    # As long as an answer may take: a second at first.
+    assert 1.0 <= operator.config.beat * again <= 1.2
+
+
+def test_an_arm_that_has_stopped_may_be_held_elsewhere() -> None:
+    robot = RobotSite(MODEL, NOMINAL, now=0.0)
+    robot.halt("somebody pulled the plug", now=1.0)
+    robot.halt("it was pushed", now=2.0)
+    np.testing.assert_allclose(robot.engine.timeline.sample(9.0), NOMINAL, rtol=0, atol=1e-12)
+    robot.halt("it was pushed", now=3.0, measured=NOMINAL + 0.05)
+    np.testing.assert_allclose(robot.engine.timeline.sample(9.0), NOMINAL + 0.05, rtol=0, atol=1e-12)
+    assert robot.halted == "somebody pulled the plug"

@@ -480,6 +480,24 @@ class TestPlayHead:
             assert head.mode is Mode.PLAYING
             assert head.ahead(now) == t
 
+    def test_a_loop_about_the_live_edge_isnt_left_for_it(self):
+        head = self.head()
+        head.seek(1.0, now=5.0)
+        head.play(now=5.0, rate=2.0)
+        head.set_loop(0.0, 20.0, now=5.0)
+        # At 8.8 s the live edge is caught up with, and passed.
+        assert head.position(9.0) == pytest.approx(9.0)
+        assert head.mode is Mode.PLAYING
+        assert head.position(15.0) == pytest.approx(1.0)
+        head.clear_loop(now=15.0)
+        assert head.position(40.0) == pytest.approx(39.8)
+        assert head.mode is Mode.LIVE
+
+    def test_what_was_live_plays_a_loop_from_its_start(self):
+        head = self.head()
+        head.set_loop(2.0, 20.0, now=10.0)
+        assert (head.mode, head.position(10.0)) == (Mode.PLAYING, 2.0)
+
     def test_what_is_sought_behind_a_loop_runs_freely_and_before_it_runs_in(self):
         head = self.head()
         head.set_loop(5.0, 6.0, now=40.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, REAL, VIRTUAL, draw, legend
-from interfaces.lab.driving.run import Case, Drive
+from interfaces.lab.driving.run import Case, DriveRun
 from vrs.path_matching import PathMatch
 
 if TYPE_CHECKING:
@@ -30,14 +30,14 @@ def drawn(chosen: Sequence[Case]) -> list[bool]:
     return [k in places for k in range(len(chosen))]
 
 
-def pictures(drives: Sequence[Drive]) -> list[Figure]:
+def pictures(drives: Sequence[DriveRun]) -> list[Figure]:
     """Pictures of the runs of cases that are `drawn`; at least one."""
     first = drives[0].case
     named = {f"{drive.case.architecture}, {drive.case.transport}": drive for drive in drives}
     return of_drives(named, f"{first.robot}, {first.operator}, {first.delay}, seed {first.seed}")
 
 
-def of_drives(drives: dict[str, Drive], what: str) -> list[Figure]:
+def of_drives(drives: dict[str, DriveRun], what: str) -> list[Figure]:
     """Pictures of runs by the names of their compositions.
 
     Args:
@@ -52,13 +52,13 @@ def of_drives(drives: dict[str, Drive], what: str) -> list[Figure]:
     ]
 
 
-def _shape(drives: dict[str, Drive]) -> tuple[int, int]:
+def _shape(drives: dict[str, DriveRun]) -> tuple[int, int]:
     """Rows and columns of the picture of their paths."""
     across = min(len(drives), ACROSS)
     return math.ceil(len(drives) / across), across
 
 
-def _paths(canvas: Canvas, drives: dict[str, Drive]) -> None:
+def _paths(canvas: Canvas, drives: dict[str, DriveRun]) -> None:
     grid = canvas.subplots(*_shape(drives), squeeze=False)
     for ax in grid.flat[len(drives) :]:
         ax.set_visible(False)

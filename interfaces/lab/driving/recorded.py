@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.run import Case, DriveRun, run
 from interfaces.lab.driving.sweep import Row, row_of
 
 FOLDER: Final = "runs"
@@ -24,7 +24,7 @@ class Kept(NamedTuple):
     """What is left of a run."""
 
     row: Row
-    drive: Drive | None
+    drive: DriveRun | None
     """All of it, where that's to be drawn."""
     problem: str
     """Why its recording isn't there; empty where it is, or wasn't asked for."""

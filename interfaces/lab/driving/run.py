@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Final, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from interfaces.lab.driving.operators import Operator, operator
-from interfaces.lab.driving.surroundings import operator_surroundings, robot_surroundings
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.link import Link
 from interfaces.link.profiles import delay_profile
@@ -19,18 +17,23 @@ from interfaces.teleop.architectures import (
     OperatorSite,
     Packet,
     Player,
-    Position,
     Report,
     RobotSite,
     Transport,
     controller,
+)
+from interfaces.teleop.architectures.equipment import (
+    CONTROL,
+    POSITIONS,
+    SENSING,
+    operator_surroundings,
+    robot_surroundings,
 )
 from robots import ipr
 from robots.bullet.rooms import Room
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
-from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import STAND, Posture
@@ -40,8 +43,6 @@ from vrs.comparison import PathComparison, summed_up
 from vrs.model import Array
 from vrs.path_matching import PathMatch, match_paths
 
-CONTROL = 0.05
-"""Period of the robot's control, and of what is recorded [s]."""
 AFTER = 5.0
 """A run goes on for the largest delay and this after the operator stopped [s]."""
 STOPPING = 1.5
@@ -50,19 +51,10 @@ _LEARNED = round(0.5 / CONTROL)
 """The virtual environment is recorded each so many control periods."""
 LONGEST_WAIT = 600.0
 """But never longer than this [s]."""
-SENSING = ("extended",)
-"""Architectures whose robot has sonars, and whose operator has the map of the room."""
 ROBOTS = ("ipr", "micro", "bare")
 """Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""
 DriveLink: TypeAlias = Link[Packet, Report]
 """What is between both sites."""
-POSITIONS: Final[dict[str, Callable[[MobileRobot], Position]]] = {
-    "fused": FusedPosition,
-    "laser": LaserPosition,
-    "odometry": OdometryPosition,
-    "truth": TruePosition,
-}
-"""What can tell a robot where it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +95,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class DriveRun:
     """What happened in a run."""
 
     case: Case
@@ -170,7 +162,7 @@ def make_robot(case: Case, start: Posture, room: str | Room) -> MobileRobot:
     return MobileBody(case.robot, start, room=where, reality=case.reality, rng=rng, senses=senses)
 
 
-def run(case: Case, driver: Operator | None = None, witness: Witness | None = None) -> Drive:
+def run(case: Case, driver: Operator | None = None, witness: Witness | None = None) -> DriveRun:
     """Run a case; the same case gives the same to the last bit.
 
     Args:
@@ -229,7 +221,7 @@ class _Run:
         if witness is not None:
             witness.begun(case, driver.start, body, self._site, link)
 
-    def whole(self) -> Drive:
+    def whole(self) -> DriveRun:
         """From the start until the real robot could have done all."""
         case = self._case
         every = round(case.constants.period / CONTROL)
@@ -294,9 +286,9 @@ class _Run:
         if self._witness is not None:
             self._witness.sent(direction, now, size)
 
-    def _made(self, rows: Array) -> Drive:
+    def _made(self, rows: Array) -> DriveRun:
         t = rows[:, 0]
-        return Drive(
+        return DriveRun(
             case=self._case,
             t=t,
             virtual=self._site.engine.posture(t),

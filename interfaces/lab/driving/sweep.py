@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.run import Case, DriveRun, run
 from interfaces.lab.pool import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.teleop.architectures import Transport
@@ -51,7 +51,7 @@ def measure(case: Case) -> Row:
     return row_of(run(case))
 
 
-def row_of(drive: Drive) -> Row:
+def row_of(drive: DriveRun) -> Row:
     """The figures of a run."""
     case = drive.case
     return Row(

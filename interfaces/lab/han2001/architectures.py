@@ -16,7 +16,7 @@ import numpy as np
 
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.driving.pictures import of_drives
-from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.run import Case, DriveRun, run
 from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.teleop.architectures import Transport
@@ -70,7 +70,7 @@ class Found(NamedTuple):
 
     runs: dict[str, tuple[Seen, ...]]
     """By composition, a run a seed."""
-    first: dict[str, Drive]
+    first: dict[str, DriveRun]
     """The first seed's runs, for pictures; none but where one is drawn."""
 
 
@@ -91,7 +91,7 @@ def case_of(robot: str, profile: str, architecture: str, transport: Transport, s
     return Case(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
 
 
-def seen(drive: Drive) -> Seen:
+def seen(drive: DriveRun) -> Seen:
     """Sum up a run."""
     match = drive.match()
     driven = match.distance[match.t <= drive.case.length]
@@ -114,7 +114,7 @@ def work(study: Study, case: str) -> Found:
     """All compositions and seeds of a case."""
     robot, profile = case.split()
     runs: dict[str, tuple[Seen, ...]] = {}
-    first: dict[str, Drive] = {}
+    first: dict[str, DriveRun] = {}
     for architecture, transport in COMPOSITIONS:
         found = []
         for k in range(study.runs):

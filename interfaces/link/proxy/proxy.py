@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from interfaces.link.channel import Channel
-from interfaces.link.conditions import LinkConditions, Service, whole
+from interfaces.link.conditions import LinkConditions, Service
 from interfaces.link.packets import Totals
 from interfaces.link.path import Path
 from interfaces.link.proxy.address import Address
 from interfaces.link.proxy.tcp import TcpProxy, Way
 from interfaces.link.proxy.udp import Parcel, UdpProxy
 from interfaces.timer import Lateness
-from vrs.checks import number_in
+from vrs.checks import integer_in, number_in
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError
 
@@ -50,7 +50,7 @@ class ProxySettings:
             raise InvalidValueError("--to", str(self.to), "an address with a port other than 0")
         if self.listen == self.to:
             raise InvalidValueError("--to", str(self.to), "another address than --listen")
-        whole("most_clients", self.most_clients, 1, 1000)
+        integer_in("most_clients", self.most_clients, 1, 1000)
         number_in("udp_idle", self.udp_idle, 0.01, 86_400.0, "seconds")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from interfaces.lab.driving.output import facts_of
-from interfaces.lab.driving.run import Case, Drive
+from interfaces.lab.driving.run import Case, DriveRun
 from interfaces.lab.driving.sweep import row_of
 from interfaces.recording.driving.pursuit import FARTHEST, matchable
 from interfaces.recording.rerun import rerun
@@ -33,7 +33,7 @@ MOST_ROWS = 1_000_000
 class Driven:
     """A run as its recording has it."""
 
-    drive: Drive
+    drive: DriveRun
     missing: tuple[str, ...]
     """What isn't in the recording, and what stands for it; nothing in a whole one."""
 
@@ -75,7 +75,7 @@ def driven(recording: Recording) -> Driven:
     packets = [entry for entry in recording.link if entry.direction == "forward"]
     case = _case(recording)
     taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
-    drive = Drive(
+    drive = DriveRun(
         case=case,
         t=t,
         virtual=_virtual(recording, t, missing),

@@ -12,8 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from interfaces.lab.driving.run import CONTROL, Case, Drive, DriveLink
-from interfaces.lab.driving.surroundings import grid_of
+from interfaces.lab.driving.run import Case, DriveLink, DriveRun
 from interfaces.link import PacketRecord
 from interfaces.recording.capture import Paced
 from interfaces.recording.channels import Message
@@ -29,6 +28,7 @@ from interfaces.recording.writer import RecordingWriter
 from interfaces.software import software
 from interfaces.teleop import Deed
 from interfaces.teleop.architectures import OperatorSite
+from interfaces.teleop.architectures.equipment import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture
@@ -68,7 +68,7 @@ class DriveRecorder:
         """See `Witness`."""
         self._sent[direction].append((now, size))
 
-    def finish(self, drive: Drive) -> None:
+    def finish(self, drive: DriveRun) -> None:
         """Write the run down. A disk that doesn't take it is a `problem`, and ends nothing else."""
         sink = None
         try:
@@ -124,7 +124,7 @@ class DriveRecorder:
             ),
         )
 
-    def _messages(self, drive: Drive) -> Iterator[Timed]:
+    def _messages(self, drive: DriveRun) -> Iterator[Timed]:
         """All of them, by time."""
         end = float(drive.t[-1])
         yield from ((0.0, entry) for entry in self._place)
@@ -167,7 +167,7 @@ class DriveRecorder:
                     yield deed.at, entry
             before = after
 
-    def _samples(self, drive: Drive) -> Iterator[Timed]:
+    def _samples(self, drive: DriveRun) -> Iterator[Timed]:
         edits = np.searchsorted(self._edited(), drive.t, side="right").tolist()
         columns = (drive.t, drive.virtual, drive.real, drive.measured, drive.estimated, drive.drives, drive.offset)
         for row, (t, virtual, real, measured, estimated, (v, w), D) in enumerate(
@@ -179,7 +179,7 @@ class DriveRecorder:
             yield t, d.MeasuredPosture(t, *measured)
             yield t, d.EstimatedPosture(t, *estimated)
 
-    def _shown(self, drive: Drive) -> Iterator[Timed]:
+    def _shown(self, drive: DriveRun) -> Iterator[Timed]:
         """Both robots for other readers, at a lower rate."""
         poses, links = Paced(POSE_RATE), Paced(LINK_RATE)
         both = np.hstack([drive.virtual, drive.real])
@@ -202,7 +202,7 @@ class DriveRecorder:
             if number not in known_ones:
                 yield end, LinkEntry(direction, sent, size=size)  # type: ignore[arg-type]
 
-    def _learned(self, drive: Drive) -> Iterator[Timed]:
+    def _learned(self, drive: DriveRun) -> Iterator[Timed]:
         """What came into the virtual environment and went; events are cells that are new, and that all are gone."""
         before: set[tuple[int, int]] = set()
         ever: set[tuple[int, int]] = set()

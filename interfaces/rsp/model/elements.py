@@ -13,8 +13,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
-from interfaces.link.conditions import whole
-from vrs.checks import finite
+from vrs.checks import finite, integer_in
 from vrs.errors import InvalidValueError
 
 MOST_VALUES: Final = 1024
@@ -127,7 +126,7 @@ class _Valued(_Named):
     def __post_init__(self) -> None:
         _Named.__post_init__(self)
         _word(self, "type", Scalar)
-        whole(f"count of {self.name}", self.count, 1, MOST_VALUES)
+        integer_in(f"count of {self.name}", self.count, 1, MOST_VALUES)
         if finite(f"scale of {self.name}", self.scale, "a finite number, not 0") == 0:
             raise InvalidValueError(f"scale of {self.name}", self.scale, "a finite number, not 0")
         for what, text in (("unit", self.unit), ("binding", self.binding)):
@@ -165,7 +164,7 @@ class Effector(_Valued):
             raise InvalidValueError(f"initial of {self.name}", self.initial, f"in [{self.low:g}, {self.high:g}]")
         if self.type is not Scalar.F32 and self.initial != int(self.initial):
             raise InvalidValueError(f"initial of {self.name}", self.initial, "a whole number")
-        whole(f"stream of {self.name}", self.stream, 0, MOST_BYTES)
+        integer_in(f"stream of {self.name}", self.stream, 0, MOST_BYTES)
         _word(self, "filling", Filling)
         _word(self, "on_loss", OnLoss)
 
@@ -222,7 +221,7 @@ class _Stored(_Named):
 
     def __post_init__(self) -> None:
         _Named.__post_init__(self)
-        whole(f"size of {self.name}", self.size, 1, MOST_BYTES)
+        integer_in(f"size of {self.name}", self.size, 1, MOST_BYTES)
         _plain("binding", self, self.binding)
 
 

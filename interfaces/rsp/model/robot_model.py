@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from interfaces.link.conditions import whole
 from interfaces.rsp.model.elements import (
     KINDS,
     Command,
@@ -20,6 +19,7 @@ from interfaces.rsp.model.elements import (
     Sensor,
     check_name,
 )
+from vrs.checks import integer_in
 from vrs.errors import InvalidValueError
 
 MOST_ELEMENTS: Final = 1024
@@ -43,8 +43,8 @@ class RobotModel:
 
     def __post_init__(self) -> None:
         check_name(self.name)
-        whole("id", self.id, 0, 65_535)
-        whole("buffers", self.buffers, 1, 255)
+        integer_in("id", self.id, 0, 65_535)
+        integer_in("buffers", self.buffers, 1, 255)
         object.__setattr__(self, "elements", tuple(self.elements))
         if not 1 <= len(self.elements) <= MOST_ELEMENTS:
             raise InvalidValueError("elements", len(self.elements), f"1 to {MOST_ELEMENTS}")

@@ -14,7 +14,6 @@ import numpy as np
 from starlette.routing import BaseRoute
 
 from interfaces.jobs import JobFile, OperatorLoss
-from interfaces.lab.driving.surroundings import grid_of, operator_surroundings
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia
 from interfaces.runtime.live.emulation import LiveEmulation
@@ -31,6 +30,7 @@ from interfaces.stream.mobile import Postures
 from interfaces.stream.server import HubServer
 from interfaces.stream.tasks import Tasks, Wanted
 from interfaces.teleop.architectures import DriveReport, OperatorSurroundings
+from interfaces.teleop.architectures.equipment import grid_of, operator_surroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator
 from interfaces.teleop.driving.operator import BY_ITSELF, FREE, STOPPED
 from interfaces.teleop.tasks import Doing

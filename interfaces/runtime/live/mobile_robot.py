@@ -19,14 +19,13 @@ from starlette.routing import BaseRoute, Route
 
 from interfaces.jobs import RunnerConfig, ValArm
 from interfaces.jobs.val_arm import in_a_thread
-from interfaces.lab.driving.run import CONTROL, POSITIONS, SENSING
-from interfaces.lab.driving.surroundings import robot_surroundings
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.runtime.live.mobile_senses import LaserSight, NavigatorPilot
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached
 from interfaces.teleop.architectures import Constants, DriveOrders, RobotSite, architecture, controller
+from interfaces.teleop.architectures.equipment import CONTROL, POSITIONS, SENSING, robot_surroundings
 from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands
 from interfaces.teleop.hosting import HostConfig
 from interfaces.timer import Turning
@@ -60,8 +59,8 @@ class LiveMobileConfig:
     hands: Hands = field(default_factory=lambda: Hands(arm=ValArm(beside=in_a_thread())))
     """Who speaks, shows and lets an arm work; nobody aloud, and a virtual arm, unless given."""
     position: str = ""
-    """What tells it where it is: a name of `interfaces.lab.driving.run.POSITIONS`. Unless given, its laser where
-    the map has walls or other blocks for it to see, else the camera."""
+    """What tells it where it is: a name of `interfaces.teleop.architectures.equipment.POSITIONS`. Unless given, its
+    laser where the map has walls or other blocks for it to see, else the camera."""
     constants: Constants = field(default_factory=Constants)
     """Of all architectures."""
     seed: int = 0

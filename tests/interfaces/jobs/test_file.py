@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -109,3 +110,42 @@ def test_a_directory_in_its_place_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="can't be written"):
         file.save(JobList(), Progress())
     assert tmp_path.is_dir()
+
+
+def test_every_damaged_file_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "jobs.json"
+    for text in ("first", "second", "third"):
+        path.write_text(text)
+        file = JobFile(path)
+        with pytest.raises(FormatError):
+            file.load()
+        file.save(JobList(), Progress())
+    kept = [path.with_name(f"jobs.json.damaged{k}") for k in ("", "2", "3")]
+    assert [one.read_text() for one in kept] == ["first", "second", "third"]
+
+
+def test_a_reason_of_any_length_can_be_read_again() -> None:
+    jobs, why = JobList.of(Wait()), "x" * 10_000
+    progress = Progress(Stage.FAILED, (JobProgress(1, Stage.FAILED, why),), why)
+    _, found = read_jobs(written_jobs(jobs, progress), "x")
+    assert found.stage is Stage.FAILED
+    assert 100 <= len(found.reason) == len(found.jobs[0].reason) < len(why)
+
+
+def test_a_list_that_cant_be_written_leaves_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the disk is full: what is in the file's place is a whole list at any time."""
+    file, jobs = JobFile(tmp_path / "jobs.json"), JobList.of(Wait(1.0))
+    file.save(jobs, Progress.of(jobs))
+    with file.path.open("rb") as reading:
+        file.save(jobs, Progress.of(jobs))
+        assert read_jobs(reading.read(), "x") == (jobs, Progress.of(jobs))
+        assert os.fstat(reading.fileno()).st_ino != file.path.stat().st_ino
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(FormatError, match="can't be written: No space left"):
+        file.save(JobList(), Progress())
+    assert file.load() == (jobs, Progress.of(jobs))
+    assert [path.name for path in tmp_path.iterdir()] == ["jobs.json"]

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from interfaces.jobs import Command, Forecast, JobList, Load, Move, Stage, Voice, Wait, dry_run
+from interfaces.jobs import Command, Forecast, JobList, Load, Message, Move, Stage, Voice, Wait, dry_run
 from interfaces.jobs.values import Arm
 from interfaces.teleop.tasks import Doing
 from robots.onboard.driving import Posture
@@ -60,3 +60,8 @@ def test_the_prediction_is_about_what_happens() -> None:
     assert rig.operator.tasks is not None
     assert rig.operator.tasks.progress.stage is Stage.DONE
     assert rig.now - began == pytest.approx(predicted, rel=0.15)
+
+
+def test_a_message_takes_no_time() -> None:
+    look, key = dry_run(JobList.of(Message("Look"), Wait(2.0)), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits).jobs
+    assert (look.lasts, key.begins) == (0.0, 0.0)

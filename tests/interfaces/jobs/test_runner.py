@@ -15,6 +15,7 @@ from interfaces.jobs import (
     Command,
     Done,
     End,
+    Entry,
     Failed,
     Interrupted,
     Job,
@@ -304,3 +305,28 @@ class Doing(RuleBasedStateMachine):
 
 TestDoing = Doing.TestCase
 TestDoing.settings = settings(max_examples=60, stateful_step_count=25, deadline=None)
+
+
+def test_only_a_wait_has_time_left_when_it_is_paused() -> None:
+    for job, left in ((Move("B"), None), (Voice("Hello!"), None), (Wait(), None), (Wait(9.0), 7.0)):
+        runner = JobRunner(JobList.of(job, places={"B": B}))
+        runner.receive(Command.RUN, now=0.0)
+        runner.receive(Command.PAUSE, now=2.0)
+        assert runner.progress.jobs[0].left == left
+
+
+def test_a_list_that_was_done_isnt_when_a_job_is_added() -> None:
+    jobs = JobList.of(Message("Look"))
+    runner = JobRunner(jobs)
+    runner.receive(Command.RUN, now=0.0)
+    assert runner.progress.stage is Stage.DONE
+    longer = JobList((*jobs.entries, Entry(2, Message("Look again"))))
+    assert runner.receive(Load(longer), now=1.0) == ""
+    assert (runner.progress.stage, stages(runner)) == (Stage.PLANNED, ["done", "planned"])
+
+
+def test_a_list_that_was_aborted_leaves_an_empty_screen() -> None:
+    runner = JobRunner(JobList.of(Message("Look"), Wait()))
+    runner.receive(Command.RUN, now=0.0)
+    runner.receive(Command.ABORT, now=1.0)
+    assert runner.advance(now=1.0)[-1] == Show("")

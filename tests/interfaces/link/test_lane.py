@@ -151,6 +151,10 @@ def test_a_gauge_measures_the_newest_packets():
     gauge.since = 9.0
     assert gauge.measured(now=10.0).packets == 10
     assert gauge.measured(now=99.0) == Gauge().measured(now=0.0)
+    # What took long counts from when it came.
+    late = Gauge()
+    late.add(PacketRecord(0, 0, 0.0, 40.0))
+    assert late.measured(now=69.0).median == 40.0
 
 
 def test_losses_are_spelled_as_they_are_read():

@@ -174,3 +174,10 @@ def test_bad_traces_name_file_and_line(tmp_path, data, line):
 def test_a_missing_trace_is_one_typed_error(tmp_path):
     with pytest.raises(FormatError, match="can't be read"):
         delay_profile(f"trace:{tmp_path}/none.csv")
+
+
+def test_a_trace_may_hold_no_delay_and_the_longest(tmp_path):
+    path = tmp_path / "trace.csv"
+    path.write_text("delay_s\n0\n3600\n")
+    source = delay_profile(f"trace:{path}").source(np.random.default_rng(0))
+    assert [source.draw(0.0), source.draw(0.0)] == [0.0, 3600.0]

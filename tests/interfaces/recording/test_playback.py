@@ -160,6 +160,21 @@ class TestTwo:
                 assert np.abs(second.q_virtual - other.engine.joints(t)).max() <= 1e-9
                 assert (second.q_real is None) == (t > 4.0)
 
+    def test_the_nearest_mark_of_either_is_gone_to(self, tmp_path):
+        make(tmp_path / "a.mcap", 4.0, began=1000.0)
+        make(tmp_path / "b.mcap", 4.0, began=1001.5)
+        with open_recording(tmp_path / "a.mcap") as one, open_recording(tmp_path / "b.mcap") as two:
+            playback = Playback([one, two], align=Align.BEGAN)
+            playback.read_marks()
+            places = sorted({mark.t + track.shift for track in playback.tracks for mark in track.marks.marks})
+            assert len(places) > len({mark.t for mark in playback.tracks[0].marks.marks})
+            for back in (False, True):
+                playback.seek(5.5 if back else 0.0, now=0.0)
+                seen = []
+                while playback.seek_mark(back=back, now=0.0) is not None and len(seen) < 99:
+                    seen.append(playback.place(now=0.0))
+                assert seen == pytest.approx(places[::-1] if back else places)
+
     def test_by_the_calendar(self, tmp_path):
         make(tmp_path / "a.mcap", 4.0, began=1000.0)
         make(tmp_path / "b.mcap", 4.0, began=1001.5)

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.run import Case, DriveRun, run
 from interfaces.recording.driving.recorder import DriveRecorder
 from interfaces.teleop.architectures import Transport
 
@@ -16,7 +16,7 @@ _FOLDER = TemporaryDirectory(prefix="vrs-drives-")
 
 
 @cache
-def recorded(case: Case) -> tuple[Drive, Path]:
+def recorded(case: Case) -> tuple[DriveRun, Path]:
     """A run, and where its recording stands; it isn't to be changed."""
     path = Path(_FOLDER.name) / f"{abs(hash(case))}.mcap"
     recorder = DriveRecorder(path)

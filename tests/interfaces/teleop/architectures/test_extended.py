@@ -10,7 +10,7 @@ import random
 import numpy as np
 import pytest
 
-from interfaces.lab.driving.run import Case, Drive, run
+from interfaces.lab.driving.run import Case, DriveRun, run
 from interfaces.teleop.architectures import CellChanges, OperatorSurroundings, Report, RobotSurroundings
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.chassis import IPR, SonarModel
@@ -18,8 +18,7 @@ from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import place
 from robots.ipr.sensing import SonarRing
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
-from robots.onboard.driving import Drive as Speeds
-from robots.onboard.driving import Posture
+from robots.onboard.driving import Drive, Posture
 from robots.onboard.free_ways import Outline
 from robots.onboard.movers import MoversConfig, MoverTracker
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
@@ -101,14 +100,14 @@ def test_cells_that_are_none_and_times_that_are_none_are_left_out() -> None:
 def test_the_virtual_robot_stands_before_what_was_reported() -> None:
     """The cells come while it drives; it brakes, and drives on when they're gone."""
     wall = [(m, n) for m in (18, 19) for n in range(20)]
-    there, posture, before = surroundings(), Posture(0.5, 1.0, 0.0), Speeds(0.0, 0.0)
+    there, posture, before = surroundings(), Posture(0.5, 1.0, 0.0), Drive(0.0, 0.0)
     for k in range(150):
         now = 0.1 * k
         if 5 <= k < 75 and k % 10 == 5:
             there.receive(told(now, now, True, wall), now=now)
         elif k == 75:
             there.receive(told(now, now, False, wall), now=now)
-        before = there.command(Speeds(0.3, 0.0), before, posture, now=now)
+        before = there.command(Drive(0.3, 0.0), before, posture, now=now)
         posture = Posture(posture.x + 0.1 * before.v, posture.y, 0.0)
         if k < 75:
             assert posture.x + 0.4 < 1.8 + 1e-9
@@ -157,32 +156,32 @@ def on_board(sonar: Silent) -> RobotSurroundings:
 def test_beside_the_end_of_its_path_the_robot_comes_back(bearing_deg: int) -> None:
     """What it went out of the way of has gone; the field would lead along the path, on which nothing is left."""
     here, b = on_board(Silent(-10.0)), math.radians(bearing_deg)
-    posture, drive = Posture(math.cos(b), math.sin(b), 0.3), Speeds(0.0, 0.0)
+    posture, drive = Posture(math.cos(b), math.sin(b), 0.3), Drive(0.0, 0.0)
     for k in range(400):
-        drive = here.drive(Speeds(0.0, 0.0), posture, now=0.05 * k, v_before=drive.v)
+        drive = here.drive(Drive(0.0, 0.0), posture, now=0.05 * k, v_before=drive.v)
         posture = Posture(*advanced(posture, *drive, 0.05))
     assert math.hypot(posture.x, posture.y) < 0.05
-    assert drive == Speeds(0.0, 0.0)
+    assert drive == Drive(0.0, 0.0)
 
 
 def test_a_robot_that_is_hardly_off_is_left_to_its_controller() -> None:
     here = on_board(Silent(-10.0))
-    assert here.drive(Speeds(0.02, 0.1), Posture(0.1, 0.1, 0.0), now=0.0, v_before=0.0) == Speeds(0.02, 0.1)
+    assert here.drive(Drive(0.02, 0.1), Posture(0.1, 0.1, 0.0), now=0.0, v_before=0.0) == Drive(0.02, 0.1)
 
 
 def test_a_scan_is_placed_where_the_robot_was_when_it_was_taken() -> None:
     # A scan of 0.02 s comes at 0.04 s, when the robot is a metre further: half of it counts.
     sonar = Silent(-1.0)
     late = on_board(sonar)
-    late.drive(Speeds(0.0, 0.0), Posture(0.0, 0.0, 0.0), now=0.0, v_before=0.0)
+    late.drive(Drive(0.0, 0.0), Posture(0.0, 0.0, 0.0), now=0.0, v_before=0.0)
     sonar.time = 0.02
-    late.drive(Speeds(0.0, 0.0), Posture(1.0, 0.0, 0.0), now=0.04, v_before=0.0)
+    late.drive(Drive(0.0, 0.0), Posture(1.0, 0.0, 0.0), now=0.04, v_before=0.0)
     # From x = 0.5 the sonar, 0.2 m before it, hears something 0.5 m ahead: 1.2 m, cell 42.
     assert (42, 20) in late.supervisor.obstacles
     assert (47, 20) not in late.supervisor.obstacles
 
 
-def seen_at(room: Room, drive: Drive) -> dict[str, list[float]]:
+def seen_at(room: Room, drive: DriveRun) -> dict[str, list[float]]:
     """When an echo of each unknown thing came back, by the true postures [s]."""
     ring = SonarRing(IPR, SonarModel(), np.random.default_rng(0))
     plan, found = FloorPlan(room, IPR.sonar_height), {}

@@ -87,3 +87,12 @@ def test_a_way_back_beside_the_way_out_isnt_taken_for_it() -> None:
         found = path.match(Posture(0.04 * k, 0.04, 0.0), k * T + 12.0)
         assert found.path_error == pytest.approx(0.04, abs=1e-6)
         assert found.time_difference == pytest.approx(12.0, abs=0.01)
+
+
+def test_after_a_pause_the_path_goes_on_when_it_ended() -> None:
+    path = PathDeviation(0.0, Posture(0.0, 0.0, 0.0))
+    for t, x, v in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0), (2.0, 1.0, 0.0), (3.0, 1.0, 1.0), (4.0, 2.0, 1.0)):
+        path.add(ArcSegment(t, 1.0, (x, 0.0, 0.0), v, 0.0))
+    found = path.match(Posture(1.25, 0.0, 0.0), 3.75)
+    assert found.time_difference == pytest.approx(0.5)
+    assert path.place == pytest.approx(3.25)

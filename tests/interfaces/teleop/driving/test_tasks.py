@@ -24,9 +24,9 @@ from interfaces.jobs import (
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
 from interfaces.teleop.architectures import DriveOrders, Packet
 from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
-from interfaces.teleop.tasks import Doing, Go
+from interfaces.teleop.tasks import Doing, Go, Halt
 from robots.ipr.parameters import IPR_LIMITS
-from robots.onboard.driving import Posture
+from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
 
@@ -122,7 +122,7 @@ def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None
     assert rig.operator.doing is Doing.NOTHING
 
 
-@pytest.mark.parametrize("job", [Move(THERE), Voice("A rather long text that takes a while"), Wait(30.0), Wait()])
+@pytest.mark.parametrize("job", [Move(THERE), Voice("A long text that takes a while. " * 6), Wait(30.0), Wait()])
 @pytest.mark.parametrize("stop", ["abort", "pause", "stop", "wheel", "touch"])
 def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_intact(job: Job, stop: str) -> None:
     rig = Rig()
@@ -300,3 +300,40 @@ def test_another_operator_finds_the_list_paused() -> None:
     assert rig.autonomy.doing is Doing.NOTHING
     assert rig.autonomy.report().progress.stage is Stage.PAUSED
     assert stands(rig)
+
+
+class Busy:
+    """An arm whose programs never end by themselves."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def run(self, program: str, source: str, *, now: float) -> str:
+        self.told.append(program)
+        return ""
+
+    def end(self, *, now: float) -> None:
+        self.told.append("end")
+
+    def outcome(self, *, now: float) -> str | None:
+        return None
+
+
+@pytest.mark.parametrize("stop", [Command.ABORT, Command.PAUSE, Halt()])
+def test_an_arm_that_works_is_stopped_with_its_list(stop: Command | Halt) -> None:
+    arm = Busy()
+    autonomy = Rig(arm=arm).autonomy
+    autonomy.receive(Load(JobList.of(Arm("pick"))), now=0.0)
+    autonomy.receive(Command.RUN, now=0.0)
+    assert arm.told == ["pick"]
+    autonomy.receive(stop, now=1.0)
+    assert arm.told == ["pick", "end"]
+
+
+def test_it_sets_out_from_rest() -> None:
+    rig = Rig()
+    here = Posture(1.0, 2.0, 0.5)
+    rig.autonomy.receive(Go(THERE), now=0.0)
+    assert rig.autonomy.drive(here, Drive(0.3, 0.0), now=0.0) is None
+    assert rig.autonomy.doing is Doing.GOAL
+    assert rig.autonomy.drive(here, STAND, now=0.05) is not None

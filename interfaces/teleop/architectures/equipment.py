@@ -1,18 +1,22 @@
-"""The extended architecture's parts for a real robot in its room: map, sonar, supervisor, avoidance."""
+"""What an architecture takes from a real robot in its room: place; for the extended one its surroundings too."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 
-from interfaces.teleop.architectures import Controller, Following, OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.architectures.controllers import Controller, Following
+from interfaces.teleop.architectures.sites import Position
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.navigation import mounts_of, outline_of
 from robots.ipr.parameters import CELL, CELLS
+from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
@@ -21,6 +25,17 @@ from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
 from robots.onboard.yielding import Yielding, YieldingConfig
 from vrs.mobile import Avoidance, Grid, MobileModel, VirtualEnvironment
 
+CONTROL = 0.05
+"""Period of the real robot's control [s]."""
+SENSING = ("extended",)
+"""Architectures whose robot has sonars, and whose operator has the map of the room."""
+POSITIONS: Final[dict[str, Callable[[MobileRobot], Position]]] = {
+    "fused": FusedPosition,
+    "laser": LaserPosition,
+    "odometry": OdometryPosition,
+    "truth": TruePosition,
+}
+"""What can tell a robot where it is."""
 _ROUNDING = 1e-9
 MARGIN = 0.02
 """Of the virtual robot's circle round the real one's outline [m]."""
