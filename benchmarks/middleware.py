@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from benchmarks.timing import seconds
 from interfaces.lab.tipsuwan.gain import behind_a_network
 from interfaces.lab.tipsuwan.run import Control, Setting, agent, network_of, run
 from interfaces.lab.tipsuwan.s_paths import START, s_path
@@ -35,14 +36,9 @@ def costs(action: Callable[[Drive], object]) -> list[float]:
     return sorted(found)
 
 
-def seconds(action: Callable[[], object], rounds: int = 3) -> float:
+def median_seconds(action: Callable[[], object], rounds: int = 3) -> float:
     """Median processor time of an action [s]."""
-    found = []
-    for _ in range(rounds):
-        start = time.process_time()
-        action()
-        found.append(time.process_time() - start)
-    return statistics.median(found)
+    return statistics.median(seconds(action) for _ in range(rounds))
 
 
 def part() -> Part:
@@ -65,7 +61,7 @@ def part() -> Part:
         return Result(what, Cost(statistics.median(found), found[round(0.99 * BLOCKS) - 1]), bar=Bar(median=asked))
 
     def whole_run(control: Control) -> Result:
-        taken = seconds(lambda: run(curve, agent(control, curve, setting), network_of(0), setting=setting))
+        taken = median_seconds(lambda: run(curve, agent(control, curve, setting), network_of(0), setting=setting))
         return Result(f"a run of 15 s by {control.value}, kinematic robot", Cost(1e6 * taken))
 
     return Part(
@@ -77,7 +73,7 @@ def part() -> Part:
             row("scheduling alone, by the exact root", lambda drive: by_root.schedule(drive, 0.21)),
             row("the exact root alone", lambda drive: optimal_way(drive.w, 0.25)),
             row("the quadratic-curve tracker, for comparison", lambda _: tracker.control(posture)),
-            Result("training the network", Cost(1e6 * seconds(lambda: train(seed=1), 1))),
+            Result("training the network", Cost(1e6 * median_seconds(lambda: train(seed=1), 1))),
             *(whole_run(control) for control in (Control.DIRECT, Control.NETWORK, Control.PREDICTIVE)),
         ),
     )

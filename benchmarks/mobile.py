@@ -10,10 +10,10 @@ import math
 import os
 import statistics
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from benchmarks.timing import seconds
 from robots.ipr.bare import BareBody
 from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses, SonarModel
@@ -26,13 +26,6 @@ PERIODS = 10
 """Control periods of 0.1 s a block."""
 START = (1.2, 1.3, 0.0)
 """Where in the furnished room a slow circle meets nothing."""
-
-
-def seconds(action: Callable[[], object]) -> float:
-    """Return the processor time that an action takes [s]."""
-    start = time.process_time()
-    action()
-    return time.process_time() - start
 
 
 def circle(body: MobileRobot) -> None:

@@ -6,13 +6,12 @@ Blocks of both alternate, so that a busy machine slows both; the median and the 
 from __future__ import annotations
 
 import statistics
-import time
-from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.timing import seconds
 from robots.bullet import Payload, Reality, World, load_arm
 from robots.puma560.body import RealArm, puma_links
 from robots.puma560.parameters import POSES, default_limits
@@ -42,13 +41,6 @@ def bare_loop(world: World, body: int, torques: Array) -> None:
         bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=tau, physicsClientId=client)
         bullet.stepSimulation(physicsClientId=client)
         bullet.getJointStates(body, joints, physicsClientId=client)
-
-
-def seconds(action: Callable[[], object]) -> float:
-    """Return the processor time that an action takes [s]."""
-    start = time.process_time()
-    action()
-    return time.process_time() - start
 
 
 def measure(blocks: int = 20) -> dict[str, float]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from benchmarks.recorded import RATE, Teller, Tick, begin, record, ticks
 from benchmarks.results import Bar, Cost, Part, Result
+from benchmarks.timing import seconds
 from interfaces.recording import Recorder, Recording, open_recording
 from interfaces.recording import messages as m
 from interfaces.recording.channels import Message
@@ -77,11 +78,11 @@ def _hour(folder: Path) -> list[Result]:
     bar = Bar(median=0.5, p99=0.5)
     with open_recording(path) as recording:
         assert not recording.damage
-        seeks = [_seconds(lambda t=t: recording.real(t)) for t in places]  # type: ignore[misc]
-        computed = _seconds(lambda: recording.virtual(places[0]))
-        again = [_seconds(lambda t=t: recording.virtual(t)) for t in places]  # type: ignore[misc]
-        commands = _seconds(lambda: recording.commands)
-        whole = _seconds(lambda: recording.track("/real/joints"))
+        seeks = [seconds(lambda t=t: recording.real(t)) for t in places]  # type: ignore[misc]
+        computed = seconds(lambda: recording.virtual(places[0]))
+        again = [seconds(lambda t=t: recording.virtual(t)) for t in places]  # type: ignore[misc]
+        commands = seconds(lambda: recording.commands)
+        whole = seconds(lambda: recording.track("/real/joints"))
         edits = len(recording.edits)
     return [
         Result("an hour", Cost(size / 1e6), unit="MB", bar=Bar(median=60.0)),
@@ -113,14 +114,8 @@ def _openings(path: Path, look: Callable[[Recording], None] | None = None, times
             if look is not None:
                 look(recording)
 
-    return _cost([_seconds(opened) for _ in range(times)])
+    return _cost([seconds(opened) for _ in range(times)])
 
 
-def _seconds(call: Callable[[], object]) -> float:
-    start = time.process_time()
-    call()
-    return time.process_time() - start
-
-
-def _cost(seconds: list[float]) -> Cost:
-    return Cost(median(seconds), float(np.percentile(seconds, 99)))
+def _cost(times: list[float]) -> Cost:
+    return Cost(median(times), float(np.percentile(times, 99)))

@@ -189,3 +189,10 @@ class Stopwatch:
 def _percentiles(values: list[float]) -> Cost:
     median, p99 = np.percentile(values, (50, 99))
     return Cost(float(median), float(p99))
+
+
+def seconds(action: Callable[[], object]) -> float:
+    """Return the processor time that an action takes [s]."""
+    start = time.process_time()
+    action()
+    return time.process_time() - start

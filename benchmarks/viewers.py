@@ -22,7 +22,7 @@ import uvloop
 from interfaces.site import Site
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.hub import Hub, HubConfig
-from interfaces.stream.limits import Limits
+from interfaces.stream.limits import ClientLimits
 from interfaces.stream.server import HubServer, application
 from interfaces.stream.sockets import KERNEL_BUFFER, bind, serve
 from robots import puma560
@@ -60,7 +60,7 @@ class Bench:
         self.engine = Engine(MODEL, q=HOME, clock=ManualClock(self.clock.now()))
         self.site = Site(self.engine)
         robot = Idle()
-        config = HubConfig(rates=rates, limits=Limits(clients=2000))
+        config = HubConfig(rates=rates, limits=ClientLimits(clients=2000))
         self.hub = robot.hub = Hub(self.site, Lease(), Access(), robot, config=config)
         self.server = HubServer(self.hub, self.clock)
         self.listening = bind()

@@ -18,14 +18,14 @@ import json
 from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.media.camera import CameraError
 from interfaces.station.files import HEADERS
-from interfaces.stream.access import LONGEST_TOKEN, Access
+from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.viewers import (
@@ -112,7 +112,7 @@ class MediaDoor:
 
     async def _still(self, request: Request) -> Response:
         """A picture by itself."""
-        if refusal := self._access.refusal(Role.VIEWER, _bearer(request)):
+        if refusal := self._access.refusal(Role.VIEWER, bearer(request.headers.get("authorization", ""))):
             return JSONResponse({"problem": refusal}, 403, HEADERS)
         if not self._stills.take(self._media.clock.now()):
             return JSONResponse({"problem": "too many pictures: try again in a moment"}, 429, HEADERS)
@@ -223,9 +223,3 @@ class _Page:
         else:
             media.presenter.clear()
         return {}
-
-
-def _bearer(connection: HTTPConnection) -> str | None:
-    """The token that a request shows; None where it shows none."""
-    scheme, _, token = connection.headers.get("authorization", "").partition(" ")
-    return token[: LONGEST_TOKEN + 1] if scheme.lower() == "bearer" and token else None

@@ -28,7 +28,7 @@ MOST_PEERS: Final = 8
 """Pages that get picture and sound by RTP; more see single pictures."""
 TELL: Final = 0.1
 """Time between two looks at what there's to tell [s]."""
-_DEGREE: Final = 4
+_DECIMALS: Final = 4
 """Decimals of an angle that is told [rad]."""
 
 
@@ -117,8 +117,8 @@ class LiveMedia:
             "kind": "media",
             "video": self._video,
             "missing": self.missing,
-            "pan": round(look.pan, _DEGREE),
-            "tilt": round(look.tilt, _DEGREE),
+            "pan": round(look.pan, _DECIMALS),
+            "tilt": round(look.tilt, _DECIMALS),
             "target": list(camera.axes.target),
             "limits": [-limits.pan, limits.pan, -limits.down, limits.up],
             "view": camera.config.lens.view,

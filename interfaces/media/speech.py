@@ -76,9 +76,7 @@ def shortened(text: str) -> str:
 
 def _printable(text: str) -> str:
     kept = "".join(" " if unicodedata.category(letter)[0] in "ZC" else letter for letter in text)
-    while "[[" in kept or "]]" in kept:
-        kept = kept.replace("[[", " ").replace("]]", " ")
-    return " ".join(kept.split())
+    return " ".join(kept.replace("[[", " ").replace("]]", " ").split())
 
 
 def reading_time(text: str) -> float:

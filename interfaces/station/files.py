@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from functools import lru_cache
 from importlib import resources
 from typing import Final
@@ -10,6 +9,8 @@ from typing import Final
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
+
+from interfaces.stream.kept_files import KeptFile
 
 POLICY: Final = (
     "default-src 'none'; script-src 'self'{scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
@@ -44,18 +45,14 @@ async def _answer(request: Request) -> Response:
     name = request.path_params["name"]
     if name not in names():
         return Response("not here", 404, HEADERS, "text/plain")
-    content, tag = _content(name)
-    headers = {**HEADERS, "ETag": tag}
-    if request.headers.get("if-none-match") == tag:
-        return Response(None, 304, headers)
-    return Response(content, 200, headers, _TYPES[name.rpartition(".")[2]])
+    return _file(name).answer(request, _TYPES[name.rpartition(".")[2]], HEADERS)
 
 
 @lru_cache(maxsize=64)
-def _content(name: str) -> tuple[bytes, str]:
+def _file(name: str) -> KeptFile:
     if name in _TERMINAL:
         content = resources.files("nicegui").joinpath(f"elements/xterm/dist/{_TERMINAL[name]}").read_bytes()
     else:
         package = "interfaces.stream" if name == _READER else "interfaces.station"
         content = resources.files(package).joinpath(f"static/{name}").read_bytes()
-    return content, f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+    return KeptFile.of(content)

@@ -23,7 +23,7 @@ from interfaces.recording.live import LiveRecording
 from interfaces.station.files import HEADERS
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
-from interfaces.stream.access import LONGEST_TOKEN, Access
+from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.newest import Newest
@@ -155,8 +155,7 @@ class Recordings:
 
     async def _answer(self, request: Request) -> Response:
         """Do what a page asks for."""
-        scheme, _, token = request.headers.get("authorization", "").partition(" ")
-        shown = token[: LONGEST_TOKEN + 1] if scheme.lower() == "bearer" and token else None
+        shown = bearer(request.headers.get("authorization", ""))
         try:
             if refusal := self._access.refusal(Role.VIEWER, shown):
                 return _said(403, refusal)

@@ -16,12 +16,14 @@ from vrs.errors import FormatError, InvalidValueError
 
 TOKEN_BYTES = 32
 """Random bytes of a token."""
-LARGEST_FILE = 4096
-"""Largest token file [bytes]."""
+SHORTEST_TOKEN = -(-8 * TOKEN_BYTES // 6)
+"""Shortest token [characters]: `TOKEN_BYTES` in base64, six bits a character, without padding."""
 LONGEST_TOKEN = 256
 """Longest token that is looked at [characters]."""
+LARGEST_FILE = 4096
+"""Largest token file [bytes]."""
 
-
+_LENGTHS = f"{SHORTEST_TOKEN} to {LONGEST_TOKEN} characters"
 _RANKS = {Role.VIEWER: 0, Role.OPERATOR: 1, Role.ADMIN: 2}
 OPEN = frozenset({Role.VIEWER, Role.OPERATOR})
 """Roles that need no token on a loopback address, as long as there is no token file."""
@@ -45,8 +47,8 @@ class Access:
         """
         tokens = {} if tokens is None else tokens
         for token in tokens.values():
-            if not 4 * TOKEN_BYTES // 3 <= len(token) <= LONGEST_TOKEN:
-                raise InvalidValueError("token", f"{len(token)} characters", "43 to 256 characters")
+            if not _can_be_token(token):
+                raise InvalidValueError("token", f"{len(token)} characters", _LENGTHS)
         self._free = frozenset(free)
         if Role.ADMIN in self._free:
             raise InvalidValueError("free", "admin", "roles other than admin")
@@ -109,8 +111,8 @@ def read_tokens(path: Path) -> dict[Role, str]:
             continue
         if len(words) != 2 or words[0] not in set(Role) or words[0] in tokens:
             raise FormatError(where, f"line {number} must hold a role and its token, each role once")
-        if not 4 * TOKEN_BYTES // 3 <= len(words[1]) <= LONGEST_TOKEN:
-            raise FormatError(where, f"the token of line {number} must have 43 to 256 characters")
+        if not _can_be_token(words[1]):
+            raise FormatError(where, f"the token of line {number} must have {_LENGTHS}")
         tokens[Role(words[0])] = words[1]
     if not tokens:
         raise FormatError(where, "it holds no token")
@@ -167,6 +169,20 @@ def check_origin(given: Sequence[str], allowed: frozenset[str]) -> bool:
         return True
     scheme, separator, host = given[0].partition("://")
     return len(given) == 1 and bool(separator) and scheme in {"http", "https"} and host.lower() in allowed
+
+
+def bearer(authorization: str) -> str | None:
+    """The token that a request shows; None where it shows none.
+
+    Args:
+        authorization: Its Authorization header; empty if it has none. What is too long for a token is cut off.
+    """
+    scheme, _, token = authorization.partition(" ")
+    return token[: LONGEST_TOKEN + 1] if scheme.lower() == "bearer" and token else None
+
+
+def _can_be_token(text: str) -> bool:
+    return SHORTEST_TOKEN <= len(text) <= LONGEST_TOKEN
 
 
 def _digest(token: str) -> bytes:

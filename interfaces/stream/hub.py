@@ -16,7 +16,7 @@ from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.control import PROTOCOL, Problem, ProblemCode, Role
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import Leasing, Robot
-from interfaces.stream.limits import Bucket, Limits
+from interfaces.stream.limits import Bucket, ClientLimits
 from interfaces.stream.network import Impair, Network
 from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, News, Seat, Session, State, Welcome, Wish
 from interfaces.stream.tasks import TaskOrder, Tasks, Wanted
@@ -68,7 +68,7 @@ class HubConfig:
     """Name and version of the program."""
     instance: str = ""
     """Names this run of it; with another one there's another timeline."""
-    limits: Limits = field(default_factory=Limits)
+    limits: ClientLimits = field(default_factory=ClientLimits)
 
     def __post_init__(self) -> None:
         if not 0.1 <= self.state_rate <= 1000:

@@ -253,14 +253,15 @@ class Joined(Generic[C]):
 
 
 def _of_lease(answer: Replied) -> Lease | Problem:
-    return answer if isinstance(answer, Lease | Problem) else _ELSE
+    return answer if isinstance(answer, Lease | Problem) else ELSE
 
 
 def _of_network(answer: Replied) -> Network | Problem:
-    return answer if isinstance(answer, Network | Problem) else _ELSE
+    return answer if isinstance(answer, Network | Problem) else ELSE
 
 
-_ELSE = Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
+ELSE = Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
+"""What stands for an answer of another kind than was asked for."""
 
 
 def _address(url: str) -> str:

@@ -8,7 +8,7 @@ from vrs.checks import number_in
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ClientLimits:
     """Bounds of one client, and of all."""
 
     clients: int = 1024

@@ -7,7 +7,7 @@ from interfaces.jobs import Command, Forecast, JobList, Load
 from interfaces.stream.client import Replied
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem, ProblemCode, Role
-from interfaces.stream.joining import Joined
+from interfaces.stream.joining import ELSE, Joined
 from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.mobile_client import MobileCore
 from interfaces.stream.remote import RemoteDesigner
@@ -89,9 +89,7 @@ class MobileConnection(Joined[MobileCore]):
 
     def _ask(self, wanted: Wanted, wait: float) -> Tasks | Problem:
         answer: Replied = self._wish(lambda number, epoch: TaskOrder(number, epoch, wanted), wait)
-        if isinstance(answer, Tasks | Problem):
-            return answer
-        return Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
+        return answer if isinstance(answer, Tasks | Problem) else ELSE
 
     @property
     def postures(self) -> Postures | None:

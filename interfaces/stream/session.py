@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Protocol, TypeAlias
 
-from interfaces.messages import Ask, Broadcast, Follow, Order, Outcome, Pulse, Request, Want
+from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want
 from interfaces.stream import control
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
 from interfaces.stream.control import Problem, ProblemCode, Role
 from interfaces.stream.errors import ProtocolError
-from interfaces.stream.limits import Bucket, Limits
+from interfaces.stream.limits import Bucket, ClientLimits
 from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.network import Impair, Network, Survey
 from interfaces.stream.outbox import Outbox
@@ -62,7 +62,7 @@ class Served(Protocol):
 class Seat:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
-    __slots__ = ("key", "left", "name", "role", "servlet", "session", "settled")
+    __slots__ = ("key", "left", "name", "role", "servlet", "session")
 
     def __init__(self, key: str, name: str, role: Role) -> None:
         self.key, self.name, self.role = key, name, role
@@ -70,14 +70,12 @@ class Seat:
         self.session: Session | None = None
         self.left = 0.0
         """When its connection was lost [s]."""
-        self.settled = 0
-        """Orders up to this number have an outcome."""
 
 
 class Desk(Protocol):
     """What a session needs of the hub."""
 
-    limits: Limits
+    limits: ClientLimits
     encoder: SharedEncoder
     state: State | None
     news: dict[type, News]
@@ -238,8 +236,6 @@ class Session:
             if isinstance(reply, Broadcast | Pulse):
                 self._outbox.put_newest(reply)
                 continue
-            if isinstance(reply, Outcome):
-                seat.settled = max(seat.settled, reply.number)
             self._outbox.put(reply)
 
     def is_due(self, now: float) -> bool:

@@ -12,6 +12,7 @@ from interfaces.val2 import forms, kinds, walk
 from interfaces.val2.errors import Place, ValError
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.parser import directive, lines_of, split_comment
+from interfaces.val2.signals import INTERNAL, OUTPUTS
 from interfaces.val2.slots import Kind, nearest
 from interfaces.val2.source import SourceFile, parse_file
 from interfaces.val2.structure import survey
@@ -273,7 +274,6 @@ _RANGES: Final[dict[tuple[str, int], tuple[float, float, str]]] = {
     ("SPEED", 0): (1e-3, 1e6, "a speed above 0"),
     ("AT", 0): (0, 1e9, "seconds, not negative"),
 }
-_SIGNALS: Final = (range(1, 33), range(1001, 1033), range(2001, 2033))
 
 
 def _numbers(statement: Statement) -> Iterator[ValError]:
@@ -287,7 +287,7 @@ def _numbers(statement: Statement) -> Iterator[ValError]:
         low, high, allowed = _RANGES.get((statement.keyword, i), (-1e300, 1e300, ""))
         if not low <= value <= high:
             yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
-        if statement.keyword == "SIGNAL" and not any(abs(value) in r for r in (*_SIGNALS[::2], (0.0,))):
+        if statement.keyword == "SIGNAL" and not any(abs(value) in r for r in (OUTPUTS, INTERNAL, (0.0,))):
             yield ValError("Illegal digital signal", "allowed: 1 to 32, 2001 to 2032", place=operand.at)
         if statement.keyword == "PARAMETER":
             row = forms.PARAMETERS[statement.words[0]]

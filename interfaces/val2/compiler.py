@@ -15,7 +15,7 @@ from interfaces.val2.context import SPECIAL, Context, Invoke, Leave
 from interfaces.val2.dialogue import prompt_step, type_step
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Warned
-from interfaces.val2.expressions import Expressions, Kind
+from interfaces.val2.expressions import Expressions, ResultKind
 from interfaces.val2.geometry import to_oat
 from interfaces.val2.instructions import StepFunction, instruction
 from interfaces.val2.memory import MOST_DIMENSIONS, Slot, index, mismatch, undefined, where
@@ -248,7 +248,7 @@ class _Compiler:
 
     def _case(self, i: int, value: Expression) -> StepFunction:
         x, block = self.x, self._block(i)
-        text = x.kind(value) is Kind.STRING
+        text = x.kind(value) is ResultKind.STRING
         read: Callable[[Expression], Callable[[Slots], Any]] = x.string if text else x.real
         given, arms, otherwise = read(value), [], block.end + 1
         for arm in block.arms:
@@ -377,4 +377,4 @@ class _Compiler:
         return watch
 
 
-_PREFIX: Final = {Kind.STRING: "$", Kind.POINT: "#"}
+_PREFIX: Final = {ResultKind.STRING: "$", ResultKind.POINT: "#"}

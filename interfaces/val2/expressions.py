@@ -33,7 +33,7 @@ RELATIONS: Final[dict[str, Callable[[Any, Any], bool]]] = {
 }
 
 
-class Kind(Enum):
+class ResultKind(Enum):
     """What an expression is, as far as its text tells."""
 
     REAL = auto()
@@ -57,24 +57,24 @@ class Expressions:
         self.context = context
         self._scope = scope or {}
 
-    def kind(self, e: Expression) -> Kind:
+    def kind(self, e: Expression) -> ResultKind:
         """What an expression is."""
         from interfaces.val2.functions import RESULTS
 
         match e:
             case Number() | Unary():
-                return Kind.REAL
+                return ResultKind.REAL
             case Text():
-                return Kind.STRING
+                return ResultKind.STRING
             case Compound():
-                return Kind.TRANSFORMATION
+                return ResultKind.TRANSFORMATION
             case Variable():
-                return {"$": Kind.STRING, "#": Kind.POINT}.get(e.prefix, Kind.NAME)
+                return {"$": ResultKind.STRING, "#": ResultKind.POINT}.get(e.prefix, ResultKind.NAME)
             case Apply():
-                return RESULTS.get(e.function, Kind.REAL)
+                return RESULTS.get(e.function, ResultKind.REAL)
             case Binary():
                 both = (self.kind(e.left), self.kind(e.right))
-                return Kind.STRING if e.operator == "+" and Kind.STRING in both else Kind.REAL
+                return ResultKind.STRING if e.operator == "+" and ResultKind.STRING in both else ResultKind.REAL
 
     # Names.
 
@@ -209,7 +209,7 @@ class Expressions:
         return unary
 
     def _binary(self, e: Binary) -> Real:
-        if self.kind(e) is Kind.STRING:
+        if self.kind(e) is ResultKind.STRING:
             raise ValError("Invalid expression", "a number was expected", place=where(e.at))
         return joined(e.operator, self.real(e.left), self.real(e.right), e.at)
 
@@ -235,7 +235,7 @@ class Expressions:
         return lambda s: value(s) != 0.0
 
     def _relation(self, e: Binary) -> Callable[[Slots], bool]:
-        if Kind.STRING in (self.kind(e.left), self.kind(e.right)):
+        if ResultKind.STRING in (self.kind(e.left), self.kind(e.right)):
             relation = RELATIONS[e.operator]
             left, right = self.string(e.left), self.string(e.right)
             return lambda s: relation(left(s), right(s))
@@ -270,7 +270,7 @@ class Expressions:
             case Binary() if e.operator == "+":
                 left, right = self.string(e.left), self.string(e.right)
                 return lambda s: left(s) + right(s)
-            case Apply() if self.kind(e) is Kind.STRING:
+            case Apply() if self.kind(e) is ResultKind.STRING:
                 from interfaces.val2.functions import string_function
 
                 return string_function(self, e)
@@ -306,7 +306,7 @@ class Expressions:
                     return Transformation(X)
 
                 return compound
-            case Apply() if self.kind(e) is Kind.TRANSFORMATION:
+            case Apply() if self.kind(e) is ResultKind.TRANSFORMATION:
                 from interfaces.val2.locations import frame_function
 
                 return frame_function(self, e)
@@ -329,19 +329,19 @@ class Expressions:
 
     def location(self, e: Expression) -> Callable[[Slots], Location]:
         """A closure of a transformation or a precision point, as the text tells."""
-        return self.point(e) if self.kind(e) is Kind.POINT else self.transformation(e)
+        return self.point(e) if self.kind(e) is ResultKind.POINT else self.transformation(e)
 
     def value(self, e: Expression) -> Callable[[Slots], Value]:
         """A closure of whatever an expression is."""
         match self.kind(e):
-            case Kind.REAL:
+            case ResultKind.REAL:
                 return self.real(e)
-            case Kind.STRING:
+            case ResultKind.STRING:
                 return self.string(e)
-            case Kind.TRANSFORMATION:
+            case ResultKind.TRANSFORMATION:
                 return self.transformation(e)
-            case Kind.POINT:
+            case ResultKind.POINT:
                 return self.point(e)
-            case Kind.NAME:
+            case ResultKind.NAME:
                 assert isinstance(e, Variable)
                 return self.read(e)

@@ -12,7 +12,7 @@ from interfaces.val2.arguments import arguments, reals
 from interfaces.val2.arithmetic import truth, whole
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Warned
-from interfaces.val2.expressions import Expressions, Kind, String
+from interfaces.val2.expressions import Expressions, ResultKind, String
 from interfaces.val2.forms import FUNCTIONS
 from interfaces.val2.locations import FRAMES
 from interfaces.val2.memory import where
@@ -331,9 +331,9 @@ _STRING: Final[dict[str, Callable[[Expressions, Apply], String]]] = {
 }  # fmt: skip
 
 
-RESULTS: Final[dict[str, Kind]] = {
-    **dict.fromkeys(_STRING, Kind.STRING),
-    **dict.fromkeys(FRAMES, Kind.TRANSFORMATION),
-    **dict.fromkeys(("#PPOINT", "#HERE", "#DEST"), Kind.POINT),
+RESULTS: Final[dict[str, ResultKind]] = {
+    **dict.fromkeys(_STRING, ResultKind.STRING),
+    **dict.fromkeys(FRAMES, ResultKind.TRANSFORMATION),
+    **dict.fromkeys(("#PPOINT", "#HERE", "#DEST"), ResultKind.POINT),
 }
 """What functions give that aren't reals."""

@@ -13,9 +13,10 @@ from typing import Final
 import numpy as np
 
 from interfaces.val2.values import PrecisionPoint, Transformation
+from robots.puma560 import parameters
 from vrs.model import Array, Limits
 
-FLANGE: Final = 56.25
+FLANGE: Final = 1000.0 * parameters.FLANGE
 """From the wrist's centre to the flange along the tool's axis [mm]."""
 _VERTICAL: Final = 1e-9
 """Sine of the angle between tool and vertical under which O and T can't be told apart."""

@@ -113,11 +113,6 @@ class Task:
         """Whether it waits for something else than its turn."""
         return self.frames[-1].waiting is not None
 
-    @property
-    def standing(self) -> bool:
-        """Whether it's done but for the arm."""
-        return len(self.frames) == 1 and self.frames[0].pc >= len(self.code.program.steps)
-
     def next_deadline(self) -> float:
         """When its wait may be over by itself [s]; infinity for never."""
         return self.context.arm.next_deadline() if self.deadline == ARM else self.deadline

@@ -94,7 +94,7 @@ _read: Final = msgspec.json.Decoder(Hello | Who | Lines | Interrupt | Complete |
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class TerminalRoom:
     """What terminals are at."""
 
     board: Switchboard
@@ -262,7 +262,7 @@ class _Client:
 class PageDoor:
     """Terminals of pages; its route goes into an application. What they are at is made for the first of them."""
 
-    def __init__(self, enter: Callable[[], Awaitable[Room]]) -> None:
+    def __init__(self, enter: Callable[[], Awaitable[TerminalRoom]]) -> None:
         """Begin with nobody.
 
         Args:
@@ -270,7 +270,7 @@ class PageDoor:
         """
         self._enter = enter
         self._clients: set[_Client] = set()
-        self._room: Room | None = None
+        self._room: TerminalRoom | None = None
         self._turning: Turning | None = None
 
     @property

@@ -16,7 +16,7 @@ from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import Monitor
 from interfaces.val2.monitor.switchboard import Person, Switchboard
-from interfaces.val2.pages import Room
+from interfaces.val2.pages import TerminalRoom
 from interfaces.val2.tcp import ValDoor
 from vrs.errors import VrsError
 
@@ -44,7 +44,7 @@ class ServedVal:
         """
         self._url, self._token, self._access = url, token, access
         self._files, self._version = Files(directory, examples=examples()), version
-        self._entering: asyncio.Task[Room] | None = None
+        self._entering: asyncio.Task[TerminalRoom] | None = None
         self._connection: Connection | None = None
 
     @contextlib.asynccontextmanager
@@ -58,7 +58,7 @@ class ServedVal:
             if self._connection is not None:
                 await asyncio.to_thread(self._connection.close)
 
-    async def enter(self) -> Room:
+    async def enter(self) -> TerminalRoom:
         """What all terminals are at.
 
         Raises:
@@ -73,12 +73,12 @@ class ServedVal:
             self._entering = None if self._entering is entering else self._entering
             raise
 
-    async def _made(self) -> Room:
+    async def _made(self) -> TerminalRoom:
         connection, arm = await asyncio.to_thread(self._connect)
         self._connection = connection
         controller = Controller(arm, parameters=arm.parameters, now=connection.now())
         board = Switchboard(controller, LeaseControl(connection))
-        return Room(board, connection, partial(self._terminal, board))
+        return TerminalRoom(board, connection, partial(self._terminal, board))
 
     def _connect(self) -> tuple[Connection, Arm]:
         from interfaces import connect

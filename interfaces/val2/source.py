@@ -11,6 +11,7 @@ from typing import Final
 
 from interfaces.val2 import forms, geometry, grammar
 from interfaces.val2.errors import Place, ValError
+from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import (
     directive,
     lines_of,
@@ -155,7 +156,7 @@ def _variable(code: str, line: int, prefixes: str) -> tuple[Variable, int]:
     if found[1].upper() in forms.CONSTANTS:
         raise ValError("Reserved name", f"{found[1].upper()} is a function", place=at)
     indices = [] if found[2] is None else [part.strip() for part in found[2].split(",")]
-    if len(indices) > 3 or not all(_ELEMENT.fullmatch(part) for part in indices):
+    if len(indices) > MOST_DIMENSIONS or not all(_ELEMENT.fullmatch(part) for part in indices):
         raise ValError("Syntax error", "allowed: one to three indices", place=at)
     return Variable(grammar.name_of(found[1]), tuple(Number(float(n)) for n in indices), at), found.end()
 

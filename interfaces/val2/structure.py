@@ -30,7 +30,7 @@ from interfaces.val2.syntax import (
     While,
 )
 
-Kind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
+BlockKind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
 _LOOPS: Final = ("WHILE", "DO", "FOR")
 DEEPEST: Final = 100
 """Most levels of structure."""
@@ -40,7 +40,7 @@ DEEPEST: Final = 100
 class Block:
     """A structure from its first step to its last; steps are counted from 0."""
 
-    kind: Kind
+    kind: BlockKind
     start: int
     end: int
     """The step of `END` or `UNTIL`."""
@@ -72,7 +72,7 @@ class Structure:
 class _Open:
     """A structure whose end hasn't come yet."""
 
-    kind: Kind
+    kind: BlockKind
     start: int
     arms: list[int] = field(default_factory=list)
     closed: bool = False
@@ -163,7 +163,7 @@ class _Surveyor:
             case _ if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
                 self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
 
-    def _begin(self, kind: Kind, i: int) -> None:
+    def _begin(self, kind: BlockKind, i: int) -> None:
         if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
             self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
         if len(self._open) == DEEPEST:

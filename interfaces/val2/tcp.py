@@ -31,8 +31,8 @@ _NUL: Final = b"\0"
 """Nothing, to a terminal; a client that's gone answers it with a reset."""
 
 
-class Connection:
-    """A terminal: bytes to lines, what is said to bytes."""
+class TcpTerminal:
+    """The terminal of a connection: bytes to lines, what is said to bytes."""
 
     def __init__(
         self,
@@ -170,7 +170,7 @@ class ValDoor:
             locked: Whether a token is asked for.
         """
         self._board, self._clock, self._terminal, self._locked = board, clock, terminal, locked
-        self._connections: set[Connection] = set()
+        self._connections: set[TcpTerminal] = set()
         self._turning = Turning(clock, self._turn)
         self.port = 0
         """Where it listens."""
@@ -209,7 +209,7 @@ class ValDoor:
             writer.write(f"*Too many terminals* {MOST} at most{_NEWLINE}".encode())
             await _close(writer)
             return
-        connection = Connection(writer, self._terminal, locked=self._locked)
+        connection = TcpTerminal(writer, self._terminal, locked=self._locked)
         self._connections.add(connection)
         self._turning.soon()
         reading = asyncio.create_task(self._read(connection, reader))
@@ -221,7 +221,7 @@ class ValDoor:
             self._connections.discard(connection)
             await _close(writer)
 
-    async def _read(self, connection: Connection, reader: asyncio.StreamReader) -> None:
+    async def _read(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> None:
         data = _NUL
         while data:
             try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from interfaces.val2 import forms
 from interfaces.val2.slots import Kind
 from interfaces.val2.syntax import (
     Apply,
@@ -57,8 +58,6 @@ def parts(expression: Expression) -> Iterator[Expression]:
 
 def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
     """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
-    from interfaces.val2 import forms
-
     match statement:
         case Assign(target, value):
             yield value, "string" if target.prefix == "$" else "real"

@@ -1,13 +1,12 @@
 // What the robot sees, says and shows: its camera's picture and sound by RTP, or single pictures, and both its axes.
 import { Gaze } from "./gaze.js";
-import { h, icon, mark, write } from "./dom.js";
+import { DEGREES, h, icon, mark, write } from "./dom.js";
 import { held, needs } from "./handling.js";
 import { Receiver } from "./receiver.js";
+import { sideLink } from "./sidelink.js";
 import { Stills } from "./stills.js";
 
 const PERIOD = 250;
-const AGAIN = 1000;
-const DEGREES = 180 / Math.PI;
 const LONGEST = 300;
 /** Keys and buttons, and which way they turn the camera: left, up. */
 const KEYS = { KeyJ: [1, 0], KeyL: [-1, 0], KeyI: [0, 1], KeyK: [0, -1] };
@@ -39,7 +38,7 @@ export function mount(station, box) {
   const problem = h("p.advice", { id: "camera-problem", role: "status", hidden: true });
   const said = h("p.refused", { id: "camera-refused", role: "alert", hidden: true });
 
-  const link = new window.VrsLink("/media", [], { take: (data) => take(JSON.parse(data)), state: connected });
+  const link = sideLink(station, "/media", { take: (data) => take(JSON.parse(data)), state: connected });
   const receiver = new Receiver(video, (message) => link.send(JSON.stringify(message)), fallBack);
   const stills = new Stills(still, session);
   const gaze = new Gaze(session, () => facts, (message) => link.send(JSON.stringify(message)), refuse);
@@ -114,13 +113,7 @@ export function mount(station, box) {
       single = false;
       receiver.stop();
     }
-    // A page that is held up may show its token too late.
-    if (state === "token" && session.link !== "locked") setTimeout(join, AGAIN);
     look();
-  }
-
-  function join() {
-    if (link.socket === null && link.again === null) link.connect();
   }
 
   const isShown = () => box.offsetParent !== null && document.visibilityState === "visible";
@@ -167,7 +160,5 @@ export function mount(station, box) {
     tell();
   }, PERIOD);
   station.on("lease", tell);
-  station.on("welcome", join);
-  if (session.welcome) join();
   station.shared.camera = { video, receiver, stills, get facts() { return facts; } };
 }

@@ -1,9 +1,9 @@
 // Live plots of a mobile robot: how far the real one is from the path, how much later, and what the network does.
 import { Chart } from "./chart.js";
 import { save, textOf } from "./csv.js";
-import { h, mark, write } from "./dom.js";
-import { figure } from "./graphs.js";
+import { figure, mark, write } from "./dom.js";
 import { Messages } from "./messages.js";
+import { PlotHead, loadStyles, notes, palette } from "./plothead.js";
 import { Table } from "./table.js";
 import { thinned } from "./thinning.js";
 
@@ -77,59 +77,37 @@ class Samples {
 }
 
 export function mount(station, box) {
-  for (const name of ["uplot", "plots"]) document.head.append(h("link", { rel: "stylesheet", href: `/station/${name}.css` }));
+  loadStyles();
   const { session, layout } = station;
   const samples = new Samples(station);
   const charts = GRAPHS.map((one) => new Chart(one));
-  const colours = new Map();
-  let span = SPANS[0];
+  const colour = palette(station, again);
+  const head = new PlotHead(SPANS, {
+    chosen: again,
+    save: () => textOf(samples.table).then((parts) => save(parts, `vrs-drive-${Math.round(session.now ?? 0)}s.csv`)),
+  });
   let UPlot = null;
   let said = -Infinity;
 
-  const buttons = SPANS.map((one) => h("button", { type: "button", "aria-pressed": String(one === span), "data-span": one[0],
-    onclick: () => choose(one) }, one[1]));
-  const file = h("button", { type: "button", id: "plots-save", title: "Save what is kept, ten minutes at most",
-    onclick: () => textOf(samples.table).then((parts) => save(parts, `vrs-drive-${Math.round(session.now ?? 0)}s.csv`)) }, "CSV");
-  box.append(
-    h("div.row.plots-head", {}, h("div.row.spans", { role: "group", "aria-label": "Time that is shown" }, ...buttons),
-      h("span.grow"), file),
-    ...charts.map((chart) => chart.element),
-    h("details.plot", {}, h("summary", {}, h("span.plot-title", {}, "What these show")),
-      h("dl.plot-notes", {}, ...GRAPHS.flatMap(({ title, note }) => [h("dt", {}, title), h("dd", {}, note)]))),
-  );
-
-  function choose(one) {
-    span = one;
-    buttons.forEach((button, k) => mark(button, "aria-pressed", String(SPANS[k] === one)));
-    again();
-  }
+  box.append(head.element, ...charts.map((chart) => chart.element), notes(GRAPHS));
 
   function again() {
     for (const chart of charts) chart.wanted = true;
-  }
-
-  station.addEventListener("theme", () => {
-    colours.clear();
-    again();
-  });
-
-  function colour(name) {
-    if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
-    return colours.get(name);
   }
 
   setInterval(() => {
     const { now } = session;
     if (document.hidden || layout.shown !== "deviation" || now === null) return;
     const at = performance.now();
-    const view = { samples, from: now - span[0], until: now, span: span[0], cursor: null, events: [] };
+    const [span, , period] = head.span;
+    const view = { samples, from: now - span, until: now, span, cursor: null, events: [] };
     if (at - said > SAID) say(view, (said = at));
     if (!UPlot) {
       UPlot = import("./uplot.js").then((found) => (UPlot = found.default));
       return;
     }
     if (UPlot instanceof Promise) return;
-    const due = charts.find((chart) => chart.visible && (chart.wanted || at - chart.drawn > span[2]));
+    const due = charts.find((chart) => chart.visible && (chart.wanted || at - chart.drawn > period));
     if (!due) return;
     if (!due.plot) due.begin(UPlot, colour);
     due.draw(view);

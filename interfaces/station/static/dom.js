@@ -43,11 +43,18 @@ export function isTyping(event) {
   return target.tagName === "INPUT" && !["range", "checkbox", "radio", "button"].includes(target.type);
 }
 
-/** Radians as degrees, with a real minus. */
-export function degrees(angle) {
-  const text = ((angle * 180) / Math.PI).toFixed(1);
-  return (text === "-0.0" ? "0.0" : text).replace("-", "−") + "°";
+/** Degrees of a radian. */
+export const DEGREES = 180 / Math.PI;
+
+/** A number for people, with a real minus. */
+export function figure(x, digits) {
+  if (x === null || x === undefined || !Number.isFinite(x)) return "–";
+  const text = x.toFixed(digits);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
+
+/** Radians as degrees. */
+export const degrees = (angle) => `${figure(angle * DEGREES, 1)}°`;
 
 /** Seconds of the session as m:ss.s. */
 export function clockText(t) {

@@ -1,6 +1,5 @@
 // Driving: by buttons that are held, by keys, by the stick on the page and by a gamepad; and how both robots are.
-import { h, icon, isTyping, write } from "./dom.js";
-import { figure } from "./graphs.js";
+import { DEGREES, figure, h, icon, isTyping, write } from "./dom.js";
 import { held, needs, Speed } from "./handling.js";
 import { mountPad } from "./pad.js";
 import { steering } from "./steer.js";
@@ -21,7 +20,6 @@ const WORDS = {
   gamepad: "Gamepad: the left stick drives, B stops",
 };
 const PERIOD = 100;
-const DEGREES = 180 / Math.PI;
 
 export function mount(station, box) {
   document.head.append(h("link", { rel: "stylesheet", href: "/station/driving.css" }));

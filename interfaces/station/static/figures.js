@@ -1,9 +1,7 @@
 // The figures of a window, by the names and units of `vrs compare`: what plots show, for those who read.
-import { h, write } from "./dom.js";
-import { figure } from "./graphs.js";
+import { DEGREES, figure, h, write } from "./dom.js";
 import { BASES } from "./samples.js";
 
-const DEGREES = 180 / Math.PI;
 
 function spread(column) {
   const known = column.filter((x) => !Number.isNaN(x));

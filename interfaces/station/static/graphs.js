@@ -1,15 +1,8 @@
 // What each plot shows, in the words and units of the report and of `vrs compare`.
+import { DEGREES, figure } from "./dom.js";
 import { thinned } from "./thinning.js";
 
-const DEGREES = 180 / Math.PI;
 const JOINT_DASHES = [[], [9, 4], [3, 3], [9, 3, 2, 3], [14, 4], [2, 5]];
-
-/** A number for people, with a real minus. */
-export function figure(x, digits) {
-  if (x === null || x === undefined || !Number.isFinite(x)) return "–";
-  const text = x.toFixed(digits);
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
-}
 
 function line(label, colour, dash = [], width = 1.6) {
   return { label, colour, dash, width };

@@ -1,5 +1,5 @@
 // The list of jobs: edited, reordered, kept by the server, tried on the virtual robot, and done.
-import { h, icon, isTyping, mark, write } from "./dom.js";
+import { DEGREES, h, icon, isTyping, mark, write } from "./dom.js";
 import { needs } from "./handling.js";
 import { ask, goalText } from "./tasks.js";
 
@@ -27,7 +27,6 @@ const LOSSES = {
   stop: "When the operator is lost, the robot stops and the list is paused.",
   "carry-on": "When the operator is lost, the robot carries on with the list.",
 };
-const DEGREES = 180 / Math.PI;
 
 /** What a job's field shows. */
 function written(job) {

@@ -1,11 +1,10 @@
 // The 2D map: walls, both robots, what the laser sees, how sure the place is, the route; a click sends the robot there.
-import { h, write } from "./dom.js";
+import { DEGREES, h, write } from "./dom.js";
 import { needs } from "./handling.js";
-import { Chart2D } from "./plan.js";
+import { FloorPlan } from "./plan.js";
 import { ask, goalText } from "./tasks.js";
 
 const PERIOD = 100;
-const DEGREES = 180 / Math.PI;
 /** Words for how a journey is. */
 const STATES = {
   idle: "No goal yet.",
@@ -19,7 +18,7 @@ const STATES = {
 export function mount(station, box) {
   document.head.append(h("link", { rel: "stylesheet", href: "/station/tasks.css" }));
   const { session } = station;
-  const chart = new Chart2D((goal) => go(goal));
+  const chart = new FloorPlan((goal) => go(goal));
   const fields = {};
   const number = (name, label, unit, required) => {
     fields[name] = h("input", { id: `goal-${name}`, type: "number", step: "any", required, autocomplete: "off" });

@@ -1,5 +1,5 @@
 // The way to the robot: what is emulated on it, changed by who has control, and what is measured of it.
-import { h, mark, write } from "./dom.js";
+import { figure, h, mark, write } from "./dom.js";
 
 const DELAYS = ["none", "constant:0.1", "constant:0.3", "domain", "country", "mon", "tue", "wed", "thu", "fri", "lunar"];
 const LOSSES = ["0", "0.01", "0.05", "0.2", "burst:0.05,5"];
@@ -166,7 +166,7 @@ export function mount(station, box) {
     const mine = session.sync.uncertainty(performance.now() / 1000);
     write(cells.clock, `robot ± ${time(network.clock)}, page ± ${time(Number.isFinite(mine) ? mine : null)}`);
     const behind = state?.D == null ? "" : `, ${time(Math.max(0, -state.D))} behind`;
-    write(cells.offset, !network.link_loss ? "–" : (network.offset == null ? "adaptive" : `fixed, D = ${(-network.offset).toFixed(2).replace(/^/, "−")} s`) + behind);
+    write(cells.offset, !network.link_loss ? "–" : (network.offset == null ? "adaptive" : `fixed, D = ${figure(network.offset, 2)} s`) + behind);
     write(cells.policy, policy(network));
     const age = state?.t != null && session.now !== null ? session.now - state.t : null;
     write(cells.age, age === null ? "–" : time(Math.max(0, age)));

@@ -17,7 +17,7 @@ function s(tag, props = {}) {
 
 const path = (points) => points.map(([x, y], k) => `${k ? "L" : "M"}${x.toFixed(3)} ${y.toFixed(3)}`).join("");
 
-export class Chart2D {
+export class FloorPlan {
   /** @param {Function} chosen is given a goal */
   constructor(chosen) {
     this.element = s("svg", { class: "plan", id: "map", role: "img", "aria-label": "Map of the known walls, the robots and the route" });

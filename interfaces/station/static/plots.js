@@ -5,6 +5,7 @@ import { clockText, h, mark, write } from "./dom.js";
 import { Figures } from "./figures.js";
 import { graphs } from "./graphs.js";
 import { Happenings, KINDS } from "./happenings.js";
+import { PlotHead, loadStyles, notes, palette } from "./plothead.js";
 import { Samples } from "./samples.js";
 
 /** Windows that one may choose: seconds, name, time between two pictures of a plot [ms], and two comparisons [ms]. */
@@ -35,9 +36,7 @@ const NOTES = [
 ];
 
 export function mount(station, box) {
-  const style = (name) => document.head.append(h("link", { rel: "stylesheet", href: `/station/${name}.css` }));
-  style("uplot");
-  style("plots");
+  loadStyles();
   station.shared.plots = new Plots(station, box);
 }
 
@@ -49,7 +48,8 @@ class Plots {
     this.happenings = new Happenings(station);
     this.charts = graphs(this.samples.joints).map((graph) => new Chart(graph));
     this.figures = new Figures();
-    this.span = SPANS[0];
+    this.head = new PlotHead(SPANS, { chosen: () => this.choose(), save: () => this.save() });
+    this.colour = palette(station, () => this.again());
     this.basis = "timeline";
     this.paths = null;
     this.compared = this.said = this.spoken = this.counted = -Infinity;
@@ -58,31 +58,13 @@ class Plots {
     this.number = 0;
     this.cost = 0;
     this.next = 0;
-    this.colours = new Map();
     this.cached = { key: "", events: [] };
     this.build(box);
-    station.addEventListener("theme", () => {
-      this.colours.clear();
-      this.again();
-    });
     station.addEventListener("cursor", () => this.again());
     setInterval(() => this.turn(), TURN);
   }
 
   build(box) {
-    this.spans = SPANS.map((span) => {
-      const button = h(
-        "button",
-        {
-          type: "button",
-          "aria-pressed": String(span === this.span),
-          "data-span": span[0],
-          onclick: () => this.choose(span),
-        },
-        span[1],
-      );
-      return button;
-    });
     this.basisBox = h(
       "select",
       { id: "plots-basis", "aria-label": "Where the errors are compared" },
@@ -93,41 +75,18 @@ class Plots {
       this.again();
     });
     this.shows = h("p.muted.plots-shows", { id: "plots-shows" });
-    const file = h(
-      "button",
-      {
-        type: "button",
-        id: "plots-save",
-        title: "Save what is kept, ten minutes at most",
-        onclick: () => this.save(),
-      },
-      "CSV",
-    );
     const keys = KINDS.map(([kind, text]) => h("li", {}, swatch(...ACROSS[kind]), text));
     box.append(
-      h(
-        "div.row.plots-head",
-        {},
-        h("div.row.spans", { role: "group", "aria-label": "Time that is shown" }, ...this.spans),
-        h("span.grow"),
-        file,
-      ),
+      this.head.element,
       h("label.row.plots-head", {}, h("span", {}, "Errors"), this.basisBox),
       this.shows,
       ...this.charts.map((chart) => chart.element),
       h("ul.plot-key", { "aria-label": "Lines across the plots" }, ...keys),
       this.figures.element,
-      h(
-        "details.plot",
-        {},
-        h("summary", {}, h("span.plot-title", {}, "What these show")),
-        h(
-          "dl.plot-notes",
-          {},
-          ...this.charts.flatMap(({ graph }) => [h("dt", {}, graph.title), h("dd", {}, graph.note)]),
-          h("dt", {}, "What isn't known live"),
-          ...NOTES.map((text) => h("dd", {}, text)),
-        ),
+      notes(
+        this.charts.map(({ graph }) => graph),
+        h("dt", {}, "What isn't known live"),
+        ...NOTES.map((text) => h("dd", {}, text)),
       ),
     );
     this.figures.element.addEventListener("toggle", () => {
@@ -135,9 +94,7 @@ class Plots {
     });
   }
 
-  choose(span) {
-    this.span = span;
-    this.spans.forEach((button, k) => mark(button, "aria-pressed", String(SPANS[k] === span)));
+  choose() {
     this.paths = null;
     this.compared = -Infinity;
     this.again();
@@ -148,17 +105,11 @@ class Plots {
     for (const chart of this.charts) chart.wanted = true;
   }
 
-  colour(name) {
-    if (!this.colours.has(name))
-      this.colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
-    return this.colours.get(name);
-  }
-
   /** What is shown now; null where nothing is known yet. */
   view() {
     const { now } = this.session;
     if (now === null) return null;
-    const [span] = this.span;
+    const [span] = this.head.span;
     const cursor = this.station.shared.pane?.cursor ?? null;
     const until = cursor === null ? now : Math.min(now, cursor + span / 2);
     return {
@@ -187,7 +138,7 @@ class Plots {
     if (!this.UPlot) return;
     this.compare(view, at);
     const seen = this.charts.filter((chart) => chart.visible);
-    const period = Math.max(this.span[2], (this.cost * seen.length) / SHARE);
+    const period = Math.max(this.head.span[2], (this.cost * seen.length) / SHARE);
     const due = seen.filter((chart) => chart.wanted || at - chart.drawn >= period);
     const chart = due[this.next++ % Math.max(due.length, 1)];
     if (chart) this.draw(chart, view, at);
@@ -202,7 +153,7 @@ class Plots {
   }
 
   draw(chart, view, at) {
-    if (!chart.plot) chart.begin(this.UPlot, (name) => this.colour(name));
+    if (!chart.plot) chart.begin(this.UPlot, this.colour);
     chart.draw({ ...view, events: this.events(view) });
     chart.drawn = at;
     chart.wanted = false;
@@ -226,7 +177,7 @@ class Plots {
   }
 
   title({ from, until, cursor }) {
-    return cursor === null ? `Newest ${this.span[1]}` : `${clockText(from)} to ${clockText(until)}`;
+    return cursor === null ? `Newest ${this.head.span[1]}` : `${clockText(from)} to ${clockText(until)}`;
   }
 
   /** The value at the cursor, or the newest one. */
@@ -244,7 +195,7 @@ class Plots {
 
   /** Lines across; for all plots of a turn or two the same. */
   events({ from, until }) {
-    const key = `${Math.floor(until * 4)} ${this.span[0]}`;
+    const key = `${Math.floor(until * 4)} ${this.head.span[0]}`;
     if (this.cached.key !== key) this.cached = { key, events: this.happenings.between(from, until) };
     return this.cached.events;
   }
@@ -253,7 +204,7 @@ class Plots {
   compare({ from, until, samples }, at) {
     const chart = this.charts.find(({ graph }) => graph.ofPaths);
     const looked = chart.visible || this.figures.element.open;
-    if (!looked || this.comparing || at - this.compared < this.span[3]) return;
+    if (!looked || this.comparing || at - this.compared < this.head.span[3]) return;
     const { path, table } = samples;
     const last = Math.min(until, table.newest);
     const leader = [path.before(from - LEAD), path.before(last + 1e-9)];

@@ -1,5 +1,6 @@
 // Recording on the fly, and the list of recordings: replayed alone or side by side, and copied.
 import { h, icon, mark, write } from "./dom.js";
+import { sideLink } from "./sidelink.js";
 
 const ALIGNED = [
   ["start", "beginnings together"],
@@ -7,7 +8,6 @@ const ALIGNED = [
   ["timeline", "at equal session times"],
 ];
 const MOST_CHOSEN = 2;
-const AGAIN = 1000;
 
 /** Bytes as people read them. */
 function sizeText(bytes) {
@@ -188,7 +188,7 @@ export function mount(station, box) {
     if (again) again.firstChild.focus();
   }
 
-  const link = new window.VrsLink("/recordings/board", [], {
+  sideLink(station, "/recordings/board", {
     take(data) {
       const message = JSON.parse(typeof data === "string" ? data : new TextDecoder().decode(data));
       if (message.kind === "recording") now = message.now;
@@ -200,24 +200,13 @@ export function mount(station, box) {
       showState();
       showList();
     },
-    state(next) {
-      // A page that is held up may show its token too late.
-      if (next === "token" && session.link !== "locked") setTimeout(join, AGAIN);
-    },
   });
-  function join() {
-    if (link.socket === null && link.again === null) link.connect();
-  }
   // Draws what has come while the panel was hidden.
   new IntersectionObserver(() => {
     showState();
     showList();
   }).observe(box);
-  station.on("welcome", () => {
-    join();
-    showState();
-  });
-  if (session.welcome) join();
+  station.on("welcome", showState);
   station.shared.record = { get now() { return now; }, get items() { return items; } };
   showState();
   showChoice();

@@ -1,4 +1,5 @@
 // What panels share of what a robot does by itself: asking for it, and saying why it can't be.
+import { DEGREES } from "./dom.js";
 
 /** Kinds of news of the server that are kept as they come. */
 export const NEWS = ["tasks", "seen", "plan"];
@@ -36,6 +37,6 @@ export function busy(session) {
 
 /** Metres and degrees of a goal, for people. */
 export function goalText({ x, y, heading }) {
-  const turned = heading == null ? "" : `, ${((heading * 180) / Math.PI).toFixed(0)}°`;
+  const turned = heading == null ? "" : `, ${(heading * DEGREES).toFixed(0)}°`;
   return `${x.toFixed(2)}, ${y.toFixed(2)} m${turned}`;
 }

@@ -11,6 +11,7 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
+from interfaces.stream.kept_files import KeptFile
 from interfaces.stream.meshcat.twins import TwinScene
 from interfaces.stream.meshcat.viewers import Viewers
 from interfaces.view_parts import viewer_bundle
@@ -71,20 +72,13 @@ def files(page: str, package: str, scripts: Sequence[str] = ()) -> list[BaseRout
 def _answer(request: Request, known: dict[str, str], name: str) -> Response:
     if name not in known:
         return Response("not here", 404, HEADERS, "text/plain")
-    content, tag = _content(known[name], name)
-    headers = {**HEADERS, "ETag": tag}
-    if request.headers.get("if-none-match") == tag:
-        return Response(None, 304, headers)
-    return Response(content, 200, headers, _TYPES[name[name.rindex(".") :]])
+    return _file(known[name], name).answer(request, _TYPES[name[name.rindex(".") :]], HEADERS)
 
 
 @lru_cache(maxsize=16)
-def _content(package: str, name: str) -> tuple[bytes, str]:
-    """A file's bytes and what its version is known by."""
-    import hashlib
-
+def _file(package: str, name: str) -> KeptFile:
     if name in ("meshcat.js", "licences.txt"):
         content = viewer_bundle()[name == "licences.txt"].encode()
     else:
         content = resources.files(package).joinpath(f"static/{name}").read_bytes()
-    return content, f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+    return KeptFile.of(content)

@@ -74,7 +74,7 @@ class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders
         return Orders(epoch(self.epoch), self.number, self.sent_at, *times, self.heard, entries)
 
 
-class PlanWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
+class PlanPartWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
     """`PlanPart`."""
 
     version: Count
@@ -85,7 +85,7 @@ class PlanWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
     segments: Planned[C] = ()
 
     @classmethod
-    def of(cls, plan: PlanPart, packed: bool) -> PlanWire[C]:
+    def of(cls, plan: PlanPart, packed: bool) -> PlanPartWire[C]:
         """The wire form."""
         return cls(plan.version, plan.since, numbers(plan.initial), *rows(plan.segments, packed))
 
@@ -110,7 +110,7 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
     echo: tuple[Number, Stamp, Stamp] | None = None
     halted: Text = ""
     receipts: Annotated[tuple[tuple[Number, ReceiptWire], ...], Meta(max_length=MOST_ENTRIES)] = ()
-    plan: PlanWire[C] | None = None
+    plan: PlanPartWire[C] | None = None
     reference: Joints | None = None
     uncertainty: Annotated[float, Meta(ge=0, le=1e12)] | None = None
 
@@ -130,7 +130,7 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             value.echo,
             text(value.halted),
             tuple((number, ReceiptWire.of(receipt)) for number, receipt in value.receipts),
-            None if value.plan is None else PlanWire.of(value.plan, packed),
+            None if value.plan is None else PlanPartWire.of(value.plan, packed),
             None if value.reference is None else numbers(value.reference),
             value.uncertainty,
         )

@@ -47,7 +47,7 @@ def load(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - comman
 
 def _set_all(memory: Memory, entries: Iterable[Entry]) -> None:
     """Set variables; where one can't be, none is."""
-    known = {spelled(variable): value for variable, value in memory.variables()}
+    known = {layout.variable(variable): value for variable, value in memory.variables()}
     done: list[Variable] = []
     try:
         for entry in entries:
@@ -56,8 +56,8 @@ def _set_all(memory: Memory, entries: Iterable[Entry]) -> None:
     except ValError:
         for variable in done:
             memory.delete(variable)
-            if spelled(variable) in known:
-                memory.set(variable, known[spelled(variable)])
+            if layout.variable(variable) in known:
+                memory.set(variable, known[layout.variable(variable)])
         raise
 
 
@@ -117,7 +117,9 @@ def _source(desk: Desk, name: str, parts: str, names: str) -> SourceFile:
 
 def _named(entries: Iterable[Entry], names: str, kind: str) -> list[Entry]:
     return list(
-        chosen({spelled(entry.variable): entry for entry in entries}, names, kind.removesuffix("s")).values()
+        chosen(
+            {layout.variable(entry.variable): entry for entry in entries}, names, kind.removesuffix("s")
+        ).values()
     )
 
 
@@ -179,7 +181,7 @@ def delete_values(kind: str) -> Callable[..., Dialogue]:
         kinds = {"location", "point"} if kind == "location" else {kind}
         known = {name for some in kinds for name, _ in memory.listing(some)}
         doomed = chosen(
-            {spelled(v): v for v, _ in memory.variables() if spelled(v) in known},
+            {layout.variable(v): v for v, _ in memory.variables() if layout.variable(v) in known},
             rest,
             "location" if kind == "location" else "value",
         )
@@ -191,12 +193,6 @@ def delete_values(kind: str) -> Callable[..., Dialogue]:
         return Confirm(f"Delete {_listed(doomed)}", act)
 
     return command
-
-
-def spelled(variable: Variable) -> str:
-    """A variable as it's written, its indices numbers."""
-    indices = ",".join(layout.number(getattr(index, "value", 0.0)) for index in variable.indices)
-    return f"{variable.name}[{indices}]" if indices else variable.name
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from interfaces.val2.geometry import to_oat
 from interfaces.val2.ports import Where
+from interfaces.val2.syntax import Number, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 
 WIDTH = 79
@@ -26,6 +27,12 @@ def number(value: float) -> str:
     if value.is_integer() and abs(value) < 1e15:
         return str(int(value))
     return f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
+
+
+def variable(named: Variable) -> str:
+    """A variable as it's written, its indices numbers."""
+    indices = [number(index.value) for index in named.indices if isinstance(index, Number)]
+    return f"{named.name}[{','.join(indices)}]" if indices else named.name
 
 
 def six(location: Location) -> tuple[float, ...]:

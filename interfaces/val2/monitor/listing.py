@@ -1,4 +1,4 @@
-"""LISTP, LISTL, LISTR, LISTS, DIRECTORY, FREE, ID, IO."""
+"""LISTP, LISTL, LISTR, LISTS, DIRECTORY, FREE, ID."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ class Teach:
     @property
     def prompt(self) -> str:
         """The name of what comes next."""
-        return f"{spelled(self._next)}? "
+        return f"{layout.variable(self._next)}? "
 
     def line(self, text: str, *, now: float) -> Dialogue | None:
         """CR records, E ends."""
@@ -161,12 +161,6 @@ def following(variable: Variable) -> Variable:
     found = re.fullmatch(r"(.*?)(\d+)", variable.name)
     assert found is not None
     return replace(variable, name=f"{found[1]}{int(found[2]) + 1}")
-
-
-def spelled(variable: Variable) -> str:
-    """A variable as it's written."""
-    indices = [layout.number(index.value) for index in variable.indices if isinstance(index, Number)]
-    return variable.name + (f"[{','.join(indices)}]" if indices else "")
 
 
 def tool(desk: Desk, rest: str, *, now: float) -> None:

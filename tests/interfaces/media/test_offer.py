@@ -59,6 +59,18 @@ def test_what_is_said_for_all_parts_counts_for_each() -> None:
     assert canonical(shared) == canonical(OFFER)
 
 
+def test_what_a_part_says_counts_before_what_is_said_for_all() -> None:
+    assert canonical(COMMON + REACHED.replace("bUVc", "else") + VIDEO + AUDIO) == canonical(OFFER)
+
+
+@pytest.mark.parametrize("number", [96, 128, 999])
+def test_packets_that_are_sent_again_have_a_type_of_their_own_or_there_are_none(number: int) -> None:
+    video = VIDEO.replace(":97 ", f":{number} ")
+    found = canonical(COMMON + video + AUDIO)
+    assert "m=video 9 UDP/TLS/RTP/SAVPF 96\r\n" in found
+    assert "rtx" not in found
+
+
 @pytest.mark.parametrize(
     "offer",
     [
@@ -75,6 +87,7 @@ def test_what_is_said_for_all_parts_counts_for_each() -> None:
         OFFER.replace("bUVc", "b"),
         OFFER.replace("setup:actpass", "setup:holdconn"),
         OFFER.replace("rtpmap:96", "rtpmap:196"),
+        OFFER.replace("rtpmap:111", "rtpmap:128"),
         COMMON + VIDEO + "m=application 9 UDP/DTLS/SCTP webrtc-datachannel\r\n" + REACHED,
     ],
 )

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import itertools
 import math
 import os
 import shutil
+import wave
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +62,26 @@ def test_a_voice_keeps_its_bounds(given: dict[str, Any]) -> None:
 def test_sound_that_is_none_is_refused(data: bytes) -> None:
     with pytest.raises(FormatError):
         samples_of(data)
+
+
+def sound(rate: int, channels: int = 1, width: int = 2) -> bytes:
+    """A WAV file of 100 frames."""
+    data = io.BytesIO()
+    with wave.open(data, "wb") as file:
+        file.setnchannels(channels)
+        file.setsampwidth(width)
+        file.setframerate(rate)
+        file.writeframes(bytes(100 * channels * width))
+    return data.getvalue()
+
+
+def test_sound_is_of_one_channel_at_8_to_48_khz() -> None:
+    for rate in (8000, 22_050, 48_000):
+        samples, found = samples_of(sound(rate))
+        assert (len(samples), found) == (100, rate)
+    for wrong in (sound(7999), sound(48_001), sound(22_050, channels=2), sound(22_050, width=1)):
+        with pytest.raises(FormatError, match="sound of"):
+            samples_of(wrong)
 
 
 def levels(packets: list[bytes]) -> list[float]:

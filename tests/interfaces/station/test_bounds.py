@@ -52,6 +52,7 @@ def ask(bounds: Bounds, path: str, method: str = "GET") -> tuple[int, dict[str, 
 
     asyncio.run(run())
     headers = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
+    assert len(headers) == len(sent[0]["headers"])
     return sent[0]["status"], headers, b"".join(part.get("body", b"") for part in sent[1:])
 
 
@@ -151,6 +152,28 @@ def test_a_socket_that_ended_makes_room() -> None:
         wire = Wire([])
         asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
         assert wire.sent[0]["type"] == "websocket.accept"
+
+
+def test_there_are_only_so_many_sockets() -> None:
+    async def run() -> None:
+        held = asyncio.Event()
+
+        async def keep(scope: Any, receive: Any, send: Any) -> None:
+            await send({"type": "websocket.accept"})
+            await held.wait()
+
+        bounds = Bounds(keep, "/", lambda: 0, BoundsConfig(visitors=2))
+        first, last = [Wire([]), Wire([])], Wire([])
+        tasks = [asyncio.create_task(bounds(wire.scope(), wire.receive, wire.send)) for wire in first]
+        await asyncio.sleep(0)
+        async with asyncio.timeout(5.0):
+            await bounds(last.scope(), last.receive, last.send)
+        held.set()
+        await asyncio.gather(*tasks)
+        assert [wire.sent[0]["type"] for wire in first] == ["websocket.accept"] * 2
+        assert [(message["type"], message["code"]) for message in last.sent] == [("websocket.close", 1008)]
+
+    asyncio.run(run())
 
 
 def test_bounds_are_checked() -> None:

@@ -49,6 +49,12 @@ def test_a_place_is_new_and_its_directory_is_made(tmp_path):
     assert directory.entries() == ([], 0)
     place = directory.place("x.mcap")
     assert place.parent.is_dir()
+    place.write_text("")
+    assert directory.path("x.mcap") == place
+    os.symlink(place, place.parent / "link.mcap")
+    with pytest.raises(InvalidValueError, match="listed"):
+        directory.path("link.mcap")
+    place.unlink()
     os.symlink("/nowhere", place)
     with pytest.raises(InvalidValueError, match="isn't taken"):
         directory.place("x.mcap")
@@ -85,6 +91,11 @@ def test_the_list_says_what_is_wrong_and_is_bounded(kept, tmp_path, monkeypatch)
     monkeypatch.setattr(shelf, "LISTED", 3)
     assert len(directory.entries(growing=({"whole.mcap", "cut.mcap", "none.mcap"} - set(looked)).pop())[0]) == 3
     assert len(looked) == 2
+    monkeypatch.setattr(shelf, "LISTED", 1)
+    for time in range(5):
+        os.utime(tmp_path / "none.mcap", (2e9 + time, 2e9 + time))
+        directory.entries()
+        assert len(directory._known) <= 2
 
 
 def standing(replay):
@@ -130,6 +141,10 @@ def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):
             assert first not in served._replays.values()
             with pytest.raises(InvalidValueError):
                 served._asked({"a": "../whole.mcap"})
+            monkeypatch.setattr(replays, "_WAITING", len(served._replays))
+            with pytest.raises(InvalidValueError, match="at most"):
+                served._asked({"a": "whole.mcap", "align": "began", "b": "whole.mcap"})
+            monkeypatch.setattr(replays, "_WAITING", 64)
             monkeypatch.setattr(replays, "LOOKED_INTO", 1000)
             large, _ = await opened(served)
             assert standing(large)["kind"] == "failed"

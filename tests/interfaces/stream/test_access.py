@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from interfaces.stream.access import Access, check_host, check_origin, hosts, make_tokens, read_tokens
+from interfaces.stream.access import Access, bearer, check_host, check_origin, hosts, make_tokens, read_tokens
 from interfaces.stream.control import Role
 from vrs.errors import FormatError, InvalidValueError
 
@@ -51,6 +51,28 @@ def test_a_token_shows_nowhere():
     with pytest.raises(InvalidValueError) as caught:
         Access({Role.VIEWER: "short"})
     assert "short" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("length", "long_enough"), [(42, False), (43, True), (256, True), (257, False)])
+def test_a_token_has_43_to_256_characters(tmp_path, length, long_enough):
+    path = tmp_path / "tokens"
+    path.write_text("viewer " + length * "v")
+    path.chmod(0o600)
+    if long_enough:
+        assert not Access(read_tokens(path), free=()).refusal(Role.VIEWER, length * "v")
+        return
+    with pytest.raises(FormatError, match="43 to 256"):
+        read_tokens(path)
+    with pytest.raises(InvalidValueError, match="43 to 256"):
+        Access({Role.VIEWER: length * "v"})
+
+
+def test_the_token_that_a_request_shows():
+    token = 43 * "v"
+    assert bearer(f"Bearer {token}") == bearer(f"bearer {token}") == token
+    for nothing in ("", "Bearer", "Bearer ", f"Basic {token}", token):
+        assert bearer(nothing) is None
+    assert bearer("Bearer " + 100_000 * "v") == 257 * "v"
 
 
 def test_a_made_file_is_read_back(tmp_path):

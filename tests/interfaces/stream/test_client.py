@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from interfaces.designer import Designer
-from interfaces.messages import Form
+from interfaces.messages import Form, Order
 from interfaces.observer import Observer
 from interfaces.stream import control
-from interfaces.stream.client import UNKNOWN, Phase
-from interfaces.stream.codec import Encoding
+from interfaces.stream.client import FIRST_PONGS, KEPT, UNKNOWN, ClientCore, Phase
+from interfaces.stream.codec import Encoding, encode
 from interfaces.stream.control import ProblemCode, Role
 from interfaces.viewer import Viewer
 from tests.interfaces.joined import to
@@ -65,6 +65,42 @@ def test_it_knows_session_time(ahead):
     joined.run(2.0)
     assert abs(joined.time(core) - joined.now) <= core.sync.uncertainty(joined.now + ahead)
     assert core.sync.uncertainty(joined.now + ahead) < 0.01
+
+
+def test_of_the_first_round_trips_the_shortest_tells_session_time():
+    joined = Joined()
+    welcome = encode(operator(joined)[0].welcome, Encoding.MSGPACK)
+    core = ClientCore()
+    core.connected(now=0.0)
+    core.receive(welcome, now=0.0)
+    trips = [1.0] * FIRST_PONGS
+    trips[1] = 0.5
+    for number, trip in enumerate(trips):
+        sent = 2.0 * number
+        assert core.time(sent) is None
+        # The way there takes all of it, but for the shortest.
+        there = 100.0 + sent + (0.25 if trip == 0.5 else trip)
+        core.receive(encode(control.Pong(1 + number, sent, there, there), Encoding.MSGPACK), now=sent + trip)
+    assert core.phase is Phase.OPEN
+    assert core.time(50.0) == pytest.approx(150.0, abs=1e-3)
+
+
+def test_an_answer_to_what_has_not_been_asked_yet_tells_no_time():
+    joined = Joined()
+    core, _ = operator(joined)
+    local = joined.now + joined.ahead[core]
+    before = core.time(local)
+    for pong in (control.Pong(9, local + 1.0, 3.0, 3.0), control.Pong(9, local - 0.01, 7.0, 6.0)):
+        core.receive(encode(pong, Encoding.MSGPACK), now=local)
+        assert core.time(local) == before
+
+
+def test_orders_that_are_never_answered_are_kept_in_number():
+    core = ClientCore()
+    for number in range(1, 2 * KEPT):
+        core.port.send(Order(number, to(1), 0), now=0.0)
+        core.advance(now=0.0)
+        assert len(core._orders) == min(number, KEPT)
 
 
 def test_beats_keep_the_lease_and_silence_loses_it():

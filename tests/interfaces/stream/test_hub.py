@@ -7,7 +7,7 @@ from interfaces.messages import Follow, Form, Order
 from interfaces.stream import control
 from interfaces.stream.codec import encode
 from interfaces.stream.control import ProblemCode, Role
-from interfaces.stream.limits import Limits
+from interfaces.stream.limits import ClientLimits
 from tests.interfaces.joined import to
 from tests.interfaces.stream.served import ADMIN, make_hub
 from tests.interfaces.stream.test_session import Peer, holder, kinds
@@ -174,7 +174,7 @@ def test_a_half_dead_connection_is_replaced():
 
 
 def test_what_was_left_is_forgotten_in_time_and_in_number():
-    hub = make_hub(limits=Limits(absence=10.0, absent=5))
+    hub = make_hub(limits=ClientLimits(absence=10.0, absent=5))
     for k in range(20):
         peer = Peer(hub, now=0.1 * k)
         peer.tell(Follow(1, Form.FRAMES, 60.0), now=0.1 * k)
@@ -183,6 +183,27 @@ def test_what_was_left_is_forgotten_in_time_and_in_number():
     hub.advance(now=20.0)
     assert hub.seats == 0
     assert all(broadcaster.viewers == 0 for broadcaster in hub.site.broadcasters)
+
+
+def test_of_too_many_that_were_left_the_first_is_forgotten():
+    hub = make_hub(limits=ClientLimits(absence=10.0, absent=2))
+    peers = [Peer(hub, now=0.0) for _ in range(3)]
+    for k in (1, 2, 0):
+        hub.leave(peers[k].session, done=False, now=1.0 + 0.1 * (k == 2) + 0.2 * (k == 0))
+    again = [Peer(hub, session=peer.welcome.session, now=2.0).welcome.resumed for peer in peers]
+    assert again == [True, False, True]
+
+
+def test_who_has_the_lease_is_kept_as_long_as_it_lasts():
+    hub = make_hub(limits=ClientLimits(absence=0.0, absent=0))
+    peer, epoch = holder(hub)
+    hub.leave(peer.session, done=False, now=0.3)
+    hub.advance(now=0.4)
+    again = Peer(hub, session=peer.welcome.session, now=0.5)
+    assert (again.welcome.resumed, again.welcome.lease.yours, again.welcome.lease.epoch) == (True, True, epoch)
+    hub.leave(again.session, done=False, now=0.6)
+    hub.advance(now=10.0)
+    assert (hub.seats, hub.robot.log[-1]) == (0, ("ended", epoch, "expired"))
 
 
 @pytest.mark.parametrize(("role", "done"), [(Role.VIEWER, False), (Role.VIEWER, True), (Role.OPERATOR, True)])
@@ -344,7 +365,7 @@ def test_an_order_of_one_ends_the_shares_of_the_others_until_they_share_anew(com
 
 
 def test_few_share_a_lease_and_who_was_forgotten_shares_none():
-    hub = make_hub(limits=Limits(sharers=2, absence=1.0))
+    hub = make_hub(limits=ClientLimits(sharers=2, absence=1.0))
     owner, epoch, other = sharing(hub)
     second, third = Peer(hub), Peer(hub)
     assert leases(second.tell(control.Share(1, owner.welcome.session), now=0.1))[-1].shared

@@ -9,7 +9,7 @@ from interfaces.messages import Ask, Follow, Form, Order, Pulse, Reply, Want
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.control import Notice, ProblemCode, Role
-from interfaces.stream.limits import Limits
+from interfaces.stream.limits import ClientLimits
 from tests.interfaces.joined import to
 from tests.interfaces.stream.served import ADMIN, HOME, make_hub
 from vrs import Stop
@@ -101,7 +101,7 @@ def test_an_admin_shows_a_token():
 
 
 def test_too_many_clients():
-    hub = make_hub(limits=Limits(clients=2))
+    hub = make_hub(limits=ClientLimits(clients=2))
     peers = [Peer(hub) for _ in range(2)]
     third = Peer(hub, greet=False)
     closed(third, 1013, ProblemCode.FULL, now=0.0)
@@ -151,7 +151,7 @@ def test_the_largest_message():
 
 
 def test_too_fast_is_passed_over_told_once_a_second_and_closed():
-    hub = make_hub(limits=Limits(rate=100, burst=50, excess=20))
+    hub = make_hub(limits=ClientLimits(rate=100, burst=50, excess=20))
     peer, ping = Peer(hub), encode(control.Ping(1, 0.0), Encoding.MSGPACK)
     for _ in range(49):
         peer.session.receive(ping, now=0.0)
@@ -165,7 +165,7 @@ def test_too_fast_is_passed_over_told_once_a_second_and_closed():
 
 
 def test_at_the_rate_nothing_is_passed_over():
-    hub = make_hub(limits=Limits(rate=100, burst=5, excess=20))
+    hub = make_hub(limits=ClientLimits(rate=100, burst=5, excess=20))
     peer = Peer(hub)
     for k in range(1, 1000):
         assert kinds(peer.tell(control.Ping(k, 0.0), now=0.01001 * k)) == ["pong"]
@@ -247,7 +247,7 @@ def test_an_outcome_is_told_again_after_the_lease_has_ended():
 
 
 def test_a_slow_reader_gets_the_newest_frame_and_no_more_waits_than_it_may():
-    hub = make_hub(limits=Limits(waiting=4096))
+    hub = make_hub(limits=ClientLimits(waiting=4096))
     peer = Peer(hub, role=Role.VIEWER)
     peer.tell(Follow(1, Form.FRAMES, 60.0), now=0.0)
     for k in range(1, 600):
@@ -259,7 +259,7 @@ def test_a_slow_reader_gets_the_newest_frame_and_no_more_waits_than_it_may():
 
 
 def test_one_who_asks_and_never_reads_costs_little():
-    hub = make_hub(limits=Limits(rate=1e5, burst=1e5, waiting=32768))
+    hub = make_hub(limits=ClientLimits(rate=1e5, burst=1e5, waiting=32768))
     peer, epoch = holder(hub)
     for k in range(300):
         hub.site.time(0.01 * k)
@@ -280,7 +280,7 @@ def test_one_who_asks_and_never_reads_costs_little():
 
 def test_random_bytes_never_do_anything_else():
     rng = random.Random(5)
-    hub = make_hub(limits=Limits(bad=1000, rate=1e5, burst=1e5))
+    hub = make_hub(limits=ClientLimits(bad=1000, rate=1e5, burst=1e5))
     other, epoch = holder(hub)
     valid = [encode(m, Encoding.MSGPACK) for m in (Order(1, to(1), epoch), Ask(1, 0.0), control.Ping(1, 0.0),
              control.Acquire(1), control.Beat(epoch), Follow(1, Form.SEGMENTS), Want(1, 0))]  # fmt: skip

@@ -7,6 +7,8 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import pytest
+
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Event, Failed, Typed
@@ -355,3 +357,10 @@ def body(*lines: str) -> str:
 def run(*lines: str) -> str:
     """What a program of these lines types."""
     return Rig().run(body(*lines))
+
+
+def failure(text: str) -> ValError:
+    """The error that stops a program."""
+    with pytest.raises(ValError) as raised:
+        Rig().run(text)
+    return raised.value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 from interfaces.val2.controller import Controller
@@ -17,6 +18,16 @@ from vrs.engine import Engine
 MODEL = puma560.model()
 LONGEST = 120.0
 """Longest that anything may take here [s]."""
+HELLO = ("EDIT hello", 'TYPE "hello"', "E")
+LOOP = ("EDIT loop", "WHILE TRUE DO", "DELAY 0.1", "END", "E")
+ASK = ("EDIT ask", 'PROMPT "n? ", n', 'TYPE "n is", n', "E")
+"""Programs, as they are typed."""
+AWAY = "DO MOVE TRANS(400,0,200,90,0,0)"
+
+
+def numbers(shown: str) -> list[float]:
+    """The decimal fractions in what was shown."""
+    return [float(text) for text in re.findall(r"-?\d+\.\d+", shown)]
 
 
 class Sitting:

@@ -7,6 +7,7 @@ import pytest
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Ended
 from interfaces.val2.interpreter import State
+from interfaces.val2.reactions import Reactions, reaction_to
 from tests.interfaces.val2.rig import FakeArm, Rig, body
 
 ALARM = ".PROGRAM alarm()\n TYPE TIMER(0)\n.END\n"
@@ -88,6 +89,20 @@ def test_ignore() -> None:
     rig.run(body("REACT 1001, alarm ALWAYS", "WAIT.EVENT , 1.5", "IGNORE 1001", "WAIT.EVENT , 5") + ALARM
             + at(1.0, (2.0, 1001)))  # fmt: skip
     assert times(rig) == [pytest.approx(1.0, abs=1e-3)]
+
+
+def test_what_turned_waits_once_and_is_forgotten_with_ignore() -> None:
+    watched = Reactions()
+    watched.add(reaction_to(1001, "alarm", immediate=False, always=True))
+    for on in (True, False, True):
+        watched.notice(1001, on)
+    due = watched.due(0)
+    assert due is not None
+    assert due.program == "alarm"
+    assert watched.due(0) is None
+    watched.notice(1001, on=True)
+    watched.ignore(-1001)
+    assert watched.due(0) is None
 
 
 def test_a_program_reacts_to_its_own_signals() -> None:

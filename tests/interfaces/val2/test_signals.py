@@ -112,6 +112,20 @@ def test_pulses_and_times() -> None:
     assert turns(rig, 1003) == [(12.0, True), (13.0, False)]
 
 
+def test_a_pulse_is_as_long_as_it_is_said_and_at_and_after_add_up() -> None:
+    signals = Signals()
+    rules = [Rule(1001, lambda: True, lasting=0.5, at_time=2.0), Rule(1002, lambda: True, after=1.5, at_time=2.0)]
+    signals.begin([*rules, Rule(1003, lambda: True, lasting=0.0, at_time=7.0)], now=10.0)
+    found = []
+    while (t := signals.next_deadline()) < math.inf:
+        signals.advance(now=t)
+        found += [(t, *change) for change in signals.changes()]
+    assert found == [
+        (12.0, 1001, True), (12.5, 1001, False), (13.5, 1002, True),
+        (17.0, 1003, True), (17.0 + SOONEST, 1003, False),
+    ]  # fmt: skip
+
+
 def test_a_cell_begins_anew_at_every_execute() -> None:
     rig = Rig()
     text = body("WAIT SIG(1001)", "TYPE 1") + cell("1001 = ON AT 1", "1001 = OFF AT 1.1")

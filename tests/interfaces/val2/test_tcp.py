@@ -47,7 +47,8 @@ def test_every_end_of_line_ends_one_line_however_it_comes(size):
 
 @pytest.mark.parametrize("size", [1, 2, 1000])
 def test_telnet_negotiation_is_passed_over(size):
-    data = b"\xff\xfb\x01w\xff\xfd\x03h\xff\xfa\x18\x00xterm\r\n\xff\xf0e\xff\xf1re\r\n\xff\xf4no\x03x\r\n"
+    options = b"\xff\xfb\x01w\xff\xfd\x03h\xff\xfa\x18\x00xterm\r\n\xff\xf0e\xff\xfa\x18\xff\xffzz\n\xff\xf0"
+    data = options + b"\xff\xf1re\r\n\xff\xf4no\x03x\r\n"
     reader = Input()
     found = [line for k in range(0, len(data), size) for line in reader.feed(data[k : k + size])]
     assert found == ["where", INTERRUPT, INTERRUPT, "x"]

@@ -1,0 +1,109 @@
+"""What is in memory and in files: DELETE, ZERO, LISTs, COPY, RENAME, STOREs and LOADs."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from interfaces.val2.syntax import Variable
+
+from .sitting import HELLO
+
+
+def test_delete_and_zero_ask_and_only_y_does_it(sitting):
+    sitting.type(*HELLO, "DO x = 1", "DO SET p = NULL", 'DO $s = "a"', "DO a[1] = 1", "DO a[2] = 2")
+    for line in ("DELETE hello", "DELETER x", "DELETEL p", "DELETES $s", "ZERO"):
+        for answer in ("", "N", "no", "x"):
+            sitting.line(line)
+            assert sitting.monitor.prompt.endswith("(Y/N)? "), line
+            sitting.type(answer)
+    assert "hello" in sitting.controller.memory.programs
+    assert sitting.controller.memory.get(Variable("x")) == 1.0
+    sitting.type("DELETE hello", "y", "DELETEL p", "YES", "DELETES $s", "y", "DELETER a[1]", "y")
+    assert sitting.type("LISTR") == "a[2] = 2\nx    = 1\n"
+    assert sitting.type("LISTL", "LISTS", "LISTP") == "No locations\nNo strings\nNo programs\n"
+    sitting.type("ZERO", "y")
+    assert sitting.type("LISTR") == "No reals\n"
+    assert sitting.type("DELETE nothing").startswith("*Undefined program name*")
+
+
+def test_lists_take_names_patterns_and_expressions(sitting):
+    sitting.type("DO pa = 1", "DO pb = 2", "DO q = 0.1", "DO a[1,2] = 5", 'DO $x = "hi"')
+    assert sitting.type("LISTR p*") == "pa = 1\npb = 2\n"
+    assert sitting.type("LISTR pb*pb") == "4\n"
+    assert sitting.type("LISTR pi*pb").startswith("6.28318")
+    assert sitting.type("LISTR z*") == "*Undefined value* z*\n"
+    assert sitting.type("LISTR a") == "a[1,2] = 5\n"
+    assert sitting.type("LISTR a[1,2], q") == "a[1,2] = 5\nq      = 0.1\n"
+    assert sitting.type("LISTR pa + pb") == "3\n"
+    assert sitting.type('LISTS $x + "!"') == '"hi!"\n'
+    assert sitting.type("LISTR z").startswith("*Undefined value* z")
+
+
+def test_copy_and_rename(sitting):
+    sitting.type(*HELLO, "COPY two=hello", "RENAME three=two")
+    assert sorted(sitting.controller.memory.programs) == ["hello", "three"]
+    assert sitting.controller.memory.programs["three"].name == "three"
+    sitting.line("COPY hello=three")
+    assert "(Y/N)?" in sitting.monitor.prompt
+    sitting.type("N")
+    for line in ("COPY a", "COPY a=b", "RENAME 1=hello", "COPY =hello"):
+        assert sitting.type(line).startswith("*"), line
+
+
+def test_store_keeps_a_program_with_all_that_it_uses_and_asks_before_it_writes_over(sitting, tmp_path):
+    sitting.type("EDIT main", "CALL sub", "MOVE p", "E", "EDIT sub", "x = y", "E", *HELLO)
+    sitting.type("DO SET p = TRANS(1,2,3)", "DO SET q = NULL", "DO y = 2", "DO z = 3")
+    sitting.type("STORE part=main")
+    text = (tmp_path / "part.v2").read_text()
+    assert ".PROGRAM main" in text
+    assert ".PROGRAM sub" in text
+    assert ".PROGRAM hello" not in text
+    sitting.line("STOREP part")
+    assert "write over" in sitting.monitor.prompt.lower()
+    sitting.type("n")
+    assert (tmp_path / "part.v2").read_text() == text
+    sitting.type("ZERO", "y", "LOAD part")
+    assert sorted(sitting.controller.memory.programs) == ["main", "sub"]
+    assert sitting.type("LISTR") == "y = 2\n"
+    assert [name for name, _ in sitting.controller.memory.listing("location")] == ["p"]
+    assert sitting.type("FLIST") == "part\n"
+    assert list(tmp_path.iterdir()) == [tmp_path / "part.v2"]
+
+
+def test_parts_are_stored_alone(sitting, tmp_path):
+    sitting.type(*HELLO, "DO SET p = NULL", "DO SET #j = #PPOINT(1)", "DO x = 1", 'DO $s = "a"')
+    sitting.type("STOREP a", "STOREL b", "STORER c", "STORES d", "STOREL e=#*")
+    found = {path.stem: path.read_text() for path in tmp_path.iterdir()}
+    assert ".PROGRAM hello" in found["a"]
+    assert ".LOCATIONS" not in found["a"]
+    assert "#j" in found["b"]
+    assert "p " in found["b"]
+    assert ".REALS" in found["c"]
+    assert ".LOCATIONS" not in found["c"]
+    assert "$s" in found["d"]
+    assert "#j" in found["e"]
+    assert "\np " not in found["e"]
+
+
+@pytest.mark.parametrize("name", ["../x", "/etc/passwd", "a/b", ".hidden", "x.txt", "..", "", "a" * 200, "con\\x"])
+def test_files_lead_nowhere_else(sitting, name, tmp_path):
+    sitting.type(*HELLO)
+    for line in (f"LOAD {name}", f"STORE {name}"):
+        assert re.match(r"\*(Invalid file name|Missing argument)\*", sitting.type(line)), line
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_link_leads_nowhere_either_and_a_broken_file_changes_nothing(sitting, tmp_path):
+    (tmp_path / "link.v2").symlink_to("/etc/passwd")
+    assert sitting.type("LOAD link").startswith("*Invalid file name*")
+    (tmp_path / "bad.v2").write_text(".PROGRAM a\n x = 1\n.END\n.PROGRAM b\n MOVE (\n.END\n")
+    assert re.match(r"\*Syntax error\*.*line 5", sitting.type("LOAD bad"))
+    assert not sitting.controller.memory.programs
+    assert sitting.type("LOAD none").startswith("*Nonexistent file*")
+    (tmp_path / "half.v2").write_text(".LOCATIONS\n a 1 2 3 90 -90 0\n.END\n.REALS\n x 5\n p 7\n.END\n")
+    sitting.type("DO x = 1", "DO SET p = NULL")
+    assert sitting.type("LOAD half").startswith("*Variable type mismatch*")
+    assert sitting.type("LISTR") == "x = 1\n"
+    assert [name for name, _ in sitting.controller.memory.listing("location")] == ["p"]
