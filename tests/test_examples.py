@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("[0-9]*.py"))
+HOME = Path(__file__).resolve().parents[1]
+EXAMPLES = sorted((HOME / "examples").glob("[0-9]*.py"))
+PROGRAMS = sorted((HOME / "examples" / "val2").glob("*.v2"))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
@@ -22,3 +24,10 @@ def test_an_example_runs(path, tmp_path):
 
 def test_there_are_examples():
     assert EXAMPLES
+
+
+def test_the_course_names_each_with_its_own_first_line():
+    page = (HOME / "docs" / "examples.md").read_text().splitlines()
+    said = [f"| `{path.name}` | {path.read_text().splitlines()[0].strip(chr(34))} |" for path in EXAMPLES]
+    said += [f"| `{path.name}` | {path.read_text().splitlines()[0].partition(';')[2]} |" for path in PROGRAMS]
+    assert [line for line in page if line.startswith("| `")] == said

@@ -15,9 +15,23 @@ Misuse raises; outcomes that a user must expect (postponed, rejected) are values
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class VrsError(Exception):
     """Root of every error that this project raises on purpose."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross from one process to another with message and data, whatever a class's own arguments are."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[VrsError], args: tuple[object, ...], data: dict[str, object]) -> VrsError:
+    error = kind.__new__(kind, *args)
+    # OSError's own leaves this to __init__.
+    error.args = args
+    error.__dict__.update(data)
+    return error
 
 
 class InvalidValueError(VrsError, ValueError):

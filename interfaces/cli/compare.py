@@ -44,10 +44,14 @@ ROWS = {"arm": ARM_ROWS, "mobile": MOBILE_ROWS}
 
 def compare(
     recording: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
-    other: Annotated[Path | None, typer.Argument(metavar="[OTHER.mcap]", help="Another to set beside it.")] = None,
+    other: Annotated[Path | None, typer.Argument(metavar="OTHER.mcap", help="Another to set beside it.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write the figures as JSON on standard output.")] = False,
 ) -> None:
-    """Compare the twins of a recording; of a whole one of an arm --json is the run's own summary.json."""
+    """Say how far apart the twins of a recording were, and why.
+
+    Of a whole recording of an arm, --json is the run's own summary.json. Of two recordings: both, and the
+    differences.
+    """
     from interfaces.recording.figures import differences
     from interfaces.recording.kinds import check_alike
     from interfaces.recording.recording import open_recording

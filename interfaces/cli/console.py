@@ -47,6 +47,8 @@ def console(
         raise InvalidValueError("alone", alone, "left out with --connect")
     if token_file is not None and connect is None:
         raise InvalidValueError("token-file", str(token_file), "left out without --connect")
+    if delay != "none" and (alone or connect is not None):
+        raise InvalidValueError("delay", delay, "left out with --connect and --alone: no robot is begun here")
     if not files.is_dir():
         raise InvalidValueError("files", str(files), "a directory")
     delay_profile(delay)

@@ -25,6 +25,8 @@ ADAPTIVE = "adaptive"
 DEFAULT_DELAY = "thu"
 RECORDING = "run.mcap"
 """Name of a run's recording."""
+RESULTS = ("report.html", "summary.json", RECORDING)
+"""What a run leaves."""
 DEFAULT_SEED = 6
 """With it the default link stalls four times in mid-motion, so that the report has something to explain."""
 
@@ -55,7 +57,7 @@ def demo(
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     model = puma560.model()
     plan = default_plan(model) if commands is None else read_plan(commands, model)
-    prepare(out)
+    prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     run, attributions, offsets = explained(plan, recorder, model, profile, seed, D, order)
     recorder.finish(attributions, offsets)
@@ -65,14 +67,18 @@ def demo(
     if as_json:
         typer.echo(text, nl=False)
     else:
-        show(summary, out)
+        show(summary, out, recorded=not recorder.problem)
 
 
-def prepare(out: Path) -> None:
+def prepare(out: Path, *names: str) -> None:
     """Make the directory of the results, before any work is done.
 
+    Args:
+        out: The directory.
+        names: Of files that will be written there, so that no work is lost in the end.
+
     Raises:
-        FormatError: If it can't be made or written to.
+        FormatError: If it can't be made or written to, or a directory stands where a file is to be.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -80,6 +86,9 @@ def prepare(out: Path) -> None:
             pass
     except OSError as error:
         raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
+    for name in names:
+        if (out / name).is_dir():
+            raise FormatError(str(out / name), "can't hold the results: it's a directory, and is to be a file")
 
 
 def complain(recorder: RunRecorder) -> None:
@@ -122,6 +131,10 @@ def explained(
             task = bar.add_task(f"{name:30}", total=_length(plan))
             return lambda t: bar.update(task, completed=t, total=max(t, _length(plan)))
 
+        def finished() -> None:
+            for task in bar.tasks:
+                bar.update(task.id, completed=task.total)
+
         stages, offsets = [], []
         for off in range(len(CAUSES) + 1):
             name = f"without {CAUSES[off - 1].replace('_', ' ')}" if off else "both twins"
@@ -135,17 +148,19 @@ def explained(
                     seed=seed, offset=D, service=service, progress=shown(name), keeper=keeper,
                 )  # fmt: skip
             stages.append((run, measures(run)))
+            finished()
         for other in (None, fixed_offset(FIXED, profile) if D is None else D):
             progress = shown(f"offset {spelled(other)}")
             outcome = offset_outcome(
                 plan, model, profile, seed=seed, offset=other, service=service, progress=progress
             )
             offsets.append(outcome)
+            finished()
     return stages[0][0], attribute(tuple(measured for _, measured in stages)), tuple(offsets)
 
 
 def _length(plan: Plan) -> float:
-    """A guess at how long the run will be [s]; the bar is corrected at the end."""
+    """A guess at how long the run will be [s]; the bar is full at the end, whatever it was."""
     times = (motion.command.execute_at or motion.registered_at for motion in plan.motions)
     return max(times, default=0.0) + 8.0
 
@@ -168,11 +183,11 @@ def write(summary: dict[str, Any], run: TwinRun, out: Path) -> str:
     return text
 
 
-def show(summary: dict[str, Any], out: Path, *, err: bool = False) -> None:
+def show(summary: dict[str, Any], out: Path, *, recorded: bool, err: bool = False) -> None:
     """Show a summary's tables, on standard error if asked for, and where the results are."""
     tables(summary, err=err)
-    names = [str(out / name) for name in ("report.html", "summary.json", RECORDING)]
-    typer.echo(f"Wrote {names[0]}, {names[1]} and {names[2]}", err=err)
+    *names, last = [str(out / name) for name in (RESULTS if recorded else RESULTS[:-1])]
+    typer.echo(f"Wrote {', '.join(names)} and {last}", err=err)
 
 
 def tables(summary: dict[str, Any], *, err: bool = False) -> None:

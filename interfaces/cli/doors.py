@@ -62,6 +62,11 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
     return Access(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), free=())
 
 
+def in_url(host: str) -> str:
+    """A host as URLs have it: IPv6 addresses in brackets."""
+    return f"[{host}]" if ":" in host else host
+
+
 def names_of(host: str) -> list[str]:
     """Names by which a server is rightly addressed that listens on a host."""
     if is_loopback(host):
@@ -77,9 +82,12 @@ def names_of(host: str) -> list[str]:
 
 
 def end_with_input(ended: asyncio.Event) -> None:
-    """Set an event of the running loop when standard input ends."""
+    """Set an event of the running loop when standard input ends; none, or a file, has ended."""
     import asyncio
 
+    if sys.stdin is None:
+        ended.set()
+        return
     loop, source = asyncio.get_running_loop(), sys.stdin.fileno()
 
     def look() -> None:
@@ -87,7 +95,11 @@ def end_with_input(ended: asyncio.Event) -> None:
             loop.remove_reader(source)
             ended.set()
 
-    loop.add_reader(source, look)
+    try:
+        loop.add_reader(source, look)
+    except PermissionError:
+        # Files and /dev/null can't be waited for: there's always something to read, or the end.
+        ended.set()
 
 
 def end_on_signal(ended: asyncio.Event) -> None:

@@ -31,7 +31,7 @@ def send(out: Path, seed: int, goals: int | None, workers: int, *, as_json: bool
 
     study = Study(seed, USUAL if goals is None else goals)
     paper = study_of(study.runs)
-    prepare(out)
+    prepare(out, "runs.csv", "summary.json")
     found = measured(paper, study, workers)
     write(found, out)
     if as_json:

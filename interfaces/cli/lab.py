@@ -11,8 +11,12 @@ import typer
 from interfaces.cli.demo import prepare
 from interfaces.cli.goals import GOALS, send
 from interfaces.cli.localization import LOCALIZATION, localize, refuse
+from interfaces.cli.options import PROFILES
+from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from interfaces.lab.pool import Calls, Made
 
 
@@ -21,7 +25,7 @@ def lab(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="[localization|goals]",
+            metavar="localization|goals",
             help="How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
             " architectures.",
         ),
@@ -31,33 +35,39 @@ def lab(
         typer.Option(
             "--architecture",
             metavar="A",
-            help="I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable.",
+            help="I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable, III and "
+            "timeline unless given.",
         ),
     ] = None,
     transport: Annotated[
-        list[str] | None, typer.Option("--transport", metavar="T", help="stream or datagrams; repeatable.")
+        list[str] | None,
+        typer.Option("--transport", metavar="T", help="stream or datagrams (unless given); repeatable."),
     ] = None,
     delay: Annotated[
-        list[str] | None, typer.Option("--delay", metavar="PROFILE", help="Delay one way, as thu@3.3; repeatable.")
+        list[str] | None,
+        typer.Option("--delay", metavar="PROFILE", help=f"Delay one way, thu unless given; repeatable: {PROFILES}"),
     ] = None,
     robot: Annotated[
-        list[str] | None, typer.Option("--robot", metavar="R", help="ipr, micro or bare; repeatable.")
+        list[str] | None,
+        typer.Option("--robot", metavar="R", help="ipr (unless given), micro or bare; repeatable."),
     ] = None,
     operator: Annotated[
         list[str] | None,
         typer.Option(
             "--operator",
             metavar="O",
-            help="figure-eight, corridor, slalom, docking, mixed, inputs:FILE.csv, or MODULE:NAME of your own; "
-            "repeatable.",
+            help="figure-eight, corridor, slalom, docking, wander, mixed (unless given), inputs:FILE.csv, or "
+            "MODULE:NAME of your own; repeatable.",
         ),
     ] = None,
     position: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--position", metavar="P", help="What tells the robot where it is: fused, laser, odometry, truth."
+            "--position",
+            metavar="P",
+            help="What tells the robot where it is: fused (unless given), laser, odometry, truth.",
         ),
-    ] = "fused",
+    ] = None,
     runs: Annotated[
         int | None,
         typer.Option(
@@ -69,8 +79,11 @@ def lab(
         ),
     ] = None,
     starts: Annotated[
-        int, typer.Option("--starts", min=1, max=10_000, metavar="K", help="Of localization: starts anywhere.")
-    ] = 200,
+        int | None,
+        typer.Option(
+            "--starts", min=1, max=10_000, metavar="K", help="Of localization: starts anywhere, 200 unless given."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="The first seed.")] = 0,
     length: Annotated[
         float | None,
@@ -101,15 +114,16 @@ def lab(
         one_of("experiment", what, (LOCALIZATION, GOALS))
         others = {
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
-            "--operator": operator, "--attribution": attribution, "--record": record,
+            "--operator": operator, "--position": position, "--attribution": attribution, "--record": record,
         }  # fmt: skip
         if what == GOALS:
-            refuse(what, {**others, "--length": length})
+            refuse(what, {**others, "--length": length, "--starts": starts})
             send(out, seed, runs, workers, as_json=as_json)
             return
         refuse(what, others)
-        localize(out, seed, runs, length, starts, workers, as_json=as_json)
+        localize(out, seed, runs, length, 200 if starts is None else starts, workers, as_json=as_json)
         return
+    refuse("the architectures", {"--starts": starts})
     runs, length = runs or 5, length or 120.0
     from interfaces.lab.driving.attribution import attributed
     from interfaces.lab.driving.operators import operator as make
@@ -119,21 +133,29 @@ def lab(
     from interfaces.lab.driving.run import ROBOTS
     from interfaces.lab.driving.sweep import cases
     from interfaces.link.profiles import delay_profile
-    from interfaces.teleop.architectures import Transport
-    from interfaces.teleop.architectures import architecture as makes
+    from interfaces.teleop.architectures import Constants, Transport, controller
     from interfaces.teleop.architectures.equipment import POSITIONS
+    from robots.onboard.driving import Posture
 
     architectures = architecture or ["III", "timeline"]
     transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]
     delays, robots = delay or ["thu"], [one_of("robot", r, ROBOTS) for r in robot or ["ipr"]]
-    operators, position = operator or ["mixed"], one_of("position", position, POSITIONS)
+    operators, position = operator or ["mixed"], one_of("position", position or "fused", POSITIONS)
+    combined_of: dict[str, Sequence[object]] = {
+        "architecture": architectures, "transport": transports, "delay": delays, "robot": robots,
+        "operator": operators,
+    }  # fmt: skip
+    for option, given in combined_of.items():
+        _once(option, given)
     for profile in delays:
         delay_profile(profile)
     for name in architectures:
-        makes(name)
+        controller(name, Posture(0.0, 0.0, 0.0), Constants())
     for who in operators:
         make(who, seed, 0.1)
-    prepare(out)
+    prepare(out, "runs.csv", "summary.json", "paths.svg", "errors.svg")
+    if record:
+        prepare(out / "runs")
     seeds = range(seed, seed + runs)
     combined = cases(architectures, transports, delays, robots, operators, seeds, length)
     chosen = [replace(case, position=position) for case in combined]
@@ -165,6 +187,16 @@ def lab(
     if causes:
         Console().print(causes_table(causes))
     typer.echo(f"Wrote {out / 'summary.json'}, runs.csv with {len(rows)} runs, and the figures")
+
+
+def _once(name: str, given: Sequence[object]) -> None:
+    """Check that nothing is asked for twice: its runs would count twice in the intervals.
+
+    Raises:
+        InvalidValueError: If something is.
+    """
+    if len(set(given)) < len(given):
+        raise InvalidValueError(name, ", ".join(map(str, given)), "named once each")
 
 
 def _worked(calls: Calls[Made], what: str, workers: int) -> list[Made]:

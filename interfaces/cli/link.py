@@ -10,15 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from interfaces.cli.doors import end_on_signal
+from interfaces.cli.options import PROFILES
 
 if TYPE_CHECKING:
     from interfaces.link import Conditions, DelayProfile
     from interfaces.link.proxy import Proxy
-
-PROFILE_HELP = (
-    "none, constant:S, domain, country, mon, tue, wed, thu, fri, gamma:MEAN,SD[,MIN], "
-    "route:DISTANCE,NODES,ROUTING,LOAD,BANDWIDTH, lunar or trace:FILE.csv; thu@20 for a correlation time of 20 s."
-)
 
 
 class Transport(enum.StrEnum):
@@ -39,9 +35,7 @@ def link(
         ),
     ],
     to: Annotated[str, typer.Option("--to", metavar="[HOST:]PORT", help="The server.")],
-    delay: Annotated[
-        str, typer.Option("--delay", metavar="PROFILE", help=f"One-way delay, each way: {PROFILE_HELP}")
-    ],
+    delay: Annotated[str, typer.Option("--delay", metavar="PROFILE", help=f"One-way delay, each way: {PROFILES}")],
     delay_back: Annotated[
         str | None,
         typer.Option(

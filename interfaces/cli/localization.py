@@ -17,14 +17,14 @@ LOCALIZATION: Final = "localization"
 
 
 def refuse(what: str, others: Mapping[str, object]) -> None:
-    """Raise if options are given that are of other experiments than this one.
+    """Raise if options are given that are of other experiments than this one, and would do nothing.
 
     Raises:
         InvalidValueError: If there's one.
     """
     given = [name for name, value in others.items() if value]
     if given:
-        raise InvalidValueError("options", " ".join(given), f"without those for {what}: it has its own robots")
+        raise InvalidValueError("options", " ".join(given), f"left out for {what}")
 
 
 def localize(
@@ -47,7 +47,7 @@ def localize(
 
     study = Study(seed, ROOMS if rooms is None else rooms, LENGTH if length is None else length)
     paper = study_of(study.runs, starts)
-    prepare(out)
+    prepare(out, "runs.csv", "summary.json")
     found = measured(paper, study, workers)
     write(found, out)
     if as_json:

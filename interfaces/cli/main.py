@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import io
+import logging
 import os
+import signal
 import sys
 from typing import Annotated
 
@@ -36,21 +40,21 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-app.command()(check)
-app.command()(compare)
-app.command()(console)
-app.command()(demo)
-app.command()(doctor)
-app.command()(export)
-app.command()(link)
-app.command()(replay)
-app.command()(lab)
-app.command()(reproduce)
-app.command()(robot)
-app.command()(run)
-app.command()(serve)
-app.add_typer(rsp)
-app.add_typer(middleware)
+app.command(short_help="Both twins on one plan across an emulated internet: begin here")(demo)
+app.command(short_help="What this machine lacks, and how to mend it")(doctor)
+app.command(short_help="The operator station in a browser, both robots live")(serve)
+app.command(short_help="The real robot alone: the remote site")(robot)
+app.command(short_help="Type VAL-II commands to a PUMA 560")(console)
+app.command(short_help="A VAL-II program on both twins")(run)
+app.command(short_help="What is wrong with a VAL-II program")(check)
+app.command(short_help="Play recordings back, in the browser or as lines")(replay)
+app.command(short_help="How far apart the twins of a recording were")(compare)
+app.command(short_help="A recording as tables or as a report")(export)
+app.command(short_help="Seeded experiments with a mobile robot")(lab)
+app.command(short_help="What papers claim, measured")(reproduce)
+app.command(short_help="An emulated internet between two programs")(link)
+app.add_typer(rsp, short_help="Robot models of the simulacrum protocol, and code from them")
+app.add_typer(middleware, short_help="The gain network of the network middleware")
 
 
 def _version(value: bool) -> None:
@@ -69,8 +73,23 @@ def _root(
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 the machine is at fault, 2 bad input, 130 Ctrl-C."""
+    """Run the command line and exit: 0 done, 1 the machine is at fault, 2 bad input, 130 Ctrl-C or SIGTERM."""
+    _ready_streams()
+    # Whoever ends it so wants workers and robots ended as by Ctrl-C; what serves has its own way.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(_status(sys.argv[1:] if arguments is None else arguments))
+
+
+def _ready_streams() -> None:
+    """Have standard streams, whatever this was started with, and let warnings look like what else is said."""
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w", encoding="utf-8"))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(logging.Formatter("vrs: %(message)s"))
 
 
 def _status(arguments: list[str]) -> int:
@@ -80,16 +99,26 @@ def _status(arguments: list[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _say("interrupted", 130)
     except UsageProblem as error:
-        return _say(f"{getattr(error, 'format_message', error.__str__)()} (vrs --help says what is allowed)", 2)
+        command = getattr(getattr(error, "ctx", None), "command_path", "vrs")
+        said = getattr(error, "format_message", error.__str__)()
+        return _say(f"{said} ({command} --help says what is allowed)", 2)
     except VrsError as error:
         return _say(str(error), 2)
     except BrokenPipeError:
-        # Whoever read our output has left; the interpreter must not fail again when it flushes.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        return _unheard(1)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        return _unheard(_say(f"standard output: {error.strerror}", 1))
     status = result if isinstance(result, int) else 0
     # Typer turns Ctrl-C into this status by itself, and says nothing.
     return _say("interrupted", status) if status == 130 else status
+
+
+def _unheard(status: int) -> int:
+    """Let the interpreter not fail again when it flushes what nobody takes."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return status
 
 
 def _say(message: str, status: int) -> int:

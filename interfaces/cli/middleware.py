@@ -23,7 +23,7 @@ def _root() -> None:
     """The network middleware of a mobile robot: its gain network."""
 
 
-@middleware.command()
+@middleware.command(short_help="Train it, and test it against the exact gain")
 def train(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where the network goes, as JSON.")],
     seed: Annotated[

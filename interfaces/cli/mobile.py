@@ -15,6 +15,7 @@ from interfaces.cli.doors import (
     access_for,
     end_on_signal,
     end_with_input,
+    in_url,
     keep_quiet,
     names_of,
     start_robot,
@@ -70,10 +71,15 @@ RoomName: TypeAlias = Annotated[
 
 
 def without(robot: str, given: Mapping[str, tuple[Any, Any]]) -> None:
-    """Check that no option was given that a robot hasn't.
+    """Check that no option was given that a robot hasn't: see `left_out`."""
+    left_out(f"{robot} has nothing of the kind", given)
+
+
+def left_out(why: str, given: Mapping[str, tuple[Any, Any]]) -> None:
+    """Check that no option was given that would do nothing.
 
     Args:
-        robot: Its name.
+        why: It would do nothing.
         given: What each option is, and what it is unless given.
 
     Raises:
@@ -81,7 +87,7 @@ def without(robot: str, given: Mapping[str, tuple[Any, Any]]) -> None:
     """
     for name, (value, usual) in given.items():
         if value != usual:
-            raise InvalidValueError(name, str(value), f"left out: {robot} has nothing of the kind")
+            raise InvalidValueError(name, str(value), f"left out: {why}")
 
 
 def room_of(text: str) -> Room:
@@ -178,7 +184,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())
         keep_quiet()
-        shown = f"[{host}]" if ":" in host else host
+        shown = in_url(host)
         typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}:{port}/")
         sys.stdout.flush()
@@ -270,7 +276,7 @@ async def _run(robot: LiveMobileRobot, host: str, port: int, *, until_eof: bool)
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         keep_quiet()
         hasten(1)
-        typer.echo(f"{READY}ws://{host}:{port}/site (ipr, {robot.config.architecture})")
+        typer.echo(f"{READY}ws://{in_url(host)}:{port}/site (ipr, {robot.config.architecture})")
         typer.echo(f"vrs: {POLICY_SAYS[robot.config.jobs.loss]}", err=True)
         sys.stdout.flush()
         if until_eof:

@@ -7,7 +7,10 @@ from typing import Annotated, TypeAlias
 
 import typer
 
-PROFILES = "none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar or trace:FILE.csv."
+PROFILES = (
+    "none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar, gamma:MEAN,SD[,MIN], "
+    "route:DISTANCE,NODES,ROUTING,LOAD,BANDWIDTH or trace:FILE.csv; thu@20 for a correlation time of 20 s."
+)
 """What a delay may be."""
 
 Delay: TypeAlias = Annotated[str, typer.Option("--delay", metavar="PROFILE", help=PROFILES)]

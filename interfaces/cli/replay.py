@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, names_of
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, in_url, names_of
 from interfaces.cli.options import Host, Port
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
@@ -30,7 +30,7 @@ RERUN = ("identical", "commands", "versions", "difference", "missing")
 def replay(
     run: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
     other: Annotated[
-        Path | None, typer.Argument(metavar="[OTHER.mcap]", help="Another one, shown beside it.")
+        Path | None, typer.Argument(metavar="OTHER.mcap", help="Another one, shown beside it.")
     ] = None,
     at: Annotated[
         float | None,
@@ -209,7 +209,7 @@ def _serve(
         number = listening.getsockname()[1]
         app = application(page.routes, hosts(names_of(host), number))
         async with sockets.serve(app, listening), page.running():
-            shown = f"[{host}]" if ":" in host else host
+            shown = in_url(host)
             names = " and ".join(str(track.recording.path) for track in playback.tracks)
             typer.echo(f"vrs: playing {names} on http://{shown}:{number}/replay")
             sys.stdout.flush()

@@ -66,7 +66,7 @@ def reproduce(
 
     chosen = papers(paper)
     more = [found for path in beyond or () for found in read_verdicts(path)]
-    prepare(out)
+    prepare(out, "reproduce.html", *(f"{each.name}.json" for each in chosen))
     written: list[Verdicts] = []
     for each in chosen:
         study = Study(seed, each.runs if runs is None else runs, each.length if length is None else length)

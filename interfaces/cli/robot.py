@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, keep_quiet, names_of
+from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, in_url, keep_quiet, names_of
 from interfaces.cli.mobile import (
     ARCHITECTURE,
     OPERATOR_LOSS,
@@ -18,6 +18,7 @@ from interfaces.cli.mobile import (
     OperatorLossName,
     RobotName,
     RoomName,
+    left_out,
     room_of,
     run_mobile,
     without,
@@ -28,6 +29,9 @@ from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from interfaces.runtime.live.robot import LiveRobot
+
+LISTEN = "127.0.0.1:8601"
+"""Where an operator's site connects, unless told otherwise."""
 
 
 def robot(
@@ -46,14 +50,14 @@ def robot(
     listen: Annotated[
         str,
         typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
-    ] = "127.0.0.1:8601",
+    ] = LISTEN,
     name: RobotName = "puma560",
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     offset: Annotated[
         str,
         typer.Option(
-            "--offset", metavar="OFFSET", help="How far behind the operator it plays: adaptive or fixed:S"
+            "--offset", metavar="OFFSET", help="How far behind the operator it plays: adaptive or fixed:S."
         ),
     ] = "adaptive",
     link_loss: Annotated[
@@ -99,6 +103,13 @@ def robot(
     if rsp is not None:
         from interfaces.cli.thin_client import thin_client
 
+        left_out("a thin client has nothing of the kind", {
+            "listen": (listen, LISTEN), "robot": (name, "puma560"), "architecture": (architecture, ARCHITECTURE),
+            "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "timeout": (timeout, 0.5),
+            "operator-loss": (operator_loss, OPERATOR_LOSS), "max-age": (max_age, 0.5), "lead": (lead, 0.05),
+            "body": (body, "puma560"), "friction": (friction, True), "pose": (pose, "nominal"),
+            "reports": (reports, 30.0),
+        })  # fmt: skip
         thin_client(rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
         return
     if rsp_model is not None:
@@ -113,6 +124,8 @@ def robot(
     from robots import puma560
     from robots.onboard import LossPolicy, WatchdogConfig
 
+    number_in("timeout", timeout, 0.1, 2.0, unit=" s")
+    number_in("max-age", max_age, 0.01, 2.0, unit=" s")
     if one_of("robot", name, ROBOTS) == "ipr":
         without(name, {
             "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, "puma560"),
@@ -177,7 +190,7 @@ async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> 
         keep_quiet()
         hasten(1)
         if not robot.ended.is_set():
-            typer.echo(f"{READY}ws://{host}:{port}/site ({robot.config.model.name}, {robot.config.body})")
+            typer.echo(f"{READY}ws://{in_url(host)}:{port}/site ({robot.config.model.name}, {robot.config.body})")
             sys.stdout.flush()
         if until_eof:
             end_with_input(robot.ended)

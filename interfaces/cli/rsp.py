@@ -64,7 +64,7 @@ def show(file: ModelFile, as_json: AsJson = False) -> None:
     Console().print(table)
 
 
-@model.command()
+@model.command(short_help="What is wrong with a model")
 def check(file: ModelFile, as_json: AsJson = False) -> None:
     """Check a model against the metamodel, and that its elements fit together."""
     from interfaces.rsp.model import read_model
@@ -76,7 +76,7 @@ def check(file: ModelFile, as_json: AsJson = False) -> None:
         typer.echo(f"{file}: {facts['name']}, {facts['count']} elements, fine")
 
 
-@rsp.command()
+@rsp.command(short_help="A robot's middleware and packet handlers, as a Python package")
 def generate(
     file: ModelFile,
     out: Annotated[

@@ -13,6 +13,7 @@ from interfaces.cli.demo import (
     DEFAULT_DELAY,
     DEFAULT_SEED,
     RECORDING,
+    RESULTS,
     complain,
     explained,
     prepare,
@@ -59,7 +60,7 @@ def run(
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     source, model = read(program), puma560.model()
-    prepare(out)
+    prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(
         source, model, profile, simulated_puma(),
@@ -71,7 +72,7 @@ def run(
     summary = summarize(whole, attributions, offsets)
     write(summary, whole, out)
     complain(recorder)
-    show(summary, out, err=True)
+    show(summary, out, recorded=not recorder.problem, err=True)
     if played.error is not None:
         raise played.error
 

@@ -15,6 +15,7 @@ from interfaces.cli.doors import (
     access_for,
     end_on_signal,
     end_with_input,
+    in_url,
     keep_quiet,
     names_of,
     start_robot,
@@ -32,6 +33,7 @@ from interfaces.cli.mobile import (
     OperatorLossName,
     RobotName,
     RoomName,
+    left_out,
     room_of,
     serve_mobile,
     without,
@@ -92,7 +94,11 @@ def serve(
     ] = JOBS,
     max_age: Annotated[
         float,
-        typer.Option("--max-age", metavar="S", help="Of the robot that this starts: oldest message that counts."),
+        typer.Option(
+            "--max-age",
+            metavar="S",
+            help="Of the robot that this starts: oldest message that counts under halt [s], 0.01 to 2.",
+        ),
     ] = 0.5,
     body: Annotated[
         str, typer.Option("--body", metavar="BODY", help="Of the robot that this starts: puma560 or exact.")
@@ -139,6 +145,7 @@ def serve(
     from interfaces.recording.sink import Sink
     from interfaces.runtime.ages import late_often
     from interfaces.runtime.offset import fixed_offset, spelled
+    from interfaces.runtime.physics_messages import BodyKind
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes
@@ -146,10 +153,20 @@ def serve(
 
     one_of("robot", robot, ROBOTS)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
+    number_in("max-age", max_age, 0.01, 2.0, unit=" s")
+    one_of("body", body, BodyKind)
+    if robot_at is not None:
+        left_out("the robot at --robot-at has its own", {
+            "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "max-age": (max_age, 0.5),
+            "body": (body, "puma560"), "operator-loss": (operator_loss, OPERATOR_LOSS),
+            "architecture": (architecture, ARCHITECTURE),
+        })  # fmt: skip
+    elif robot_token_file is not None:
+        raise InvalidValueError("robot-token-file", str(robot_token_file), "left out without --robot-at")
     profile = delay_profile(delay)
     way = Conditions(delay=profile, loss=loss_model(loss), service=service)  # type: ignore[arg-type]
     link = LinkConditions.symmetric(way)
-    advice = late_often(link, policy, max_age)
+    advice = "" if robot_at is not None else late_often(link, policy, max_age)
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
     if robot == "ipr":
@@ -289,7 +306,7 @@ async def _serve(
         )  # fmt: skip
         operator = LiveOperator(config, access)
         station = Station(described(model, operator.scene.tool))
-        shown = f"[{host}]" if ":" in host else host
+        shown = in_url(host)
         near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())
         terminals = PageDoor(val.enter).route

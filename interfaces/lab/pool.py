@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any, TypeAlias, TypeVar
@@ -46,7 +48,7 @@ def pooled(
         return list(made.values())
     # A fork would copy the threads of whoever shows the progress.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
         try:
             waiting = {pool.submit(work, *given): k for k, (work, given) in enumerate(calls)}
             for future in as_completed(waiting):
@@ -58,3 +60,15 @@ def pooled(
                 child.terminate()
             raise
     return [made[k] for k in range(len(calls))]
+
+
+def _end_with_parent() -> None:
+    """Let a worker not outlive who began it, who tells nobody when he is killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()

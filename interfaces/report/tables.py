@@ -55,7 +55,7 @@ def attribution_table(summary: Json) -> Table:
     for item in summary["attribution"]:
         label, scale, unit = MEASURES[item["measure"]]
         values = [item["total"], *(item["parts"][cause] for cause in order), item["residual"]]
-        table.add_row(f"{label}, {unit}", *(f"{scale * value:.3f}" for value in values))
+        table.add_row(f"{label}, {unit}", *(f"{round(scale * value, 3) + 0.0:.3f}" for value in values))
     return table
 
 

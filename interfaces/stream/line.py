@@ -135,7 +135,8 @@ class Line:
                 reason = "the connection ended"
                 pause = FIRST_PAUSE
             except (OSError, WebSocketException, ProtocolError, TimeoutError) as error:
-                reason = str(error) or type(error).__name__
+                refused = isinstance(error, ConnectionRefusedError)
+                reason = "no server listens there" if refused else str(error) or type(error).__name__
             with self.changed:
                 self.failure = reason
                 self.core.disconnected()

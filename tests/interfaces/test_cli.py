@@ -42,6 +42,9 @@ def test_demo_writes_the_same_summary_twice(plan, tmp_path):
         assert json.loads(done.stdout)["seed"] == 3
         assert done.stdout == (tmp_path / name / "summary.json").read_text()
         assert (tmp_path / name / "report.html").stat().st_size > 10_000
+        bars = [line for line in done.stderr.splitlines() if "━" in line]
+        assert len(bars) == 6
+        assert all("100%" in bar for bar in bars)
         files.append((tmp_path / name / "summary.json").read_bytes())
     assert files[0] == files[1]
     summary = json.loads(files[0])
@@ -79,18 +82,43 @@ def test_demo_takes_a_fixed_offset_on_an_in_order_link(plan, tmp_path):
         (["demo", "--commands", "{tmp}/plan.jsonl", "--out", "{tmp}/binary"], "can't hold the results"),
         (["demo", "--commands", "{tmp}/plan.jsonl", "--out", "{tmp}/binary/sub"], "can't hold the results"),
         (["demo", "--delay", "trace:{tmp}/missing"], "missing: can't be read"),
+        (["demo", "--commands", "{tmp}/plan.jsonl", "--out", "{tmp}/full"], "run.mcap: can't hold the results"),
+        (["lab", "--out", "{tmp}/full", "--robot", "bare"], "runs.csv: can't hold the results"),
+        (["lab", "--out", "{tmp}/file", "--robot", "bare", "--record"], "runs: can't hold the results"),
+        (["lab", "goals", "--out", "{tmp}/full"], "runs.csv: can't hold the results"),
+        (["reproduce", "tipsuwan", "--out", "{tmp}/full"], "tipsuwan.json: can't hold the results"),
         (["fly"], "fly"),
+        (["demo", "--seed", "x"], "vrs demo --help"),
+        (["rsp", "model", "draw"], "vrs rsp model --help"),
+        (["lab", "--out", "{tmp}/lab", "--architecture", "III", "--architecture", "III"], "once"),
+        (["lab", "--out", "{tmp}/lab", "--starts", "4"], "--starts"),
+        (["lab", "goals", "--out", "{tmp}/lab", "--starts", "4"], "--starts"),
+        (["lab", "localization", "--out", "{tmp}/lab", "--position", "truth"], "--position"),
+        (["console", "--alone", "--delay", "wed"], "--alone"),
+        (["console", "--connect", "ws://127.0.0.1:1"], "no server listens there"),
+        (["console", "--connect", "ws://127.0.0.1:1", "--delay", "wed"], "--connect"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(plan, tmp_path, capsys, arguments, said):
     (tmp_path / "empty").touch()
     (tmp_path / "binary").write_bytes(bytes(range(256)))
+    for name in ("run.mcap", "runs.csv", "tipsuwan.json"):
+        (tmp_path / "full" / name).mkdir(parents=True)
+    (tmp_path / "file").mkdir()
+    (tmp_path / "file" / "runs").touch()
     assert _status([argument.format(tmp=tmp_path) for argument in arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert captured.err.startswith("vrs: ")
     assert said in captured.err
+
+
+def test_a_list_of_commands_is_cut_nowhere(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    for arguments in ([], ["rsp", "--help"], ["rsp", "model", "--help"], ["middleware", "--help"]):
+        assert _status(arguments) == 0
+    assert not any(line.endswith("...") for line in capsys.readouterr().out.splitlines() if "Usage" not in line)
 
 
 def test_help_and_version(capsys):
@@ -100,7 +128,8 @@ def test_help_and_version(capsys):
     assert capsys.readouterr().out.splitlines()[-1].startswith("vrs-teleop ")
 
 
-def test_ctrl_c_ends_with_130_and_one_line(tmp_path):
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_with_130_and_one_line(tmp_path, how):
     process = subprocess.Popen(
         [sys.executable, "-c", "from interfaces.cli import main; main()", "demo", "--out", str(tmp_path / "out")],
         stdout=subprocess.PIPE,
@@ -111,7 +140,7 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path):
     deadline = time.monotonic() + 60
     while not (tmp_path / "out").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(how)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in err
@@ -147,6 +176,14 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path):
         (("robot", "--timeout", "9"), "0.1"),
         (("robot", "--lead", "0"), "0.01"),
         (("robot", "--listen", "127.0.0.1:99999"), "listen"),
+        (("robot", "--max-age", "nan"), "max-age"),
+        (("robot", "--robot", "ipr", "--timeout", "nan"), "timeout"),
+        (("robot", "--rsp", "127.0.0.1:0", "--pose", "ready"), "thin client"),
+        (("serve", "--body", "jelly"), "puma560"),
+        (("serve", "--max-age", "nan"), "0.01, 2"),
+        (("serve", "--robot-at", "127.0.0.1:1", "--body", "exact"), "--robot-at has its own"),
+        (("serve", "--robot", "ipr", "--robot-at", "127.0.0.1:1", "--architecture", "I"), "--robot-at has its own"),
+        (("serve", "--robot-token-file", "tokens"), "--robot-at"),
     ],
 )
 def test_doors_say_what_is_allowed(capsys, arguments, said):
@@ -155,6 +192,43 @@ def test_doors_say_what_is_allowed(capsys, arguments, said):
     assert error.startswith("vrs: ")
     assert said in error
     assert len(error.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("arguments", [["doctor"], ["console", "--alone"]])
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "<&- >&- 2>&-"])
+def test_it_runs_without_standard_streams(arguments, closed):
+    script = "from interfaces.cli import main; main()"
+    asked = ["sh", "-c", f'exec "$0" -c "$@" {closed}', sys.executable, script, *arguments]
+    done = subprocess.run(asked, capture_output=True, stdin=subprocess.DEVNULL, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_output_that_finds_no_room_is_one_line(tmp_path):
+    script = "from interfaces.cli import main; main()"
+    with open("/dev/full", "wb") as full:
+        asked = [sys.executable, "-c", script, "doctor", "--json"]
+        done = subprocess.run(asked, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (1, "vrs: standard output: No space left on device\n")
+
+
+def test_a_terminal_that_knows_no_unicode_gets_what_it_knows():
+    asked = [sys.executable, "-c", "from interfaces.cli.main import _ready_streams as r; r(); print('−8 … 8')"]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(asked, capture_output=True, env=environment, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"?8 ? 8\n", b"")
+
+
+@pytest.mark.parametrize("redirected", ["</dev/null", "</etc/hostname", "<&-"])
+def test_standard_input_that_is_no_pipe_has_ended(redirected):
+    """A service has none, or /dev/null, which can't be waited for."""
+    script = (
+        "import asyncio\nfrom interfaces.cli.doors import end_with_input\n"
+        "async def main():\n    ended = asyncio.Event()\n    end_with_input(ended)\n"
+        "    await asyncio.wait_for(ended.wait(), 5)\nasyncio.run(main())"
+    )
+    asked = ["sh", "-c", f'exec "$0" -c "$1" {redirected}', sys.executable, script]
+    done = subprocess.run(asked, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_token_file_is_made_for_its_owner_alone(tmp_path):

@@ -17,7 +17,8 @@ from interfaces.teleop.architectures.controllers import (
 )
 from robots.onboard.driving import Posture
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
-from vrs.checks import number_in, one_of
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,11 @@ def architecture(name: str) -> Architecture:
     """
     if is_own(name):
         return own("architecture", name, ("constants", "posture"))
-    return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES)]
+    if name not in ARCHITECTURES:
+        raise InvalidValueError(
+            "architecture", name, f"one of {', '.join(ARCHITECTURES)}, or MODULE:NAME of your own"
+        )
+    return ARCHITECTURES[name]
 
 
 def controller(name: str, posture: Posture, constants: Constants) -> Controller:

@@ -66,6 +66,18 @@ def test_a_walk_by_keys_comes_by_everything(page: Page) -> None:
         assert [one for one in walked if not (one["shown"] and one["inside"] and one["name"])] == []
 
 
+def test_stop_can_be_pressed_however_narrow_the_page_is(page: Page) -> None:
+    page.open()
+    for width in (390, 640, 820, 1001):
+        page.page.set_viewport_size({"width": width, "height": 720})
+        box = page.page.locator("#stop").bounding_box()
+        assert 0 <= box["x"] <= width - box["width"], width
+        middle = f"{box['x'] + box['width'] / 2}, {box['y'] + box['height'] / 2}"
+        assert page.get(f"document.elementFromPoint({middle}).closest('#stop') !== null"), width
+        pane = page.page.locator("#pane-box").bounding_box()
+        assert min(pane["width"], pane["height"]) > 150, width
+
+
 def test_a_gamepad_moves_the_tool_and_its_b_stops(page: Page) -> None:
     page.page.add_init_script(PAD)
     page.open()
