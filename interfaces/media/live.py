@@ -187,7 +187,8 @@ class LiveMedia:
             OfferError: If it can't be answered, or too many watch.
         """
         if not self._video:
-            raise InvalidValueError("watch", "video", f"left out: {self.missing or 'it'} isn't installed")
+            why = f"{self.missing} isn't installed" if self.missing else "it's switched off here"
+            raise InvalidValueError("watch", "video", f"left out: {why}")
         from interfaces.media.peers import CONNECT_TIME, Peer
 
         await self.leave(page)

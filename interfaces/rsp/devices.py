@@ -82,9 +82,11 @@ class EffectorDevice(Device, Generic[V]):
         Raises:
             InvalidValueError: If there's no such value or it's beyond its limits; nothing changed then.
         """
-        values = list(self._values)
-        values[_place(self.name, index, len(values))] = value
-        self.write_all(values)
+        # As one: another thread may write another of them.
+        with self._middleware.changed:
+            values = list(self._values)
+            values[_place(self.name, index, len(values))] = value
+            self.write_all(values)
 
     def write_all(self, values: Sequence[V]) -> None:
         """Set all values; arguments and errors as of `write`."""

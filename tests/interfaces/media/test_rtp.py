@@ -103,6 +103,17 @@ def test_who_may_come_in_and_what_is_answered(monkeypatch: pytest.MonkeyPatch) -
     asyncio.run(session())
 
 
+def test_a_site_whose_video_is_switched_off_says_so() -> None:
+    async def session() -> None:
+        async with site(CameraConfig(lens=LENS, video=False)) as here, here.page() as page:
+            facts = await page.hear("media")
+            assert (facts["video"], facts["missing"]) == (False, "")
+            await page.say(do="watch", offer="v=0")
+            assert "it's switched off here" in (await page.hear("problem"))["text"]
+
+    asyncio.run(session())
+
+
 def test_without_the_extra_there_are_single_pictures_and_a_camera_that_fails_is_started_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from random import Random
+from threading import Thread
 
 import pytest
 
+from interfaces.rsp.devices import EffectorDevice
 from interfaces.rsp.errors import FullError
+from interfaces.rsp.local import LocalCore
+from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import Effector, Filling, RobotModel
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig
 from interfaces.rsp.outbox import MemoryOutbox, Outcome, Settled
 from interfaces.rsp.period import PeriodConfig, PeriodControl
 from interfaces.rsp.streams import StreamInbox, StreamOutbox
 from tests.interfaces.rsp.joined import Network, Pair
+from vrs.clock import ManualClock
 from vrs.errors import InvalidValueError
 
 HELD, LINE, FLOAT = 0, 1, 2
@@ -229,3 +235,22 @@ def test_an_acknowledgement_is_of_its_own_element() -> None:
     outbox.fill({}, now=0.0, timeout=0.1)
     assert outbox.acknowledge(4, second.to_bytes(2, "big")) == [Settled(4, second, Outcome.DONE)]
     assert outbox.expire(9.0) == [Settled(3, first, Outcome.FAILED)]
+
+
+def test_two_threads_that_write_two_values_of_one_effector_lose_none() -> None:
+    model = RobotModel("pair", 2, (Effector("wheels", count=2),))
+    other: list[Thread] = []
+
+    class Slow(EffectorDevice[int]):
+        def write_all(self, values: Sequence[int]) -> None:
+            if not other:
+                # In the midst of the first write somebody else begins another one.
+                other.append(Thread(target=self.write, args=(1, 7)))
+                other[0].start()
+                other[0].join(0.1)
+            super().write_all(values)
+
+    wheels = Slow(Middleware(LocalCore(model, bytes), ManualClock(0.0)), "wheels")
+    wheels.write(0, 5)
+    other[0].join(5.0)
+    assert wheels.read_all() == (5, 7)

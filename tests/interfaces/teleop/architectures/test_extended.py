@@ -12,7 +12,9 @@ import pytest
 
 from interfaces.lab.driving.run import Case, DriveRun, run
 from interfaces.teleop.architectures import CellChanges, OperatorSurroundings, Report, RobotSurroundings
-from robots.bullet.rooms import Room, read_room
+from interfaces.teleop.architectures.equipment import BodySonar, grid_of
+from robots.bullet.rooms import EMPTY, Room, read_room
+from robots.ipr.bare import BareBody
 from robots.ipr.chassis import IPR, SonarModel
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import place
@@ -241,3 +243,26 @@ def test_nobody_who_walks_through_is_run_into(seed: int) -> None:
     assert place("fig13_person").people
     assert drive.touched == ()
     assert drive.limits_passed() == 0
+
+
+def test_on_a_drive_echoes_are_as_old_as_the_drive_says() -> None:
+    """The body's own time is another one: it may have stood there for long."""
+    with BareBody("ipr", room=place("furnished"), rng=0) as body:
+        while body.time < 5.0:
+            body.drive(0.0, 0.0, 30)
+        scan, own = BodySonar(body, 4.0).scan(), body.sonar
+        assert scan is not None
+        assert own is not None
+        assert scan[0] == pytest.approx(own.time - 4.0)
+        assert 0.0 <= scan[0] <= body.time - 4.0
+        assert list(scan[1]) == own.ranges.tolist()
+
+
+def test_where_there_is_no_room_cells_lie_about_the_start() -> None:
+    grid = grid_of(EMPTY, Posture(3.0, -2.0, 1.0))
+    width, height = (n * grid.cell for n in grid.shape)
+    assert grid.origin == pytest.approx((3.0 - width / 2, -2.0 - height / 2))
+    room = place("furnished")
+    inside = grid_of(room, Posture(3.0, 2.0, 0.0))
+    for n, size in zip(inside.shape, (room.length, room.width), strict=True):
+        assert 0.0 <= n * inside.cell - size < inside.cell
