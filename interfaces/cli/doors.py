@@ -5,10 +5,11 @@ from __future__ import annotations
 import gc
 import ipaddress
 import os
+import re
 import signal
 import socket
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -29,6 +30,19 @@ TokenFile: TypeAlias = Annotated[
     typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
 ]
 """What lets other machines in: see `access_for`."""
+ReachedAs: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--reached-as",
+        metavar="HOST[:PORT]",
+        help="Another address that it's reached by, as behind a forwarded port or a proxy; may be repeated.",
+    ),
+]
+"""What else requests may ask for: see `asked_for`."""
+Hosts: TypeAlias = Callable[[int], frozenset[str]]
+"""What the Host of a request may be, by the port that a server listens on."""
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(:[0-9]{1,5})?", re.IGNORECASE)
+"""What a request's Host is made of."""
 
 
 def is_loopback(host: str) -> bool:
@@ -79,6 +93,29 @@ def names_of(host: str) -> list[str]:
     except OSError:
         found = set()
     return sorted({"127.0.0.1", "localhost", "::1", own, *found})
+
+
+def asked_for(host: str, also: Iterable[str]) -> Hosts:
+    """What the Host of a request may be, by the port that a server listens on.
+
+    Args:
+        host: Where it listens.
+        also: Other addresses that it's reached by, just as a browser's address line has them.
+
+    Raises:
+        InvalidValueError: If one of those is no address.
+    """
+    others = [address.lower() for address in also]
+    for address in others:
+        if not _HOST.fullmatch(address):
+            raise InvalidValueError("reached-as", address, "HOST or HOST:PORT, as a browser's address line has it")
+
+    def allowed(port: int) -> frozenset[str]:
+        from interfaces.stream.access import hosts
+
+        return hosts(names_of(host), port).union(others)
+
+    return allowed
 
 
 def end_with_input(ended: asyncio.Event) -> None:

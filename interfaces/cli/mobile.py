@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -13,11 +13,11 @@ import typer
 from interfaces.cli.doors import (
     abandon,
     access_for,
+    asked_for,
     end_on_signal,
     end_with_input,
     in_url,
     keep_quiet,
-    names_of,
     start_robot,
 )
 from interfaces.software import software
@@ -25,7 +25,9 @@ from vrs.checks import number_in, one_of
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
+    from interfaces.cli.doors import Hosts
     from interfaces.link import LinkConditions
+    from interfaces.link.proxy import Address
     from interfaces.runtime.live.mobile_robot import LiveMobileRobot
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
@@ -117,6 +119,8 @@ class MobileServing:
 
     host: str
     port: int
+    allowed: Hosts
+    """What requests may ask for."""
     room: str
     architecture: str
     conditions: LinkConditions
@@ -149,7 +153,6 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
     import contextlib
 
     from interfaces.stream import sockets
-    from interfaces.stream.access import hosts
 
     ended = asyncio.Event()
     end_on_signal(ended)
@@ -179,7 +182,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         operator = LiveMobileOperator(config, access)
         panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
         station = Station({"mobile": True, "name": model.name}, panels=panels)
-        app = application([*operator.routes, *station.routes], hosts(names_of(host), port))
+        app = application([*operator.routes, *station.routes], serving.allowed(port))
         await stack.enter_async_context(station.running())
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())
@@ -216,6 +219,7 @@ def run_mobile(
     token_file: Path | None,
     until_eof: bool,
     operator_loss: str = "stop",
+    reached_as: Iterable[str] = (),
 ) -> None:
     """Run a mobile robot and its site, until Ctrl-C or SIGTERM.
 
@@ -229,6 +233,7 @@ def run_mobile(
         token_file: Its tokens.
         until_eof: Whether it ends with standard input.
         operator_loss: What becomes of what it does by itself when the operator is lost, `stop` or `carry-on`.
+        reached_as: Other addresses that it's reached by.
     """
     import uvloop
 
@@ -251,32 +256,31 @@ def run_mobile(
     driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
     jobs = RunnerConfig(loss=OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss)))
     config = LiveMobileConfig(room_of(room), architecture, driven, jobs, Hands(speaker=Aloud()), server=software())
-    access = access_for(address.host, token_file, free={Role.SITE})
+    access, allowed = access_for(address.host, token_file, free={Role.SITE}), asked_for(address.host, reached_as)
 
     async def main() -> None:
-        await _run(LiveMobileRobot(config, access), address.host, address.port, until_eof=until_eof)
+        await _run(LiveMobileRobot(config, access), address, allowed, until_eof=until_eof)
 
     uvloop.run(main())
 
 
-async def _run(robot: LiveMobileRobot, host: str, port: int, *, until_eof: bool) -> None:
+async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> None:
     """Run until a signal comes, or standard input ends."""
     from interfaces.jobs import POLICY_SAYS
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
     from interfaces.stream import sockets
-    from interfaces.stream.access import hosts
     from interfaces.stream.server import application
 
     end_on_signal(robot.ended)
-    listening = sockets.bind(host, port)
+    listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
-    app = application(robot.routes, hosts(names_of(host), port))
+    app = application(robot.routes, allowed(port))
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         keep_quiet()
         hasten(1)
-        typer.echo(f"{READY}ws://{in_url(host)}:{port}/site (ipr, {robot.config.architecture})")
+        typer.echo(f"{READY}ws://{in_url(address.host)}:{port}/site (ipr, {robot.config.architecture})")
         typer.echo(f"vrs: {POLICY_SAYS[robot.config.jobs.loss]}", err=True)
         sys.stdout.flush()
         if until_eof:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, in_url, names_of
+from interfaces.cli.doors import ReachedAs, TokenFile, access_for, asked_for, end_on_signal, in_url
 from interfaces.cli.options import Host, Port
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
@@ -17,6 +17,7 @@ from vrs.errors import InvalidValueError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from interfaces.cli.doors import Hosts
     from interfaces.recording.playback import Playback
     from interfaces.recording.recording import Recording
     from interfaces.stream.access import Access
@@ -63,6 +64,7 @@ def replay(
     host: Host = "127.0.0.1",
     port: Port = 8610,
     token_file: TokenFile = None,
+    reached_as: ReachedAs = None,
 ) -> int:
     """Play recordings back: either way, at any rate, in a loop, live where one is being written.
 
@@ -81,7 +83,7 @@ def replay(
         raise InvalidValueError("json", "--json", "with --headless or --commands")
     from interfaces.stream.access import OPEN
 
-    access = access_for(host, token_file, free=OPEN)
+    access, allowed = access_for(host, token_file, free=OPEN), asked_for(host, reached_as or ())
     with ExitStack() as stack:
         recordings = [stack.enter_context(open_recording(path)) for path in (run, other) if path is not None]
         for recording in recordings:
@@ -92,7 +94,7 @@ def replay(
         if headless:
             _print(playback, at, rate, span, frames, as_json)
         else:
-            _serve(playback, at, rate, span, access, host, port)
+            _serve(playback, at, rate, span, access, allowed, host, port)
     return 0
 
 
@@ -176,6 +178,7 @@ def _serve(
     rate: float | None,
     span: tuple[float, float] | None,
     access: Access,
+    allowed: Hosts,
     host: str,
     port: int,
 ) -> None:
@@ -183,7 +186,6 @@ def _serve(
 
     from interfaces.recording.page import ReplayPage
     from interfaces.stream import sockets
-    from interfaces.stream.access import hosts
     from interfaces.stream.control import Role
     from interfaces.stream.server import application
     from vrs.clock import WallClock
@@ -207,7 +209,7 @@ def _serve(
             playback, clock, authorize=lambda token: not access.refusal(Role.VIEWER, token), first=first
         )
         number = listening.getsockname()[1]
-        app = application(page.routes, hosts(names_of(host), number))
+        app = application(page.routes, allowed(number))
         async with sockets.serve(app, listening), page.running():
             shown = in_url(host)
             names = " and ".join(str(track.recording.path) for track in playback.tracks)

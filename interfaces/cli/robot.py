@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import TokenFile, access_for, end_on_signal, end_with_input, in_url, keep_quiet, names_of
+from interfaces.cli.doors import (
+    Hosts,
+    ReachedAs,
+    TokenFile,
+    access_for,
+    asked_for,
+    end_on_signal,
+    end_with_input,
+    in_url,
+    keep_quiet,
+)
 from interfaces.cli.mobile import (
     ARCHITECTURE,
     OPERATOR_LOSS,
@@ -28,6 +38,7 @@ from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from interfaces.link.proxy import Address
     from interfaces.runtime.live.robot import LiveRobot
 
 LISTEN = "127.0.0.1:8601"
@@ -95,6 +106,7 @@ def robot(
         float, typer.Option("--reports", metavar="N", help="How often it says where it is [1/s], 1 to 200.")
     ] = 30.0,
     token_file: TokenFile = None,
+    reached_as: ReachedAs = None,
     until_eof: Annotated[
         bool, typer.Option("--until-eof", help="End when standard input does, once the robot rests.")
     ] = False,
@@ -108,7 +120,7 @@ def robot(
             "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "timeout": (timeout, 0.5),
             "operator-loss": (operator_loss, OPERATOR_LOSS), "max-age": (max_age, 0.5), "lead": (lead, 0.05),
             "body": (body, "puma560"), "friction": (friction, True), "pose": (pose, "nominal"),
-            "reports": (reports, 30.0),
+            "reports": (reports, 30.0), "reached-as": (reached_as, None),
         })  # fmt: skip
         thin_client(rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
         return
@@ -134,6 +146,7 @@ def robot(
         run_mobile(
             listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
             reports=reports, token_file=token_file, until_eof=until_eof, operator_loss=operator_loss,
+            reached_as=reached_as or (),
         )  # fmt: skip
         return
     without(name, {
@@ -152,9 +165,10 @@ def robot(
     )
     config = LiveRobotConfig(model, q, RobotHostConfig(site=site, lead=lead), kind, friction, software())
     access = access_for(address.host, token_file, free={Role.SITE})
+    allowed = asked_for(address.host, reached_as or ())
 
     async def main() -> str:
-        return await _serve(LiveRobot(config, access), address.host, address.port, until_eof=until_eof)
+        return await _serve(LiveRobot(config, access), address, allowed, until_eof=until_eof)
 
     problem = uvloop.run(main())
     if problem:
@@ -172,25 +186,26 @@ def _offset(text: str) -> float | None:
     return fixed_offset(text, delay_profile("none"))
 
 
-async def _serve(robot: LiveRobot, host: str, port: int, *, until_eof: bool) -> str:
+async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
     from interfaces.stream import sockets
-    from interfaces.stream.access import hosts
     from interfaces.stream.server import application
 
     end_on_signal(robot.ended)
-    listening = sockets.bind(host, port)
+    listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
-    app = application(robot.routes, hosts(names_of(host), port))
+    app = application(robot.routes, allowed(port))
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         await robot.ready()
         keep_quiet()
         hasten(1)
         if not robot.ended.is_set():
-            typer.echo(f"{READY}ws://{in_url(host)}:{port}/site ({robot.config.model.name}, {robot.config.body})")
+            typer.echo(
+                f"{READY}ws://{in_url(address.host)}:{port}/site ({robot.config.model.name}, {robot.config.body})"
+            )
             sys.stdout.flush()
         if until_eof:
             end_with_input(robot.ended)

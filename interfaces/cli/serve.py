@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.doors import (
+    Hosts,
+    ReachedAs,
     TokenFile,
     abandon,
     access_for,
+    asked_for,
     end_on_signal,
     end_with_input,
     in_url,
     keep_quiet,
-    names_of,
     start_robot,
 )
 from interfaces.cli.mobile import (
@@ -111,6 +113,7 @@ def serve(
         Path | None, typer.Option("--robot-token-file", metavar="FILE", help="Token file of that robot.")
     ] = None,
     token_file: TokenFile = None,
+    reached_as: ReachedAs = None,
     val_port: Annotated[
         int | None,
         typer.Option(
@@ -168,6 +171,7 @@ def serve(
     link = LinkConditions.symmetric(way)
     advice = "" if robot_at is not None else late_often(link, policy, max_age)
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
+    allowed = asked_for(host, reached_as or ())
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
     if robot == "ipr":
         without(robot, {
@@ -181,7 +185,7 @@ def serve(
         if camera:
             number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
         serving = MobileServing(
-            host, port, room, architecture, link, policy.value, max_age, seed, at, token, until_eof,
+            host, port, allowed, room, architecture, link, policy.value, max_age, seed, at, token, until_eof,
             one_of("operator-loss", operator_loss, OperatorLoss), jobs, camera,
         )  # fmt: skip
         _advise(advice)
@@ -209,7 +213,7 @@ def serve(
         raise InvalidValueError("val-files", str(val_files), "a directory")
     access = access_for(host, token_file, free=OPEN)
     own = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
-    doors = _Doors(host, port, val_port, val_files, own, until_eof)
+    doors = _Doors(host, port, allowed, val_port, val_files, own, until_eof)
     uvloop.run(
         _serve(
             access,
@@ -241,6 +245,8 @@ class _Doors:
 
     host: str
     port: int
+    allowed: Hosts
+    """What requests may ask for."""
     val_port: int | None
     """Of the monitor; None for none."""
     val_files: Path
@@ -274,7 +280,6 @@ async def _serve(
     import contextlib
 
     from interfaces.stream import sockets
-    from interfaces.stream.access import hosts
 
     ended = asyncio.Event()
     end_on_signal(ended)
@@ -313,7 +318,7 @@ async def _serve(
         facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
         recordings = Recordings(operator, Shelf(shelved.directory), access, facts)
         routes = [*operator.routes, terminals, *recordings.routes, *station.routes]
-        app = application(routes, hosts(names_of(host), port))
+        app = application(routes, doors.allowed(port))
         await stack.enter_async_context(station.running())
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())

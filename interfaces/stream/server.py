@@ -184,6 +184,10 @@ class Endpoint:
         await self._serve(Encoding(chosen), scope, receive, send)
 
 
+REFUSED = "this Host or Origin isn't allowed here; the server's option --reached-as lets one in\n"
+"""Said to what doesn't name this server."""
+
+
 class Guard:
     """Lets in only what names this server exactly, and comes from no other's page."""
 
@@ -213,7 +217,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
         await receive()
         await send({"type": "websocket.close", "code": 1008, "reason": ""})
     else:
-        await PlainTextResponse("this Host or Origin isn't allowed here\n", 403)(scope, receive, send)
+        await PlainTextResponse(REFUSED, 403)(scope, receive, send)
 
 
 def application(routes: Sequence[BaseRoute], allowed: frozenset[str]) -> ASGIApp:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -229,6 +230,55 @@ def test_standard_input_that_is_no_pipe_has_ended(redirected):
     asked = ["sh", "-c", f'exec "$0" -c "$1" {redirected}', sys.executable, script]
     done = subprocess.run(asked, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("asked", "status"),
+    [
+        ("127.0.0.1:8600", 200),
+        ("LOCALHOST:8600", 200),
+        ("127.0.0.1:9000", 200),
+        ("lab.example", 200),
+        ("127.0.0.1:9001", 403),
+        ("lab.example:8600", 403),
+        ("other.example", 403),
+    ],
+)
+def test_a_server_answers_to_its_own_addresses_and_those_it_was_told_of(asked, status):
+    from starlette.responses import PlainTextResponse
+    from starlette.routing import Route
+
+    from interfaces.cli.doors import asked_for
+    from interfaces.stream.server import application
+
+    allowed = asked_for("127.0.0.1", ["127.0.0.1:9000", "Lab.example"])(8600)
+    app = application([Route("/", lambda _: PlainTextResponse("here"))], allowed)
+
+    def answer(origin):
+        headers = [(b"host", asked.encode()), (b"origin", origin.encode())]
+        scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": headers}
+        sent = []
+
+        async def receive():
+            return {"type": "http.request"}
+
+        async def send(message):
+            sent.append(message)
+
+        asyncio.run(app(scope, receive, send))
+        return sent[0]["status"], sent[1]["body"].decode()
+
+    found, text = answer(f"http://{asked}")
+    assert found == status
+    assert ("--reached-as" in text) == (status == 403)
+    assert answer("http://other.example")[0] == 403
+
+
+@pytest.mark.parametrize("text", ["http://lab.example", "lab.example/", "", "a b", "lab:port", "[::1"])
+def test_an_address_that_isnt_one_is_refused(capsys, text):
+    for arguments in (["serve"], ["serve", "--robot", "ipr"], ["robot"], ["robot", "--robot", "ipr"]):
+        assert _status([*arguments, "--reached-as", "lab.example", "--reached-as", text]) == 2
+        assert "HOST or HOST:PORT" in capsys.readouterr().err
 
 
 def test_a_token_file_is_made_for_its_owner_alone(tmp_path):
