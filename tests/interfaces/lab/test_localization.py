@@ -191,7 +191,7 @@ def test_the_study_gives_the_same_with_any_number_of_workers(tmp_path: Path) -> 
         (["lab", "nonsense"], "experiment must be"),
         (["lab", "localization", "--runs", "1"], "runs must be"),
         (["lab", "--position", "gps"], "position must be"),
-        (["lab", "localization", "--robot", "ipr"], "options must be without"),
+        (["lab", "localization", "--robot", "ipr"], "options must be left out"),
     ],
 )
 def test_bad_input_is_one_line(wrong: list[str], said: str, tmp_path: Path) -> None:
