@@ -80,8 +80,6 @@ class Stop:
     """And its heading [rad]."""
     lost: float
     """From where it took itself to be to where it was [m]."""
-    lost_turn: float
-    """The same of its heading [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,7 +223,7 @@ class _Play:
         told = self._pilot.posture
         return Stop(
             math.hypot(goal.x - x, goal.y - y), abs(wrapped(goal.heading - theta)),
-            math.hypot(told.x - x, told.y - y), abs(wrapped(told.theta - theta)),
+            math.hypot(told.x - x, told.y - y),
         )  # fmt: skip
 
     def _gap(self) -> float:
