@@ -27,8 +27,8 @@ INDEXES = 512
 _DENSE = 1024
 """Times below one node of height 1 that are worth more than the shortest way."""
 
-_GATHERED = 2048
-"""Times whose coefficients are gathered at once from several nodes, _DENSE or more: 0.4 MB for six joints."""
+_GATHERED = 1024
+"""Times whose coefficients are gathered at once, _DENSE or more: 0.2 MB for six joints, which a cache holds."""
 
 _CELLS = 2
 """Cells of an index a segment."""
@@ -69,14 +69,14 @@ class Stack:
         names, self._class_of = np.unique(classes, return_inverse=True)
         self._place: _Integers = np.empty(len(rows), np.int64)
         self._blocks: list[Array] = []
-        """Coefficients (K, m, n) of each class."""
+        """Coefficients of each class, a segment's together: (m, n, K)."""
         for name in range(len(names)):
             members = np.flatnonzero(self._class_of == name)
             self._place[members] = np.arange(len(members))
             size = 8 * n * max(int(orders[members].max()), QUICK_ORDER)
             joined = b"".join([rows[i].ljust(size, b"\0") for i in members.tolist()])
-            self._blocks.append(np.frombuffer(joined).reshape(len(members), -1, n).swapaxes(0, 1).copy())
-        self.quick = [len(block) for block in self._blocks] == [QUICK_ORDER]
+            self._blocks.append(np.frombuffer(joined).reshape(len(members), -1, n).swapaxes(1, 2).copy())
+        self.quick = [block.shape[2] for block in self._blocks] == [QUICK_ORDER]
         """Whether all polynomials are of QUICK_ORDER, so that `gather` serves."""
 
     def _segments(self, t: Array, offset: float) -> tuple[_Integers, Array]:
@@ -94,12 +94,11 @@ class Stack:
         Args:
             t: Times [s], sorted.
             offset: The node's summed offset [s].
-            terms: Where the coefficients go, (QUICK_ORDER, k, n).
+            terms: Where the coefficients go, (k, n, QUICK_ORDER).
             u: Where the times since each segment's start go [s], (k,).
         """
         index, u[:] = self._segments(t, offset)
-        for block, term in zip(self._blocks[0], terms, strict=True):
-            block.take(index, 0, term, "clip")
+        self._blocks[0].take(index, 0, terms, "clip")
 
     def fill(self, t: Array, offset: float, derivative: int, out: Array) -> None:
         """Write the values at times (k,), none before the first segment, into `out`, (k, n).
@@ -112,14 +111,14 @@ class Stack:
         """
         index, u = self._segments(t, offset)
         if len(self._blocks) == 1:
-            _horner(self._blocks[0], index, u, derivative, out)
+            _fill_from(self._blocks[0], index, u, derivative, out)
             return
         class_of, place = self._class_of.take(index), self._place.take(index)
         for name, block in enumerate(self._blocks):
             chosen = np.flatnonzero(class_of == name)
             if len(chosen):
                 values = np.empty((len(chosen), out.shape[1]))
-                _horner(block, place.take(chosen), u.take(chosen), derivative, values)
+                _fill_from(block, place.take(chosen), u.take(chosen), derivative, values)
                 out[chosen] = values
 
 
@@ -285,11 +284,12 @@ def _fill(
     """Write the values at sorted times that lie in a tree into `out`."""
     count, n = out.shape
     room = min(count, _GATHERED)
-    terms, u = np.empty((QUICK_ORDER, room, n)), np.empty(room)
+    terms, u = np.empty((room, n, QUICK_ORDER)), np.empty(room)
     begin = end = 0
 
     def finish() -> None:
-        _horner(terms[:, : end - begin], None, u[: end - begin], derivative, out[begin:end])
+        powers = terms[: end - begin].reshape(-1, QUICK_ORDER).T
+        _horner(powers.__getitem__, QUICK_ORDER, u[: end - begin], derivative, out[begin:end])
 
     for node, offset, low, high in _nodes_at(root, height, 0.0, t, 0):
         stack = stack_of(node, n, high - low)
@@ -302,7 +302,7 @@ def _fill(
                 finish()
                 begin = low
             end = high
-            stack.gather(t[low:high], offset, terms[:, low - begin : high - begin], u[low - begin : high - begin])
+            stack.gather(t[low:high], offset, terms[low - begin : high - begin], u[low - begin : high - begin])
         else:
             stack.fill(t[low:high], offset, derivative, out[low:high])
     finish()
@@ -363,21 +363,32 @@ def _sorted_into(starts: Array, t: Array) -> _Integers:
     return np.repeat(np.arange(low, high), np.diff([0, *edges, len(t)]))
 
 
-def _horner(block: Array, index: _Integers | None, u: Array, derivative: int, out: Array) -> None:
-    """Horner's rule, the operations of `evaluate` in their order, on rows of a block (K, m, n); None for all."""
-    order, _, n = block.shape
+def _fill_from(block: Array, index: _Integers, u: Array, derivative: int, out: Array) -> None:
+    """Write the values of segments of a block (m, n, K), by their sorted index, into `out`, (k, n)."""
+    first = int(index[0])
+    # Many times a segment: what few segments there are is put so that a power is read at once.
+    powers = block[first : int(index[-1]) + 1].transpose(2, 0, 1).copy()
+    near, room = index - first, np.empty_like(out)
+    _horner(lambda power: powers[power].take(near, 0, room, "clip").reshape(-1), len(powers), u, derivative, out)
+
+
+def _horner(term: Callable[[int], Array], order: int, u: Array, derivative: int, out: Array) -> None:
+    """Horner's rule, the operations of `evaluate` in their order.
+
+    Args:
+        term: Gives the coefficients of a power, (k n,).
+        order: Number of powers.
+        u: Times since the segments' starts [s], (k,).
+        derivative: Order of the time derivative.
+        out: Where the values go, (k, n), rows without gaps.
+    """
     if order <= derivative:
         out[...] = 0.0
         return
-    x = u.repeat(n).reshape(-1, n)
-    if index is None:
-        out[...] = block[order - 1]
-    else:
-        block[order - 1].take(index, 0, out, "clip")
-        room = np.empty_like(out)
+    x, values = u.repeat(out.shape[1]), out.reshape(-1)
+    values[...] = term(order - 1)
     if derivative:
-        out *= math.perm(order - 1, derivative)
+        values *= math.perm(order - 1, derivative)
     for power in range(order - 2, derivative - 1, -1):
-        out *= x
-        term = block[power] if index is None else block[power].take(index, 0, room, "clip")
-        out += term * math.perm(power, derivative) if derivative else term
+        values *= x
+        values += term(power) * math.perm(power, derivative) if derivative else term(power)
