@@ -87,18 +87,19 @@ def integer_in(name: str, value: object, low: int, high: int) -> int:
     return value
 
 
-def one_of(name: str, value: str, words: Iterable[str]) -> str:
+def one_of(name: str, value: str, words: Iterable[str], *more: str) -> str:
     """Return value if it's one of some words.
 
     Args:
         name: What it's called, for the message.
         value: To be checked.
         words: What is allowed.
+        *more: What else is, elsewhere, for the message.
 
     Raises:
         InvalidValueError: If it isn't.
     """
     allowed = tuple(words)
     if value not in allowed:
-        raise InvalidValueError(name, value, f"one of {', '.join(allowed)}")
+        raise InvalidValueError(name, value, f"one of {', '.join((*allowed, *more))}")
     return value

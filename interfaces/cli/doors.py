@@ -76,11 +76,6 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
     return Access(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), free=())
 
 
-def in_url(host: str) -> str:
-    """A host as URLs have it: IPv6 addresses in brackets."""
-    return f"[{host}]" if ":" in host else host
-
-
 def names_of(host: str) -> list[str]:
     """Names by which a server is rightly addressed that listens on a host."""
     if is_loopback(host):

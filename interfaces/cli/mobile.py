@@ -16,7 +16,6 @@ from interfaces.cli.doors import (
     asked_for,
     end_on_signal,
     end_with_input,
-    in_url,
     keep_quiet,
     start_robot,
 )
@@ -152,6 +151,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
     import asyncio
     import contextlib
 
+    from interfaces.link.proxy import Address
     from interfaces.stream import sockets
 
     ended = asyncio.Event()
@@ -187,9 +187,9 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())
         keep_quiet()
-        shown = in_url(host)
-        typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
-        typer.echo(f"vrs: operator station on http://{shown}:{port}/")
+        shown = Address(host, port)
+        typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
+        typer.echo(f"vrs: operator station on http://{shown}/")
         sys.stdout.flush()
         if serving.until_eof:
             end_with_input(ended)
@@ -267,6 +267,7 @@ def run_mobile(
 async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> None:
     """Run until a signal comes, or standard input ends."""
     from interfaces.jobs import POLICY_SAYS
+    from interfaces.link.proxy import Address
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
@@ -280,7 +281,7 @@ async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, unti
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         keep_quiet()
         hasten(1)
-        typer.echo(f"{READY}ws://{in_url(address.host)}:{port}/site (ipr, {robot.config.architecture})")
+        typer.echo(f"{READY}ws://{Address(address.host, port)}/site (ipr, {robot.config.architecture})")
         typer.echo(f"vrs: {POLICY_SAYS[robot.config.jobs.loss]}", err=True)
         sys.stdout.flush()
         if until_eof:

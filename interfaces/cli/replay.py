@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import ReachedAs, TokenFile, access_for, asked_for, end_on_signal, in_url
+from interfaces.cli.doors import ReachedAs, TokenFile, access_for, asked_for, end_on_signal
 from interfaces.cli.options import Host, Port
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
@@ -184,6 +184,7 @@ def _serve(
 ) -> None:
     import asyncio
 
+    from interfaces.link.proxy import Address
     from interfaces.recording.page import ReplayPage
     from interfaces.stream import sockets
     from interfaces.stream.control import Role
@@ -211,9 +212,8 @@ def _serve(
         number = listening.getsockname()[1]
         app = application(page.routes, allowed(number))
         async with sockets.serve(app, listening), page.running():
-            shown = in_url(host)
             names = " and ".join(str(track.recording.path) for track in playback.tracks)
-            typer.echo(f"vrs: playing {names} on http://{shown}:{number}/replay")
+            typer.echo(f"vrs: playing {names} on http://{Address(host, number)}/replay")
             sys.stdout.flush()
             await ended.wait()
 

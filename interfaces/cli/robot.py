@@ -16,7 +16,6 @@ from interfaces.cli.doors import (
     asked_for,
     end_on_signal,
     end_with_input,
-    in_url,
     keep_quiet,
 )
 from interfaces.cli.mobile import (
@@ -188,6 +187,7 @@ def _offset(text: str) -> float | None:
 
 async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
+    from interfaces.link.proxy import Address
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.runtime.priority import hasten
@@ -203,9 +203,8 @@ async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eo
         keep_quiet()
         hasten(1)
         if not robot.ended.is_set():
-            typer.echo(
-                f"{READY}ws://{in_url(address.host)}:{port}/site ({robot.config.model.name}, {robot.config.body})"
-            )
+            here = Address(address.host, port)
+            typer.echo(f"{READY}ws://{here}/site ({robot.config.model.name}, {robot.config.body})")
             sys.stdout.flush()
         if until_eof:
             end_with_input(robot.ended)

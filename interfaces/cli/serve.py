@@ -18,7 +18,6 @@ from interfaces.cli.doors import (
     asked_for,
     end_on_signal,
     end_with_input,
-    in_url,
     keep_quiet,
     start_robot,
 )
@@ -279,6 +278,7 @@ async def _serve(
     import asyncio
     import contextlib
 
+    from interfaces.link.proxy import Address
     from interfaces.stream import sockets
 
     ended = asyncio.Event()
@@ -311,9 +311,9 @@ async def _serve(
         )  # fmt: skip
         operator = LiveOperator(config, access)
         station = Station(described(model, operator.scene.tool))
-        shown = in_url(host)
-        near = shown if shown not in {"0.0.0.0", "[::]"} else "127.0.0.1"  # noqa: S104 - compared
-        val = ServedVal(f"ws://{near}:{port}/ws", doors.own_token, access, doors.val_files, software())
+        shown = Address(host, port)
+        near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
+        val = ServedVal(f"ws://{near}/ws", doors.own_token, access, doors.val_files, software())
         terminals = PageDoor(val.enter).route
         facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
         recordings = Recordings(operator, Shelf(shelved.directory), access, facts)
@@ -325,8 +325,8 @@ async def _serve(
         await stack.enter_async_context(recordings.running())
         await stack.enter_async_context(val.running())
         keep_quiet()
-        typer.echo(f"vrs: serving {model.name} on http://{shown}:{port}/view (programs: ws://{shown}:{port}/ws)")
-        typer.echo(f"vrs: operator station on http://{shown}:{port}/")
+        typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
+        typer.echo(f"vrs: operator station on http://{shown}/")
         if val_listening is not None:
             await stack.enter_async_context(val.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")

@@ -11,6 +11,7 @@ import stat
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
+from interfaces.link.proxy import Address
 from interfaces.stream.control import Role
 from vrs.errors import FormatError, InvalidValueError
 
@@ -144,8 +145,7 @@ def make_tokens(path: Path, random_bytes: Callable[[int], bytes] = secrets.token
 
 def hosts(names: Iterable[str], port: int) -> frozenset[str]:
     """What the Host of a request may be: names and addresses with the port; IPv6 addresses in brackets."""
-    bracketed = (f"[{name}]" if ":" in name else name for name in names)
-    return frozenset(f"{name.lower()}:{port}" for name in bracketed)
+    return frozenset(str(Address(name.lower(), port)) for name in names)
 
 
 def check_host(given: Sequence[str], allowed: frozenset[str]) -> bool:

@@ -18,7 +18,8 @@ import numpy as np
 from interfaces.lab.driving.legs import Goal, Leg, Line, Pause, Turn, point_ahead, share_of, way_left
 from interfaces.plugin import checked, is_own, own
 from robots.onboard.driving import STAND, Drive, Posture
-from vrs.errors import FormatError, InvalidValueError
+from vrs.checks import one_of
+from vrs.errors import FormatError
 from vrs.mobile import clipped, wrapped
 
 SPEED: Final = (0.22, 0.34)
@@ -351,9 +352,7 @@ def operator(name: str, seed: int, period: float) -> Operator:
         checked("operator", name, made, ("start", "room", "drive"))
         return made
     styles = list(STYLES)
-    if name not in {*styles, MIXED}:
-        known = ", ".join([*styles, MIXED])
-        raise InvalidValueError("operator", name, f"one of {known}, inputs:FILE.csv, or MODULE:NAME of your own")
+    one_of("operator", name, [*styles, MIXED], "inputs:FILE.csv", "or MODULE:NAME of your own")
     chosen = MIXTURE[seed % len(MIXTURE)] if name == MIXED else name
     # A seed drives alike, whether the style was named or chosen.
     rng = np.random.default_rng([seed, styles.index(chosen)])

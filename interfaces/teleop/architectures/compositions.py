@@ -17,8 +17,7 @@ from interfaces.teleop.architectures.controllers import (
 )
 from robots.onboard.driving import Posture
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
-from vrs.checks import number_in
-from vrs.errors import InvalidValueError
+from vrs.checks import number_in, one_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +69,7 @@ def architecture(name: str) -> Architecture:
     """
     if is_own(name):
         return own("architecture", name, ("constants", "posture"))
-    if name not in ARCHITECTURES:
-        raise InvalidValueError(
-            "architecture", name, f"one of {', '.join(ARCHITECTURES)}, or MODULE:NAME of your own"
-        )
-    return ARCHITECTURES[name]
+    return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES, "or MODULE:NAME of your own")]
 
 
 def controller(name: str, posture: Posture, constants: Constants) -> Controller:
