@@ -30,6 +30,11 @@ function range({ least, zero = false }, low, high) {
   return [middle - half, middle + half];
 }
 
+/** Of what is due to be drawn, what was drawn longest ago: so nothing waits for ever where all is due always. */
+export function stalest(due) {
+  return due.reduce((oldest, one) => (one.drawn < oldest.drawn ? one : oldest), due[0]);
+}
+
 export class Chart {
   /** @param {object} graph what it shows, see graphs.js */
   constructor(graph) {
@@ -62,8 +67,9 @@ export class Chart {
       keys.length > 1 ? h("ul.plot-key", { "aria-label": `Lines of ${graph.title}` }, ...keys) : null,
       this.area,
     );
-    new IntersectionObserver(([entry]) => {
-      this.visible = entry.isIntersecting;
+    // A busy page tells several changes at once; the last one holds.
+    new IntersectionObserver((changes) => {
+      this.visible = changes.at(-1).isIntersecting;
       this.wanted = true;
     }).observe(this.area);
     new ResizeObserver(() => {

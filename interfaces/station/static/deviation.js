@@ -1,5 +1,5 @@
 // Live plots of a mobile robot: how far the real one is from the path, how much later, and what the network does.
-import { Chart } from "./chart.js";
+import { Chart, stalest } from "./chart.js";
 import { save, textOf } from "./csv.js";
 import { figure, mark, write } from "./dom.js";
 import { Messages } from "./messages.js";
@@ -107,11 +107,11 @@ export function mount(station, box) {
       return;
     }
     if (UPlot instanceof Promise) return;
-    const due = charts.find((chart) => chart.visible && (chart.wanted || at - chart.drawn > period));
-    if (!due) return;
-    if (!due.plot) due.begin(UPlot, colour);
-    due.draw(view);
-    [due.drawn, due.wanted] = [at, false];
+    const chart = stalest(charts.filter((one) => one.visible && (one.wanted || at - one.drawn > period)));
+    if (!chart) return;
+    if (!chart.plot) chart.begin(UPlot, colour);
+    chart.draw(view);
+    [chart.drawn, chart.wanted] = [at, false];
   }, TURN);
 
   function say(view) {

@@ -67,6 +67,8 @@ export function figuresOf({ samples, from, until, paths }) {
 /** A table that is filled while it's open. */
 export class Figures {
   constructor() {
+    this.drawn = -Infinity;
+    this.wanted = true;
     this.body = h("tbody");
     this.caption = h("caption");
     const head = ["Figure", "Value", "Unit"].map((text) => h("th", { scope: "col" }, text));
@@ -77,6 +79,13 @@ export class Figures {
       h("summary", {}, h("span.plot-title", {}, "Figures of this window")),
       this.table,
     );
+    this.element.addEventListener("toggle", () => {
+      this.wanted = true;
+    });
+  }
+
+  get visible() {
+    return this.element.open;
   }
 
   draw(view, title) {

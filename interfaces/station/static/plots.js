@@ -1,5 +1,5 @@
 // Live plots: how far the robots are apart, why, and what the network does.
-import { ACROSS, Chart, swatch } from "./chart.js";
+import { ACROSS, Chart, stalest, swatch } from "./chart.js";
 import { save, textOf } from "./csv.js";
 import { clockText, h, mark, write } from "./dom.js";
 import { Figures } from "./figures.js";
@@ -15,6 +15,8 @@ const SPANS = [
   [600, "10 min", 800, 8000],
 ];
 const TURN = 50;
+/** Time between two countings of the figures [ms]. */
+const COUNTED = 1000;
 /** Drawing takes this share of the time at most. */
 const SHARE = 0.2;
 /** Values older than this aren't the present ones [s]. */
@@ -52,12 +54,11 @@ class Plots {
     this.colour = palette(station, () => this.again());
     this.basis = "timeline";
     this.paths = null;
-    this.compared = this.said = this.spoken = this.counted = -Infinity;
+    this.compared = this.said = this.spoken = -Infinity;
     this.saidAt = null;
     this.comparing = 0;
     this.number = 0;
     this.cost = 0;
-    this.next = 0;
     this.cached = { key: "", events: [] };
     this.build(box);
     station.addEventListener("cursor", () => this.again());
@@ -89,9 +90,6 @@ class Plots {
         ...NOTES.map((text) => h("dd", {}, text)),
       ),
     );
-    this.figures.element.addEventListener("toggle", () => {
-      this.counted = -Infinity;
-    });
   }
 
   choose() {
@@ -101,8 +99,7 @@ class Plots {
   }
 
   again() {
-    this.counted = -Infinity;
-    for (const chart of this.charts) chart.wanted = true;
+    for (const part of [...this.charts, this.figures]) part.wanted = true;
   }
 
   /** What is shown now; null where nothing is known yet. */
@@ -124,7 +121,7 @@ class Plots {
     };
   }
 
-  /** Draw one plot that is due: never two at once. */
+  /** Draw one plot, or the figures, if they're due: never two at once. */
   turn() {
     this.samples.advance();
     if (document.hidden || !this.shown) return;
@@ -139,25 +136,25 @@ class Plots {
     this.compare(view, at);
     const seen = this.charts.filter((chart) => chart.visible);
     const period = Math.max(this.head.span[2], (this.cost * seen.length) / SHARE);
-    const due = seen.filter((chart) => chart.wanted || at - chart.drawn >= period);
-    const chart = due[this.next++ % Math.max(due.length, 1)];
-    if (chart) this.draw(chart, view, at);
-    else if (this.figures.element.open && at - this.counted > 1000) {
-      this.counted = at;
-      this.figures.draw(view, this.title(view));
-    }
+    const due = (part, every) => part.wanted || at - part.drawn >= every;
+    const waiting = seen.filter((chart) => due(chart, period));
+    if (this.figures.visible && due(this.figures, COUNTED)) waiting.push(this.figures);
+    const part = stalest(waiting);
+    if (!part) return;
+    if (part === this.figures) part.draw(view, this.title(view));
+    else this.draw(part, view);
+    [part.drawn, part.wanted] = [at, false];
   }
 
   get shown() {
     return this.station.layout.shown === "plots";
   }
 
-  draw(chart, view, at) {
+  draw(chart, view) {
+    const begun = performance.now();
     if (!chart.plot) chart.begin(this.UPlot, this.colour);
     chart.draw({ ...view, events: this.events(view) });
-    chart.drawn = at;
-    chart.wanted = false;
-    this.cost += 0.2 * (performance.now() - at - this.cost);
+    this.cost += 0.2 * (performance.now() - begun - this.cost);
   }
 
   /** Say how everything stands, also of plots that are folded or out of sight. */

@@ -260,6 +260,47 @@ def test_plots_say_what_they_show_and_look_back(page: Page, tmp_path: Path) -> N
     assert {"tool_timeline_m", "error_user_6_rad", "servo_m"} <= kept[0].keys()
 
 
+def test_all_that_is_seen_is_drawn_in_turn(page: Page) -> None:
+    size, parts = page.page.viewport_size, f"[...{PLOTS}.charts, {PLOTS}.figures]"
+    opened = "document.querySelectorAll('#tab-panels details.plot[id]')"
+    was = page.get(f"[...{opened}].map((one) => one.open)")
+    try:
+        # More plots at once than there are turns for them.
+        page.page.set_viewport_size({"width": 1280, "height": 3200})
+        page.page.evaluate(f"{opened}.forEach((one) => {{ one.open = true; }})")
+        page.wait(f"{parts}.every((part) => part.visible)")
+        for _ in range(2):
+            before = page.get(f"{parts}.map((part) => part.drawn)")
+            page.wait(f"{parts}.every((part, k) => part.drawn > {json.dumps(before)}[k])")
+        assert page.get("document.querySelectorAll('#plot-figures tbody tr').length") > 20
+    finally:
+        page.page.evaluate(f"(was) => {opened}.forEach((one, k) => {{ one.open = was[k]; }})", was)
+        page.page.set_viewport_size(size)
+
+
+SEEN = """async (changes) => {
+    const { Chart } = await import("/station/chart.js");
+    const real = window.IntersectionObserver;
+    let tell;
+    window.IntersectionObserver = class {
+        constructor(told) { tell = told; }
+        observe() {}
+    };
+    try {
+        const chart = new Chart({ name: "of-a-test", title: "", unit: "", open: true, note: "", lines: [] });
+        tell(changes.map((isIntersecting) => ({ isIntersecting })));
+        return chart.visible;
+    } finally {
+        window.IntersectionObserver = real;
+    }
+}"""
+
+
+@pytest.mark.parametrize("changes", [[True], [False], [True, False], [False, True], [True, False, True]])
+def test_of_several_changes_the_last_says_whether_a_plot_is_seen(page: Page, changes: list[bool]) -> None:
+    assert page.page.evaluate(SEEN, changes) is changes[-1]
+
+
 def test_nothing_is_drawn_that_nobody_sees_and_memory_is_bounded(page: Page) -> None:
     page.page.click("#tab-jog")
     page.wait(f"{PLOTS}.charts.every((chart) => !chart.visible)")
