@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,13 @@ class RowBuffer:
         held[0, 2] = 0.0
         return held
 
-    def starts(self, tick: int) -> list[int]:
-        """Where the blocks that begin at this tick, or up to `KEPT` before it, begin: the latest first."""
-        return [block.start for block in reversed(self._blocks) if tick - KEPT <= block.start <= tick]
+    def kept(self, tick: int) -> Iterator[tuple[int, Array]]:
+        """What there is for this tick and up to `KEPT` before it, a block at a time, the latest first.
+
+        Yields:
+            The tick of the first row, and the rows, (k, 3, n), k ≥ 1.
+        """
+        for start, rows in reversed(self._blocks):
+            low, high = max(start, tick - KEPT), min(start + len(rows), tick + 1)
+            if low < high:
+                yield low, rows[low - start : high - start]

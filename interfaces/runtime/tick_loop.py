@@ -4,7 +4,8 @@ A late tick is made good at once, up to `PAUSE`. After a longer pause the missed
 burst. Where the references end in mid-motion, jump or were left out, each joint brakes within its limits from the
 last reference, and the arm holds until the parent has acknowledged that. Where it rests and the first rows of a
 motion come too late, by up to `row_buffer.KEPT` ticks, it begins late, and is on time again when it rests next.
-Where it moves and rows come too late, it goes over onto them within its limits, if it isn't too far from them.
+Where it moves and rows come too late, or rests where none of them do, it goes over onto them within its limits, if
+it isn't too far from them.
 """
 
 from __future__ import annotations
@@ -54,6 +55,8 @@ _TICKS = 2.0
 """A reference may change its speed as much as the limits allow in so many ticks."""
 _PLACED = 0.05
 """How far from where it's measured a joint may be placed [rad], and from where it will be so much later [s]."""
+_HERE = 1e-9
+"""A reference that rests nearer than this to where the arm rests [rad] is there."""
 _SAME = 1e-9
 """Ticks nearer than this to whole numbers are whole."""
 
@@ -239,7 +242,7 @@ class TickLoop:
             raise FormatError("rows", "too many blocks")
         while self._ahead and self._ahead[-1][0] >= message.start:
             self._ahead.pop()
-        self._belated = self._belated or (message.start <= self._last and any(self._at.qd))
+        self._belated = self._belated or message.start <= self._last
         if message.placed:
             self._placing = message.start
         self._acknowledged = message.run
@@ -268,19 +271,25 @@ class TickLoop:
         joint = self._misplaced(step) if placing else self._jump(step)
         if placing:
             self._placing = None
-        if self._belated and not placing:
-            merged = self._merged(step)
-            if merged is not None:
-                return merged
+        else:
+            instead = self._belated_step(k, step, jumps=joint is not None)
+            if instead is not None:
+                return instead
         self._belated = False
         if joint is None:
             return step
-        later = None if placing or any(self._at.qd) else self._depart_later(k)
-        if later is None:
-            way = f"from {self._at.q[joint]:.6g} rad at {self._at.qd[joint]:.4g} rad/s"
-            text = f"joint {joint + 1} would jump {way} to {step.q[joint]:.6g} rad at {step.qd[joint]:.4g} rad/s"
-            self._fail(FaultKind.JUMPED, text, k)
-        return later
+        way = f"from {self._at.q[joint]:.6g} rad at {self._at.qd[joint]:.4g} rad/s"
+        text = f"joint {joint + 1} would jump {way} to {step.q[joint]:.6g} rad at {step.qd[joint]:.4g} rad/s"
+        self._fail(FaultKind.JUMPED, text, k)
+        return None
+
+    def _belated_step(self, k: int, step: _Step, *, jumps: bool) -> _Step | None:
+        """What to do instead of a reference's step as rows came late; None if it's followed, or not at all."""
+        if jumps and not any(self._at.qd):
+            later = self._depart_later(k)
+            if later is not None:
+                return later
+        return self._merged(step) if self._belated else None
 
     def _row(self, tick: int) -> _Step | None:
         """The reference for a tick; None if there's none."""
@@ -297,7 +306,9 @@ class TickLoop:
 
     def _depart_later(self, k: int) -> _Step | None:
         """Begin a motion late whose first rows came too late; None if none begins where the arm rests."""
-        for start in self._buffer.starts(k):
+        for first, rows in self._buffer.kept(k):
+            rests = (np.abs(rows[:, 0] - self._at.q) <= _HERE).all(axis=1) & ~rows[:, 1].any(axis=1)
+            start = first + int(np.flatnonzero(rests)[-1]) if rests.any() else first
             step = self._row(start)
             if step is not None and self._jump(step) is None:
                 self._lag = k - start

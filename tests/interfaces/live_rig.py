@@ -43,16 +43,18 @@ class Rows:
 
     def __init__(self, robot: LiveRobot) -> None:
         self.q: dict[int, Any] = {}
-        feed = robot._feed_rows
+        physics = robot._physics
+        assert physics is not None
+        feed = physics.feed
 
-        def noted(rows: Reference, first: int) -> None:
+        def noted(rows: Reference, first: int, *, placed: bool = False) -> bool:
             for tick in [tick for tick in self.q if tick >= first]:
                 del self.q[tick]
             for k in range(len(rows.q)):
                 self.q[first + k] = np.concatenate([rows.q[k], rows.qd[k]])
-            feed(rows, first)
+            return feed(rows, first, placed=placed)
 
-        robot._feed_rows = noted  # type: ignore[method-assign]
+        physics.feed = noted  # type: ignore[method-assign]
 
     def until(self, tick: int) -> tuple[np.ndarray, np.ndarray]:
         """Ticks from the first to one, and q and qd in each, (k, 12); a gap holds what was before it."""

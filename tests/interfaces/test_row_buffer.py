@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.runtime.row_buffer import RowBuffer
+from interfaces.runtime.row_buffer import KEPT, RowBuffer
 from vrs.model import Array
 
 
@@ -45,3 +45,14 @@ def test_later_rows_count_instead_of_earlier_ones(blocks: list[tuple[int, int, b
             assert 1 <= len(taken) <= 3
             for i, row in enumerate(taken):
                 assert np.array_equal(row, keeper.at(tick + i))  # type: ignore[arg-type]
+        kept = {start + i: row for start, part in buffer.kept(tick) for i, row in enumerate(part)}
+        assert sorted(kept) == [k for k in sorted(keeper.rows) if k <= tick]
+        assert all(np.array_equal(row, keeper.rows[k]) for k, row in kept.items())
+
+
+def test_rows_are_kept_for_a_while_after_their_tick() -> None:
+    buffer = RowBuffer()
+    assert buffer.put(0, np.zeros((2 * KEPT, 3, 1)))
+    assert buffer.put(2 * KEPT, np.zeros((1, 3, 1)))
+    tick = 2 * KEPT + 10
+    assert [(start, len(rows)) for start, rows in buffer.kept(tick)] == [(2 * KEPT, 1), (tick - KEPT, KEPT - 10)]

@@ -361,6 +361,26 @@ def test_a_motion_whose_first_rows_come_late_begins_late_and_is_on_time_after_it
     assert bench.measured[-1].followed == bench.measured[-1].tick
 
 
+@pytest.mark.parametrize("late", [5, 60, 250])
+def test_rows_that_tell_late_of_a_rest_and_of_the_motion_after_it_are_followed_late(late: int) -> None:
+    """The arm went to rest by what it had; then one block tells how it came there, and that it had gone on."""
+    bench, engine = Bench(), Engine(MODEL, q=NOMINAL)
+    engine.execute(MotionCommand(JointTarget(NOMINAL + 0.1), None, 0.05, 1.0))
+    begins = int(engine.timeline.end / TICK) + 30
+    bench.loop.receive(rows(sampled(engine.timeline, 1, begins), 1))
+    engine.execute(MotionCommand(JointTarget(NOMINAL), None, TICK * begins, 1.0))
+    whole = sampled(engine.timeline, 1, begins + 800)
+    bench.run(TICK * (begins + late - 1))
+    bench.loop.receive(rows(Reference(*(part[begins - 151 :] for part in whole)), begins - 150))
+    bench.run(TICK * (begins + 1000))
+    assert bench.faults == []
+    bench.check()
+    moved = [m for m in bench.measured if begins + late < m.tick <= begins + late + 100]
+    assert {m.tick - m.followed for m in moved} == {late}
+    followed = np.array([m.followed for m in moved])
+    np.testing.assert_allclose([m.q_ref for m in moved], whole.q[followed - 1], rtol=0, atol=1e-9)
+
+
 def test_a_motion_that_is_too_late_is_a_jump() -> None:
     assert [fault.kind for fault in late_start(330).faults] == [FaultKind.JUMPED]
 

@@ -15,6 +15,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
+from interfaces.runtime.feeder import Feeder
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.runtime.live.warm import warm
 from interfaces.runtime.physics import (
@@ -22,19 +23,16 @@ from interfaces.runtime.physics import (
     Ended,
     PhysicsConfig,
     PhysicsProcess,
-    References,
     Silent,
 )
 from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, Ready
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached
-from interfaces.teleop import Reference, RobotHost, RobotHostConfig
+from interfaces.teleop import RobotHost, RobotHostConfig
 from interfaces.timer import Turning
 from vrs.clock import WallClock
 from vrs.model import Array, RobotModel
 
-FEED = 0.1
-"""Longest time between two lots of references for the body [s]."""
 _REST = 2.0
 """Longest time to come to rest in the end [s]."""
 
@@ -74,13 +72,11 @@ class LiveRobot:
         self.host = RobotHost(config.model, config.q, now=self.clock.now(), config=config.host, seed=seed)
         self._turning = Turning(self.clock, self._turn)
         self._server = RobotServer(
-            self.host, self.clock, access, attached=self._attached, met=self._turning.soon, heard=self._decide
+            self.host, self.clock, access, attached=self._attached, met=self._decide, heard=self._decide
         )
         self._physics: PhysicsProcess | None = None
-        self._references = References(self.host.reference, now=self._ahead(self.clock.now()))
-        self._fed, self._stale, self._placed = -math.inf, True, False
+        self._feeder: Feeder | None = None
         self._measured: Measurement | None = None
-        self._fault: Fault | None = None
         self.ended = asyncio.Event()
         """Set when the robot can't go on; anybody may set it to end it."""
         self.problem = ""
@@ -106,6 +102,7 @@ class LiveRobot:
         loop = asyncio.get_running_loop()
         with PhysicsProcess(config, self.clock) as physics:
             self._physics = physics
+            self._feeder = Feeder(self.host, physics, now=self.clock.now())
             loop.add_reader(physics.fileno(), self._turning.soon)
             self._turning.start()
             try:
@@ -114,7 +111,7 @@ class LiveRobot:
                 self._turning.stop()
                 loop.remove_reader(physics.fileno())
                 self._server.close()
-                self._physics = None
+                self._physics = self._feeder = None
 
     async def ready(self) -> None:
         """Wait until the body stands and is measured."""
@@ -131,27 +128,24 @@ class LiveRobot:
                     await asyncio.sleep(0.01)
 
     def _turn(self, now: float) -> float:
-        physics = self._physics
+        physics, feeder = self._physics, self._feeder
         assert physics is not None
+        assert feeder is not None
         for event in physics.poll(now=now):
-            self._take(event, now)
-        self._server.send(self.host.advance(now=now))
-        self._place(now)
-        if self._stale or now >= self._fed + FEED:
-            self._feed(now)
-        return min(self.host.next_deadline(), physics.next_deadline(), self._fed + FEED)
+            self._take(event, feeder, now)
+        self._server.send(feeder.advance(now=now))
+        return min(feeder.next_deadline(), physics.next_deadline())
 
-    def _take(self, event: Ready | Measurement | Fault | Silent | Ended, now: float) -> None:
+    def _take(self, event: Ready | Measurement | Fault | Silent | Ended, feeder: Feeder, now: float) -> None:
         """Take in what the body's process said."""
         if isinstance(event, Measurement):
             self._measured = event
             if self.host.measured(np.array(event.q), at=event.followed * TICK, now=now):
-                self._references.restart(now=self._ahead(now))
-                self._stale = self._placed = True
+                feeder.placed(now=now)
             return
         if isinstance(event, Fault):
             self.faults += 1
-            self._fault = event
+            feeder.failed(event)
             self.host.fault(f"the body: {event.text}", np.array(event.rest), now=now)
         elif isinstance(event, Silent):
             self.host.halt("the body's process stands still", now=now)
@@ -159,37 +153,13 @@ class LiveRobot:
             self.host.halt("the body's process has ended", now=now)
             self.problem = f"the body's process ended with status {event.status}"
             self.ended.set()
-        self._stale = True
-
-    def _ahead(self, now: float) -> float:
-        """For when of the body's time is decided at now [s]."""
-        return now + self.config.host.lead
+        feeder.decided()
 
     def _decide(self) -> None:
         """Something is decided: let the body have it soon."""
-        self._stale = True
+        if self._feeder is not None:
+            self._feeder.decided()
         self._turning.soon()
-
-    def _place(self, now: float) -> None:
-        """Once the body rests after a fault, let references count again: they begin where it rests."""
-        physics, fault = self._physics, self._fault
-        if physics is None or fault is None or now < fault.rest_tick * TICK:
-            return
-        physics.acknowledge(fault)
-        self._references.restart(now=self._ahead(now))
-        self._fault, self._stale = None, True
-
-    def _feed(self, now: float) -> None:
-        """Give the body its references, from where it has them for certain."""
-        if self._physics is not None and self._fault is None:
-            first, rows = self._references.take(now=self._ahead(now))
-            self._feed_rows(rows, first)
-            self._placed = False
-        self._fed, self._stale = now, False
-
-    def _feed_rows(self, rows: Reference, first: int) -> None:
-        assert self._physics is not None
-        self._physics.feed(rows, first, placed=self._placed)
 
     def _attached(self) -> Attached:
         site = self.config.host.site
