@@ -297,9 +297,6 @@ class MemoryCommandDevice(Device):
             InvalidValueError: If it's too long.
             FullError: If too many wait.
         """
-        most = self._middleware.layout.longest_data(self._index)
-        if len(data) > most:
-            raise InvalidValueError(self.name, f"{len(data)} bytes", f"{most} bytes at most")
         with self._middleware.changed:
             deadline = self._middleware.clock.now() + finite("timeout", timeout, "finite seconds")
             return Receipt(self, self._middleware.core.store(self._index, data, deadline=deadline))

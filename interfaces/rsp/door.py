@@ -17,7 +17,7 @@ RATE: Final = 100.0
 """Requests for a session that are looked at [1/s]."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Claim:
     """A session and whose it is."""
 
@@ -61,7 +61,7 @@ class Door:
         self._cookies = Cookies(random_bytes(32))
         self._allowed, self._since = RATE, 0.0
         self.pending: Claim | None = None
-        """A session that was given, and in which nothing came yet."""
+        """A session that was given, and in which nothing came yet; whoever asks next has it instead."""
 
     def opened(
         self, head: Header, data: bytes, address: bytes, heard: float | None, *, now: float
@@ -101,10 +101,13 @@ class Door:
         refusal = self._refusal(asked, heard, now)
         if refusal is not None:
             return answer(Type.REFUSED, handshake.encode_refused(asked.nonce, refusal))
-        claim = self.pending
+        claim, over = self.pending, []
         if claim is None or claim.nonce != asked.nonce or claim.address != address:
+            if claim is not None and claim.address != address:
+                over = [(claim.session.make(Type.ENDED, b"", now), claim.address)]
             claim = self.pending = self._claim(asked, address, head.stamp)
-        return answer(Type.OPENED, handshake.encode_answer(Answer(claim.nonce, claim.given)), claim.session.id)
+        given = handshake.encode_answer(Answer(claim.nonce, claim.given))
+        return [*over, *answer(Type.OPENED, given, claim.session.id)]
 
     def _refusal(self, asked: handshake.Open, heard: float | None, now: float) -> Refusal | None:
         if heard is None or now - heard >= self._idle:

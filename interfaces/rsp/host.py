@@ -9,13 +9,14 @@ from __future__ import annotations
 from typing import Final, Protocol
 
 from interfaces.rsp.model.elements import Command, Effector, Event, MemoryCommand, Scalar, Sensor
+from interfaces.rsp.motion_filter import Values
 from interfaces.rsp.outputs import Cleared, Commanded, Stored
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.session import SLACK
-from robots.cubo.parameters import FRAGMENT_TIME
 from vrs.checks import number_in
 
-Values = tuple[float, ...]
+FRAGMENT_TIME: Final = 0.02
+"""How long a fragment of sound is played [s]."""
 MOST_BEHIND: Final = 0.25
 """How much the body makes up for at most when its host was late [s]; the rest of the time it stood still."""
 
@@ -77,6 +78,8 @@ class RobotHost:
         for index, element in enumerate(self.model):
             if isinstance(element, Event):
                 self._events.setdefault(element.binding, []).append((index, element))
+            elif isinstance(element, Effector) and element.initial and not element.stream:
+                self._move(element, (element.initial,) * element.count)
         self._measure()
 
     @property
@@ -90,8 +93,10 @@ class RobotHost:
 
     def advance(self, *, now: float) -> None:
         """Let the body live up to now [s]."""
-        if now - self._next > MOST_BEHIND:
-            self._next = now - MOST_BEHIND
+        lost = now - MOST_BEHIND - self._next
+        if lost > 0:
+            self._next += lost
+            self._sound += lost
         while self._next <= now + SLACK:
             self._look(self._next)
             self.body.go_on(self._steps)
@@ -103,8 +108,7 @@ class RobotHost:
         for index, values in self.core.effectors(now=now).items():
             element = self.model.elements[index]
             assert isinstance(element, Effector)
-            if element.binding in self._moves:
-                self.body.move(element.binding, tuple(element.scale * value for value in values))
+            self._move(element, values)
         if self.core.stopping and self.body.resting:
             self.core.rested()
         for output in self.core.take():
@@ -125,6 +129,10 @@ class RobotHost:
         for binding in self.body.events():
             for index, event in self._events.get(binding, ()):
                 self.core.occur(index, packed(event, (1.0,) * event.count))
+
+    def _move(self, element: Effector, values: Values) -> None:
+        if element.binding in self._moves:
+            self.body.move(element.binding, tuple(element.scale * value for value in values))
 
     def _command(self, index: int, payload: bytes) -> None:
         element = self.model.elements[index]

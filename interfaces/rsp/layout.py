@@ -26,6 +26,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from interfaces.rsp.errors import PacketError
+from interfaces.rsp.header import LONGEST, SIZE
 from interfaces.rsp.model.elements import (
     Command,
     Effector,
@@ -38,14 +39,18 @@ from interfaces.rsp.model.elements import (
     Sensor,
 )
 from interfaces.rsp.model.robot_model import RobotModel
+from interfaces.rsp.security import OVERHEAD
+from vrs.errors import InvalidValueError
 
 ID: Final = struct.Struct("!H")
 STORED: Final = struct.Struct("!HH")
 """ID and length of what's stored."""
 FRAGMENT: Final = struct.Struct("!IH")
 """Number and length of a fragment."""
-_MOST_PLANS: Final = 1024
-"""Maps whose plans are kept: a stranger's maps mustn't fill the memory."""
+_MOST: Final = LONGEST - SIZE - OVERHEAD
+"""Longest body that UDP carries, sealed or not [byte]."""
+_MOST_PLANNED: Final = 16_384
+"""Payloads whose places are kept, of all maps: a stranger's maps mustn't fill the memory."""
 
 
 class Way(enum.IntEnum):
@@ -95,6 +100,8 @@ class Layout:
         self._plans: tuple[dict[int, tuple[tuple[int, int, int], ...] | None], ...] = ({}, {})
         self.longest = tuple(self._longest(way) for way in Way)
         """Longest body, by way [byte]."""
+        self.room = tuple(self._room(way) for way in Way)
+        """For memory items in a packet, by way [byte]: what's left beside all values, but always for one."""
 
     def _longest(self, way: Way) -> int:
         total = self.map_size
@@ -102,11 +109,31 @@ class Layout:
             total += STORED.size + self.longest_data(index) if size == -1 else size or 0
         return total
 
+    def _room(self, way: Way) -> int:
+        sizes = zip(self.model, self.sizes[way], strict=True)
+        values = sum(size or 0 for element, size in sizes if size != -1 and not getattr(element, "stream", 0))
+        items = [STORED.size + self.longest_data(k) for k, size in enumerate(self.sizes[way]) if size == -1]
+        return max([_MOST - self.map_size - values, *items])
+
+    def left(self, payloads: Mapping[int, bytes]) -> int:
+        """What payloads leave of a packet [byte]."""
+        return _MOST - self.map_size - sum(map(len, payloads.values()))
+
     def longest_data(self, index: int) -> int:
         """Most bytes of data of a memory command or a memory event."""
         element = self.model.elements[index]
         assert isinstance(element, MemoryCommand | MemoryEvent)
         return element.size
+
+    def check_data(self, index: int, data: bytes) -> None:
+        """Refuse data that a memory command or a memory event can't hold.
+
+        Raises:
+            InvalidValueError: If it's too long.
+        """
+        most = self.longest_data(index)
+        if len(data) > most:
+            raise InvalidValueError(self.model.elements[index].name, f"{len(data)} bytes", f"{most} bytes at most")
 
     def join(self, payloads: Mapping[int, bytes]) -> bytes:
         """The body of a packet: the map and the payloads, by element; they're trusted to be of their sizes."""
@@ -136,7 +163,7 @@ class Layout:
             plan = plans[bits]
         else:
             plan = self._plan(bits, way)
-            if len(plans) >= _MOST_PLANS:
+            if len(plans) >= _MOST_PLANNED // self.count:
                 plans.clear()
             plans[bits] = plan
         if plan is None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
@@ -17,30 +16,21 @@ from interfaces.rsp.errors import PacketError, RspError
 from interfaces.rsp.handshake import Open
 from interfaces.rsp.header import Header, Type
 from interfaces.rsp.layout import ID, Layout, Way
-from interfaces.rsp.model.elements import (
-    Effector,
-    Event,
-    MemoryCommand,
-    MemoryEvent,
-    Module,
-    Monitor,
-    Sensor,
-)
+from interfaces.rsp.model.elements import Effector, Event, MemoryCommand, MemoryEvent
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.numbers import MODULUS
 from interfaces.rsp.outbox import CommandOutbox, MemoryInbox, MemoryOutbox, Outcome, Settled
 from interfaces.rsp.outputs import Began, Ended, EndReason, LocalOutput, Occurred, Refused, Stored, Told
 from interfaces.rsp.period import PeriodConfig, PeriodControl
+from interfaces.rsp.round_trip import RoundTrip
 from interfaces.rsp.security import TAG, Keyring, Opener, Rank, Sealer
 from interfaces.rsp.session import SLACK, Drop, Dropped, Session, milliseconds
 from interfaces.rsp.streams import StreamOutbox
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
-_ASKED: Final = (Sensor, Monitor, Event, Module)
-"""Kinds that are requested by their bit alone."""
-_MOST_TIMES: Final = 4096
-"""Packets whose round trip may still be measured."""
+MOST_PATIENCE: Final = 600.0
+"""Most of a local system's patience [s]."""
 
 
 class State(enum.StrEnum):
@@ -61,7 +51,7 @@ class LocalConfig:
     retry: float = 0.25
     """How often it asks for a session, or for its end [s], in [0.01, 10]."""
     patience: float = 5.0
-    """After so long it gives up asking [s], in [0.1, 600]."""
+    """After so long without an answer it gives up asking [s], in [0.1, 600]."""
     lifetime: float = 60.0
     """A session in which nothing came for so long is lost [s], in [1, 120]: numbers mustn't go round in a
     silence."""
@@ -71,7 +61,8 @@ class LocalConfig:
 
     def __post_init__(self) -> None:
         for name, low, high in (
-            ("retry", 0.01, 10.0), ("patience", 0.1, 600.0), ("lifetime", 1.0, 120.0), ("timeout", 1e-3, 10.0),
+            ("retry", 0.01, 10.0), ("patience", 0.1, MOST_PATIENCE), ("lifetime", 1.0, 120.0),
+            ("timeout", 1e-3, 10.0),
         ):  # fmt: skip
             number_in(name, getattr(self, name), low, high, unit=" s")
 
@@ -131,14 +122,18 @@ class LocalCore:
         self._reset()
 
     def _reset(self) -> None:
-        self._commands, self._memory, self._inbox = CommandOutbox(), MemoryOutbox(), MemoryInbox()
+        self._commands, self._inbox = CommandOutbox(), MemoryInbox()
+        self._memory = MemoryOutbox(self.layout.room[Way.DOWN])
         self._written: dict[int, _Written] = {}
         self._events: dict[int, int] = {}
-        self._times: deque[tuple[int, float]] = deque(maxlen=_MOST_TIMES)
+        self._round_trip = RoundTrip()
         self._clears = 0
-        self.round_trip: float | None = None
-        """Smoothed, the robot's own period included [s]; None before the first."""
         self.streams = StreamOutbox(self.model.buffers)
+
+    @property
+    def round_trip(self) -> float | None:
+        """Smoothed, the robot's own period included [s]; None before the first."""
+        return self._round_trip.smoothed
 
     # What the simulacrum is told.
 
@@ -192,8 +187,10 @@ class LocalCore:
         """Give a memory command that must be settled by a time [s]; returns its ID.
 
         Raises:
+            InvalidValueError: If the data is too long.
             FullError: If too many wait.
         """
+        self.layout.check_data(index, data)
         return self._memory.put(index, data, deadline)
 
     def play(self, index: int, data: bytes) -> None:
@@ -265,8 +262,8 @@ class LocalCore:
         self._commands.fill(payloads, number)
         self._memory.fill(payloads, now=now, timeout=max(self._config.timeout, 2 * (self.round_trip or 0.0)))
         self._inbox.fill(payloads, number)
-        self.streams.fill(payloads, number)
-        self._times.append((number, now))
+        self.streams.fill(payloads, number, self.layout.left(payloads))
+        self._round_trip.sent(number, now)
         return session.make(Type.DOWN, self.layout.join(payloads), now, self._clears)
 
     def _receive(self, data: bytes, now: float) -> None:
@@ -300,14 +297,18 @@ class LocalCore:
             raise Dropped(Drop.AUTHENTICATION)
         if head.type is Type.REFUSED:
             nonce, refusal = handshake.decode_refused(body)
-            if nonce == self._asked.nonce:
-                self._outputs.append(Refused(refusal))
-                self.state, self._session = State.CLOSED, None
+            if nonce != self._asked.nonce:
+                raise Dropped(Drop.SESSION)
+            self._outputs.append(Refused(refusal))
+            self.state, self._session = State.CLOSED, None
             return
         answer = handshake.decode_answer(body)
         if answer.nonce != self._asked.nonce:
             raise Dropped(Drop.SESSION)
         if head.type is Type.CHALLENGE:
+            if self._asked.cookie == handshake.NO_COOKIE:
+                # Somebody is there: the second round trip has as much time as the first.
+                self._until = now + self._config.patience
             if self._asked.cookie != answer.given:
                 self._asked, self._next = self._asked._replace(cookie=answer.given), now
             return
@@ -327,12 +328,9 @@ class LocalCore:
         for written in self._written.values():
             if not written.known and 0 <= written.first <= last:
                 written.known = True
-        while self._times and self._times[0][0] <= last:
-            number, sent = self._times.popleft()
-            if number == last:
-                seconds = now - sent
-                self.round_trip = seconds if self.round_trip is None else 0.875 * self.round_trip + 0.125 * seconds
-                self.period.round_trip(seconds, now=now)
+        seconds = self._round_trip.acknowledged(last, now)
+        if seconds is not None:
+            self.period.round_trip(seconds, now=now)
 
     def _told(self, payloads: dict[int, bytes]) -> None:
         stored = []

@@ -42,7 +42,7 @@ class Middleware:
         self.ended: EndReason | None = None
         """Why the last session ended."""
         self._told: dict[int, tuple[int, bytes]] = {}
-        """Newest payload of sensors and monitors, and how many came."""
+        """How often what sensors and monitors say has changed, as the robot repeats it; and the newest payload."""
         self._came: dict[int, deque[bytes]] = {}
         self._listeners: dict[int, list[Callable[[bytes], None]]] = {}
         self._outcomes: dict[tuple[int, int], Outcome] = {}
@@ -75,7 +75,7 @@ class Middleware:
         return self.core.state is State.OPEN
 
     def payload(self, index: int) -> tuple[int, bytes | None]:
-        """How often a sensor or monitor spoke, and what it said last."""
+        """How often what a sensor or monitor says has changed, and what it said last."""
         with self.changed:
             return self._told.get(index, (0, None))
 
@@ -106,7 +106,8 @@ class Middleware:
         """Keep what happened; returns the listeners to be called, with what."""
         match output:
             case Told(index=index, payload=payload):
-                self._told[index] = self._told.get(index, (0, b""))[0] + 1, payload
+                count, before = self._told.get(index, (0, None))
+                self._told[index] = count + (payload != before), payload
             case Occurred(index=index, payload=payload) | Stored(index=index, data=payload):
                 self._came.setdefault(index, deque(maxlen=_MOST_KEPT)).append(payload)
             case Settled(index=index, id=number, outcome=outcome):

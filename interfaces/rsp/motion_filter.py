@@ -114,14 +114,15 @@ class MotionFilter:
         """Take the effectors' values of a packet.
 
         Args:
-            stamp: When it was made, on the sender's clock [s]; not before the last one's.
+            stamp: When it was made, on the sender's clock [s]; one before the last one's counts as that, so that
+                whoever sets his clock back is followed all the same.
             told: Values by effector; of the others nothing changed.
             now: When it came, on the robot's clock [s].
             fresh: Whether it was sent when it was made: what is repeated says nothing of the link.
         """
+        stamp = max(stamp, math.nextafter(self._newest, math.inf))
         if fresh:
             self._fastest.add(now - stamp, now)
-        stamp = max(stamp, math.nextafter(self._newest, math.inf))
         for index, track in self._tracks.items():
             values = told.get(index)
             if values is not None:

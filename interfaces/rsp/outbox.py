@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from interfaces.rsp.errors import FullError
+from interfaces.rsp.header import LONGEST
 from interfaces.rsp.layout import ID, STORED
 from interfaces.rsp.numbers import MODULUS, up_to
 
@@ -110,8 +111,13 @@ class MemoryOutbox:
     What follows a flight waits until all of it is acknowledged or given up, so that nothing can come out of order.
     """
 
-    def __init__(self) -> None:
-        """Begin empty."""
+    def __init__(self, room: int = LONGEST) -> None:
+        """Begin empty.
+
+        Args:
+            room: For a flight in a packet [byte]; for one item at least.
+        """
+        self._room = room
         self._waiting: deque[_Item] = deque()
         self._flight: list[_Item] = []
         self._next = 0
@@ -145,9 +151,11 @@ class MemoryOutbox:
         """
         if not self._flight:
             taken: set[int] = set()
-            while self._waiting and self._waiting[0].index not in taken:
+            room = self._room
+            while self._waiting and self._waiting[0].index not in taken and len(self._waiting[0].payload) <= room:
                 item = self._waiting.popleft()
                 taken.add(item.index)
+                room -= len(item.payload)
                 self._flight.append(item)
             self._due, self._tries = now, 0
         if self._flight and now >= self._due:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
 
 from interfaces.rsp import header
 from interfaces.rsp.door import Claim, Door
@@ -21,19 +20,19 @@ from interfaces.rsp.model.elements import (
     MemoryCommand,
     MemoryEvent,
     OnLoss,
+    Scalar,
 )
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig, Values
-from interfaces.rsp.numbers import HALF, unwrapped
+from interfaces.rsp.numbers import HALF, STAMPS, unwrapped
 from interfaces.rsp.outbox import MemoryInbox, MemoryOutbox
 from interfaces.rsp.outputs import Began, Cleared, Commanded, Ended, EndReason, Found, Lost, RobotOutput, Stored
+from interfaces.rsp.round_trip import RoundTrip
 from interfaces.rsp.security import Keyring
 from interfaces.rsp.session import SLACK, Drop, Dropped
 from interfaces.rsp.streams import StreamInbox
 from interfaces.rsp.telling import Telling
 from vrs.checks import number_in
-
-_STAMPS: Final = 1 << 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,8 @@ class RobotConfig:
     repeats: int = 3
     """Packets that tell of an event, 1 to 100: nobody acknowledges it."""
     timeout: float = 0.1
-    """After so long without an acknowledgement a memory event is sent again [s], in [0.001, 10]."""
+    """Least time before a memory event is sent again [s], in [0.001, 10]; twice the round trip where that's
+    more."""
     takeover: bool = True
     """Whether anybody may take over by force where there are no keys; with keys only an admin may."""
     filter: MotionFilterConfig = field(default_factory=MotionFilterConfig)
@@ -95,8 +95,12 @@ class RobotCore:
         self.motion = MotionFilter(model, self._config.filter)
         self.streams = StreamInbox(model.buffers)
         self._formats = {i: e.format for i, e in enumerate(model) if isinstance(e, Effector) and not e.stream}
+        self._limits = {i: e.wire_limits for i, e in enumerate(model) if isinstance(e, Effector)}
+        self._floats = {i: e for i, e in enumerate(model) if isinstance(e, Command) and e.type is Scalar.F32}
         self._outputs: list[RobotOutput] = []
         self._claim: Claim | None = None
+        self._over: Claim | None = None
+        """The last session that ended: whoever didn't hear that asks again."""
         self._stopping = False
         self._telling = Telling(model, self._config.repeats)
         self._answers: list[tuple[bytes, bytes]] = []
@@ -115,7 +119,8 @@ class RobotCore:
                 self.motion.set(index, values)
         self._changed |= {index for index in self._formats if self.motion.given(index) != given[index]}
         self._command = -1
-        self._inbox, self._memory = MemoryInbox(), MemoryOutbox()
+        self._inbox, self._round_trip = MemoryInbox(), RoundTrip()
+        self._memory = MemoryOutbox(self.layout.room[Way.UP])
         self._telling.reset()
         self._clears = 0
         self._told: dict[int, Values] = {}
@@ -151,8 +156,10 @@ class RobotCore:
         """Tell a memory event, to be settled by a time [s]; returns its ID.
 
         Raises:
+            InvalidValueError: If the data is too long.
             FullError: If too many wait.
         """
+        self.layout.check_data(index, data)
         return self._memory.put(index, data, deadline)
 
     def rested(self) -> None:
@@ -215,26 +222,34 @@ class RobotCore:
             return
         if head.type not in (Type.DOWN, Type.END):
             raise Dropped(Drop.UNEXPECTED)
-        claim = self._claim
-        if claim is None or not claim.fits(head, address):
-            claim = self._door.pending
-            if claim is None or not claim.fits(head, address):
-                raise Dropped(Drop.SESSION)
+        claim = self._claim_of(head, address)
         body, number = claim.session.take(head, data)
-        if claim is not self._claim:
+        if claim not in (self._claim, self._over):
             self._begin(claim, now)
-        if self._stopping:
+        if self._stopping and claim is self._claim:
             raise Dropped(Drop.STOPPING)
         if head.type is Type.END:
             claim.session.newest = number
             self._answers.append((claim.session.make(Type.ENDED, b"", now), claim.address))
-            self._end(EndReason.CLOSED, now)
+            if claim is self._claim:
+                self._end(EndReason.CLOSED, now)
             return
         payloads = self.layout.split(body, Way.DOWN)
         told = self._values(payloads)
         before, claim.session.newest = claim.session.newest, number
         self._paced(head, number - before)
         self._carry_out(claim, head, payloads, told, now)
+
+    def _claim_of(self, head: Header, address: bytes) -> Claim:
+        """Whose packet it may be: of the session in force, of one that was given, or the end of the last one again.
+
+        Raises:
+            Dropped: If it's nobody's.
+        """
+        for claim in (self._claim, self._door.pending, self._over if head.type is Type.END else None):
+            if claim is not None and claim.fits(head, address):
+                return claim
+        raise Dropped(Drop.SESSION)
 
     def _begin(self, claim: Claim, now: float) -> None:
         """A session proved to be there: it's in force, and an older one is over."""
@@ -251,32 +266,35 @@ class RobotCore:
     def _end(self, reason: EndReason, now: float) -> None:
         assert self._claim is not None
         self._outputs += [*self._memory.drain(), Ended(self._claim.session.id, reason), Cleared()]
-        self._claim = None
+        self._over, self._claim = self._claim, None
         self._reset(now)
 
     def _values(self, payloads: Mapping[int, bytes]) -> dict[int, Values]:
         """The effectors' values of a packet.
 
         Raises:
-            PacketError: If one isn't finite or within the effector's limits; nothing of the packet counts then.
+            PacketError: If one isn't finite or within the effector's limits, or a command's isn't finite; nothing
+                of the packet counts then.
         """
         told = {}
         for index, payload in payloads.items():
             shape = self._formats.get(index)
             if shape is not None:
-                values = shape.unpack(payload)
-                element = self.model.elements[index]
-                assert isinstance(element, Effector)
-                if not all(element.low <= value <= element.high for value in values):
-                    raise PacketError(f"values of {element.name} beyond its limits")
+                values, (low, high) = shape.unpack(payload), self._limits[index]
+                if not all(low <= value <= high for value in values):
+                    raise PacketError(f"values of {self.model.elements[index].name} beyond its limits")
                 told[index] = values
+            elif index in self._floats:
+                command = self._floats[index]
+                if not all(map(math.isfinite, command.format.unpack_from(payload, ID.size))):
+                    raise PacketError(f"values of {command.name} that aren't finite")
         return told
 
     def _paced(self, head: Header, ahead: int) -> None:
         """Keep to the local system's T: what its stamps are apart."""
         stamp = head.stamp
         if self._stamp is not None and 0 < ahead < HALF:
-            T = 1e-3 * ((stamp - self._stamp) % _STAMPS) / ahead
+            T = 1e-3 * ((stamp - self._stamp) % STAMPS) / ahead
             self._T += 0.25 * (min(max(T, 1e-3), self._config.longest) - self._T)
         self._stamp = stamp
 
@@ -285,15 +303,16 @@ class RobotCore:
     ) -> None:
         self._heard = now
         if self._lost:
-            self._find()
+            self._find(told)
         last = claim.session.acknowledged(head)
         self._inbox.heard(last)
         self._telling.heard(last)
+        self._round_trip.acknowledged(last, now)
         if head.buffers != self._clears:
             self._clears = head.buffers
             self.streams.clear()
             self._outputs.append(Cleared())
-        claim.stamp = unwrapped_stamp(head.stamp, claim.stamp)
+        claim.stamp = unwrapped(head.stamp, claim.stamp, STAMPS)
         self.motion.receive(1e-3 * claim.stamp, told, now=now)
         self._told |= told
         commands, stored, asked = [], [], set()
@@ -329,8 +348,11 @@ class RobotCore:
         number = claim.session.number
         payloads: dict[int, bytes] = {}
         self._telling.fill(payloads, number)
-        self._memory.fill(payloads, now=now, timeout=self._config.timeout)
+        self._memory.fill(
+            payloads, now=now, timeout=max(self._config.timeout, 2 * (self._round_trip.smoothed or 0.0))
+        )
         self._inbox.fill(payloads, number)
+        self._round_trip.sent(number, now)
         return claim.session.make(Type.UP, self.layout.join(payloads), now, min(self.streams.free, 255))
 
     def _watch(self, now: float) -> None:
@@ -350,11 +372,11 @@ class RobotCore:
                     self._changed.add(index)
             self._outputs.append(Lost())
 
-    def _find(self) -> None:
-        """Go on with what was told last: the local system takes it as known."""
+    def _find(self, told: Mapping[int, Values]) -> None:
+        """Go on with what was told last: the local system takes it as known; but for what is told anew."""
         self._lost = False
         for index, values in self._told.items():
-            if self._rests(index):
+            if self._rests(index) and index not in told:
                 self.motion.set(index, values)
                 self._changed.add(index)
         self._outputs.append(Found())
@@ -371,9 +393,3 @@ class RobotCore:
             values = self.motion.given(index)
             whole = effector.type.value[0] != "f"
             self.measure(watching, effector.format.pack(*(int(v) if whole else v for v in values)))
-
-
-def unwrapped_stamp(stamp: int, near: int) -> int:
-    """The time [ms] nearest to another one that has a stamp of 32 bits."""
-    ahead = (stamp - near) % _STAMPS
-    return near + ahead if ahead < _STAMPS // 2 else near + ahead - _STAMPS

@@ -52,14 +52,23 @@ class StreamOutbox:
             self._numbers[index] = number + 1
             queue.append(FRAGMENT.pack(number & 0xFFFFFFFF, len(piece)) + piece.ljust(size, b"\0"))
 
-    def fill(self, payloads: dict[int, bytes], packet: int) -> None:
-        """Add a fragment of each stream that has one to a packet, streams taking turns at the first buffer."""
+    def fill(self, payloads: dict[int, bytes], packet: int, room: int) -> None:
+        """Add a fragment of each stream that has one to a packet, streams taking turns at the first buffer.
+
+        Args:
+            payloads: Of the packet, by element.
+            packet: Its number.
+            room: What they leave of it [byte].
+        """
         waiting = [index for index, queue in self._queues.items() if queue]
         self._turn += 1
         for k in range(len(waiting)):
             if not self.credit:
                 return
             index = waiting[(self._turn + k) % len(waiting)]
+            room -= len(self._queues[index][0])
+            if room < 0:
+                return
             payloads[index] = self._queues[index].popleft()
             self._sent.append(packet)
 

@@ -35,7 +35,7 @@ reach where nothing is; 1 if something is touched; ω [rad/s]; [V]; rim speeds r
 EVENTS: Final = ("bumper", *(f"button.{name}" for name in BUTTONS))
 """Bindings of events; each has the value 1."""
 COMMANDS: Final = ("ir", "say", "stop")
-"""Bindings of commands: the infrared remote control sends a code, a phrase is said, arms and wheels stop."""
+"""Bindings of commands: the infrared remote control sends a code, a phrase is said, arms, head and wheels stop."""
 _LIMBS: Final = {"arm.right": 0, "arm.left": 1, "tilt": 2}
 _MOST_KEPT: Final = 256
 """Of what was said, sent and played."""
@@ -111,6 +111,8 @@ class CuboBody(MobileBody):
         self.done.append((self.time, binding, values))
         if binding == "stop":
             self._rims = [0.0, 0.0]
+            for number, angle in enumerate(self.angles()):
+                self._swing(p.CUBO.limbs[number], number, (angle,))
 
     def sound(self, data: bytes | None) -> None:
         """Play a fragment of sound, or silence where there's none."""

@@ -47,8 +47,6 @@ CAPACITY: Final = 80_000.0
 """Of the battery [J]: 11 V, 2 Ah."""
 IDLE_POWER: Final = 6.0
 """What processor, radio and screen take [W]."""
-FRAGMENT_TIME: Final = 0.02
-"""How long a fragment of sound is played [s]."""
 
 
 def _arm(name: str, side: int) -> Limb:

@@ -42,11 +42,12 @@ def camel(name: str) -> str:
 
 
 def class_names(model: RobotModel) -> dict[str, str]:
-    """Names of the classes of a model's elements, each once."""
+    """Names of the classes of a model's elements, each once, and none the robot's own."""
     found: dict[str, str] = {}
     for index, element in enumerate(model):
         name = camel(element.name) + SUFFIXES[type(element)]
-        found[element.name] = f"{name}{index}" if name in found.values() else name
+        taken = name == camel(model.name) or name in found.values()
+        found[element.name] = f"{name}{index}" if taken else name
     return found
 
 

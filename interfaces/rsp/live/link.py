@@ -63,7 +63,7 @@ class UdpLink:
         if self.middleware.core.state is not State.OPEN:
             refused = self.middleware.refused
             self.close()
-            raise NoSessionError("no answer" if refused is None else refused.name.lower())
+            raise DeadlineError("a session", timeout) if refused is None else NoSessionError(refused.name.lower())
         return self
 
     def close(self) -> None:

@@ -168,6 +168,14 @@ class Effector(_Valued):
         _word(self, "filling", Filling)
         _word(self, "on_loss", OnLoss)
 
+    @property
+    def wire_limits(self) -> tuple[float, float]:
+        """`low` and `high` as they come over the wire: of f32 the values nearest to them, maybe beyond."""
+        if self.type is not Scalar.F32:
+            return self.low, self.high
+        low, high = struct.unpack("!2f", struct.pack("!2f", self.low, self.high))
+        return low, high
+
 
 def _limit(what: str, element: Effector, value: float) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):

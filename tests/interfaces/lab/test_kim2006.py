@@ -112,6 +112,11 @@ def followed(error: float, cells: int) -> Followed:
     return Followed(error, error, 1.0, 0.1, 0.1, 0, 1.0, 1.0, distance, np.arange(cells), way, way)
 
 
+def test_the_error_until_a_cell_is_the_mean_up_to_where_it_was_reached() -> None:
+    rising = followed(0.0, 10)._replace(distance=np.arange(100.0), arrivals=10 * np.arange(10))
+    assert [rising.error_until(cells) for cells in (1, 2, 10, 99)] == [0.0, 5.0, 45.0, 45.0]
+
+
 def test_the_verdict_is_the_paired_intervals() -> None:
     assert Pair((0.01, 0.011), (0.02, 0.021)).verdict == "rsp"
     assert Pair((0.02, 0.021), (0.01, 0.011)).verdict == "other"

@@ -11,6 +11,7 @@ from interfaces.rsp.model import RobotModel
 from interfaces.rsp.outbox import Outcome, Settled
 from interfaces.rsp.outputs import Commanded, Lost, Occurred, Stored
 from interfaces.rsp.robot import RobotCore
+from interfaces.rsp.round_trip import RoundTrip
 from interfaces.rsp.security import Keyring, Rank
 
 ADDRESS = b"local"
@@ -65,7 +66,7 @@ class Pair:
         self.network.flight.clear()
         local.number, robot.number = number, number + 7
         robot.newest, local.newest = number - 1, number + 6
-        self.local._times.clear()
+        self.local._round_trip, self.robot._round_trip = RoundTrip(), RoundTrip()
 
     def until(self, condition, within: float) -> None:
         end = self.now + within

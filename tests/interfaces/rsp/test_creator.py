@@ -58,6 +58,7 @@ MODELS = {
     "rover": example(),
     "solo": SOLO,
     "many": MANY,
+    "namesake": RobotModel("left_wheel_effector", 4, (Effector("left_wheel"),)),
     "memo": RobotModel("memo", 2, (MemoryCommand("a"), MemoryCommand("a_1"), MemoryCommand("a1"))),
     "middleware": RobotModel(
         "twice", 3, (Sensor("middleware"), Effector("speaker", stream=9), Effector("pass_on"))
@@ -110,6 +111,13 @@ def test_what_is_generated_is_typed(written: Path, monkeypatch: pytest.MonkeyPat
         capture_output=True, text=True, check=False, cwd=HOME,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
+
+
+def test_a_robot_named_as_one_of_its_devices_has_both(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = imported(written, "left_wheel_effector", monkeypatch)
+    robot = module.LeftWheelEffector(Middleware(LocalCore(module.MODEL, bytes), ManualClock()))
+    robot.left_wheel.write(0, 7)
+    assert robot.left_wheel.read_all() == (7,)
 
 
 def test_a_package_replaces_itself_and_nothing_else(tmp_path: Path) -> None:
@@ -243,6 +251,11 @@ def test_the_api_checks_what_it_is_given(written: Path, monkeypatch: pytest.Monk
         with pytest.raises(InvalidValueError):
             call()
     assert robot.left_wheel.read_all() == (0,)
+    assert [robot.ir_fire.send(value).id for value in (0, 255)] == [0, 1]
+    for value in (-500, 500):
+        robot.left_wheel.write(0, value)
+    robot.left_wheel.write(0, 0)
+    robot.program.send(bytes(256), timeout=1.0)
     for call in (lambda: robot.position.wait(0.01), lambda: robot.bumper.wait(0.0), lambda: robot.log.wait(0.0)):
         with pytest.raises(DeadlineError):
             call()

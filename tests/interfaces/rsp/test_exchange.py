@@ -167,6 +167,23 @@ def test_the_end_is_acknowledged_and_what_waits_is_reported() -> None:
     pair.opened()
 
 
+def test_each_event_is_told_in_three_packets() -> None:
+    pair = Pair(MODEL, Network(Random(1))).opened()
+    bumper = MODEL.index("bumper")
+    pair.local.request(bumper, True)
+    pair.run(0.2)
+    told: list[bytes] = []
+    usual = pair.network.send
+    pair.network.send = lambda to, data, now: (
+        told.append(data[22:]) if to == "local" else None,
+        usual(to, data, now),
+    )[1]
+    for number in (1, 2):
+        assert pair.robot.occur(bumper, bytes([number]))
+    pair.run(0.5)
+    assert [body for body in told if body] == [b"\0\0\1"] * 3 + [b"\0\1\2"] * 3
+
+
 def test_events_that_nobody_asks_for_or_that_are_too_many_arent_told() -> None:
     pair = Pair(MODEL, Network(Random(1))).opened()
     bumper = MODEL.index("bumper")
@@ -214,9 +231,39 @@ def test_monitors_and_sensors_are_told_when_they_are_asked_for_and_changed() -> 
     pair.told.clear()
     pair.run(1.0)
     assert not any(isinstance(output, Told) for output in pair.told), "nothing changed"
+    for on in (False, True):
+        pair.local.request(MODEL.index("sensing"), on)
+        pair.run(1.0)
+    told = {output.index: output.payload for output in pair.told if isinstance(output, Told)}
+    assert told == {position: b"123412341234", state: b"\0\0"}, "who asks again may have forgotten"
+    pair.told.clear()
     pair.local.write(MODEL.index("left_wheel"), b"\0\x0a")
     for _ in range(60):
         pair.step()
         pair.robot.effectors(now=pair.now)
     told = {output.index: output.payload for output in pair.told if isinstance(output, Told)}
     assert told == {state: b"\0\x0a"}
+
+
+def test_what_is_acknowledged_isnt_acknowledged_for_ever() -> None:
+    pair = Pair(MODEL, Network(Random(1), delay=0.02)).opened()
+    pair.local.store(MODEL.index("program"), b"x", deadline=pair.now + 5.0)
+    pair.robot.store(MODEL.index("log"), b"x", deadline=pair.now + 5.0)
+    pair.run(1.0)
+    sizes: list[int] = []
+    usual = pair.network.send
+    pair.network.send = lambda to, data, now: (sizes.append(len(data)), usual(to, data, now))[1]
+    pair.run(0.5)
+    assert set(sizes) == {22}
+
+
+def test_an_event_that_was_told_before_a_newer_one_is_no_news() -> None:
+    from interfaces.rsp.header import Type
+    from interfaces.rsp.outputs import Occurred
+
+    pair = Pair(MODEL, Network(Random(1))).opened()
+    bumper, session = MODEL.index("bumper"), pair.robot._claim.session
+    for number in (0, 1, 0, 65_535, 1, 2):
+        body = pair.robot.layout.join({bumper: number.to_bytes(2, "big") + b"\1"})
+        pair.local.receive(session.make(Type.UP, body, pair.now), now=pair.now)
+    assert [output.id for output in pair.local.take() if isinstance(output, Occurred)] == [0, 1, 2]

@@ -4,6 +4,7 @@ command."""
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import time
@@ -17,11 +18,12 @@ from interfaces.cli.main import _status
 from interfaces.rsp.creator import write_package
 from interfaces.rsp.errors import DeadlineError, NoSessionError
 from interfaces.rsp.live import opened
+from interfaces.rsp.local import LocalConfig
 from interfaces.rsp.model import example, read_model, write_model
 from interfaces.rsp.outbox import Outcome
 from interfaces.rsp.outputs import EndReason
 from robots.cubo import parameters
-from vrs.errors import FormatError
+from vrs.errors import FormatError, InvalidValueError
 
 CUBO = parameters.MODEL_FILE
 
@@ -75,6 +77,15 @@ def test_cubo_over_sockets_with_keys(tmp_path: Path, monkeypatch: pytest.MonkeyP
                 assert mine.middleware.wait_for(lambda: mine.middleware.ended is EndReason.TAKEN, 5.0)
         with pytest.raises(DeadlineError), cubo.connect(address, timeout=0.5):
             pass
+
+
+def test_it_asks_as_long_as_it_may() -> None:
+    begin, config = time.monotonic(), LocalConfig(patience=0.1)
+    with pytest.raises(DeadlineError), opened(example(), "127.0.0.1:9", timeout=0.5, config=config):
+        pass
+    assert time.monotonic() - begin >= 0.5
+    with pytest.raises(InvalidValueError, match="timeout"), opened(example(), "127.0.0.1:9", timeout=math.inf):
+        pass
 
 
 def test_whom_nobody_answers(tmp_path: Path) -> None:

@@ -104,11 +104,23 @@ def test_bits_that_cant_be_are_refused() -> None:
             LAYOUT.split(bits + bytes(12), way)
 
 
+def test_an_item_is_as_long_as_its_element_at_most() -> None:
+    index, longest = MODEL.index("program"), 256
+    for size in (0, longest):
+        body = LAYOUT.join({index: struct.pack("!HH", 0, size) + bytes(size)})
+        assert LAYOUT.split(body, Way.DOWN)[index][4:] == bytes(size)
+    # Longer by a byte, in a packet that may be as long.
+    left = MODEL.index("left_wheel")
+    for size in (longest + 1, 65_000):
+        with pytest.raises(PacketError, match="length"):
+            LAYOUT.split(LAYOUT.join({left: b"\0\0", index: struct.pack("!HH", 0, size) + bytes(size)}), Way.DOWN)
+
+
 def test_maps_of_strangers_dont_fill_the_memory() -> None:
     wide = Layout(RobotModel("wide", 1, tuple(Sensor(f"s{k}") for k in range(64))))
     for bits in range(3000):
         wide.split(bits.to_bytes(8, "big"), Way.DOWN)
-    assert len(wide._plans[Way.DOWN]) <= 1024
+    assert 64 * len(wide._plans[Way.DOWN]) <= 16_384
 
 
 def test_sizes_of_each_kind() -> None:

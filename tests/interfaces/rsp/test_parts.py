@@ -13,9 +13,10 @@ from interfaces.rsp.devices import EffectorDevice
 from interfaces.rsp.errors import FullError
 from interfaces.rsp.local import LocalCore
 from interfaces.rsp.middleware import Middleware
-from interfaces.rsp.model import Effector, Filling, RobotModel
-from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig
-from interfaces.rsp.outbox import MemoryOutbox, Outcome, Settled
+from interfaces.rsp.model import Effector, Filling, RobotModel, example
+from interfaces.rsp.motion_filter import Fastest, MotionFilter, MotionFilterConfig
+from interfaces.rsp.outbox import CommandOutbox, MemoryOutbox, Outcome, Settled
+from interfaces.rsp.outputs import Occurred
 from interfaces.rsp.period import PeriodConfig, PeriodControl
 from interfaces.rsp.streams import StreamInbox, StreamOutbox
 from tests.interfaces.rsp.joined import Network, Pair
@@ -141,6 +142,19 @@ def test_clearing_drops_what_waits_on_both_sides() -> None:
     assert len(pair.local.streams) == 0
 
 
+def test_the_count_of_clearings_goes_round() -> None:
+    pair = Pair(MODEL, Network(Random(1))).opened()
+    for _ in range(255):
+        pair.local.clear()
+    pair.run(0.1)
+    pair.local.play(3, bytes(100))
+    pair.run(0.2)
+    assert pair.robot.streams.free == 7
+    pair.local.clear()
+    pair.run(0.1)
+    assert pair.robot.streams.free == 8
+
+
 def test_the_queue_of_fragments_is_bounded() -> None:
     outbox = StreamOutbox(8)
     with pytest.raises(FullError):
@@ -151,6 +165,15 @@ def test_the_queue_of_fragments_is_bounded() -> None:
         inbox.receive(3, number.to_bytes(4, "big") + b"\0\1" + b"x" * 100)
     assert inbox.overflowed == 2
     assert inbox.take(3) == b"x"
+
+
+def test_missing_fragments_are_counted_and_numbers_that_go_back_arent() -> None:
+    inbox = StreamInbox(9)
+    missing = []
+    for number in (0, 1, 4, 2, 3, 4_294_967_295, 1):
+        inbox.receive(3, number.to_bytes(4, "big") + b"\0\1" + b"x" * 100)
+        missing.append(inbox.missing)
+    assert missing == [0, 0, 2, 2, 2, 2, 3]
 
 
 def queueing(rate: float, control: PeriodControl, *, own: float = 0.0, seconds: float = 120.0) -> list[float]:
@@ -193,6 +216,27 @@ def test_a_link_that_is_slow_by_itself_is_left_alone_after_a_try() -> None:
     assert 20.0 <= again - left <= 21.0
 
 
+def test_a_queue_that_falls_by_a_fifth_lets_the_period_be() -> None:
+    control, now, periods = PeriodControl(), 0.0, []
+    for seconds in (0.1, 0.9, 0.5, 0.3, 0.3, 0.11):
+        for _ in range(5):
+            control.round_trip(seconds, now=now)
+            now += 0.1 + 1e-6
+        # The last of a window is the first that its end is noticed at.
+        control.round_trip(seconds, now=now)
+        periods.append(control.T)
+    assert periods == pytest.approx([0.02, 0.03, 0.03, 0.03, 0.045, 0.0405])
+
+
+def test_the_fastest_of_the_last_window_or_two_is_known() -> None:
+    fastest = Fastest(10.0)
+    found = []
+    for now, value in ((0.0, 1.0), (5.0, 3.0), (10.0, 4.0), (19.9, 5.0), (20.0, 6.0), (50.0, 9.0)):
+        fastest.add(value, now)
+        found.append(fastest.value)
+    assert found == [1.0, 1.0, 1.0, 1.0, 4.0, 9.0]
+
+
 def test_it_can_be_switched_off_and_is_checked() -> None:
     control = PeriodControl(PeriodConfig(least=0.04, adaptive=False))
     for k in range(1000):
@@ -229,6 +273,20 @@ def test_what_no_acknowledgement_comes_for_is_sent_more_and_more_seldom() -> Non
     assert gaps[:5] == pytest.approx([0.1, 0.2, 0.4, 0.8, 0.8], abs=0.002)
 
 
+def test_a_command_goes_until_the_number_of_its_first_packet_is_acknowledged() -> None:
+    outbox = CommandOutbox()
+    number = outbox.put(3, b"go")
+    for packet in (5, 6, 7):
+        payloads: dict[int, bytes] = {}
+        outbox.fill(payloads, packet)
+        assert payloads == {3: b"\0\0go"}
+        assert outbox.acknowledge(4) == []
+    assert outbox.acknowledge(5) == [Settled(3, number, Outcome.DONE)]
+    payloads = {}
+    outbox.fill(payloads, 8)
+    assert payloads == {}
+
+
 def test_an_acknowledgement_is_of_its_own_element() -> None:
     outbox = MemoryOutbox()
     first, second = outbox.put(3, b"map", deadline=9.0), outbox.put(4, b"route", deadline=9.0)
@@ -254,3 +312,18 @@ def test_two_threads_that_write_two_values_of_one_effector_lose_none() -> None:
     wheels.write(0, 5)
     other[0].join(5.0)
     assert wheels.read_all() == (5, 7)
+
+
+def test_what_nobody_fetches_goes_oldest_first() -> None:
+    core = LocalCore(example(), bytes)
+    middleware = Middleware(core, ManualClock())
+    bumper, fire = core.model.index("bumper"), core.model.index("ir_fire")
+    core._outputs += [Occurred(bumper, k, k.to_bytes(2, "big")) for k in range(300)]
+    core._outputs += [Settled(fire, k, Outcome.DONE) for k in range(9000)]
+    middleware.advance((), now=0.0)
+    fetched = []
+    while (payload := middleware.came(bumper)) is not None:
+        fetched.append(int.from_bytes(payload, "big"))
+    assert fetched == list(range(44, 300))
+    known = [k for k in range(9000) if middleware.outcome(fire, k) is not None]
+    assert known == list(range(9000 - 8192, 9000))

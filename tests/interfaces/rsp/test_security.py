@@ -7,8 +7,8 @@ from random import Random
 
 import pytest
 
-from interfaces.rsp import header
-from interfaces.rsp.handshake import Refusal
+from interfaces.rsp import handshake, header
+from interfaces.rsp.handshake import Open, Refusal
 from interfaces.rsp.header import Type
 from interfaces.rsp.local import LocalCore, State
 from interfaces.rsp.model import example
@@ -78,13 +78,35 @@ def test_every_flipped_bit_of_a_sealed_packet_is_dropped_and_counted() -> None:
     assert state(pair) != before
 
 
-def test_a_replayed_packet_is_dropped_and_counted() -> None:
-    pair = pair_of(sealed=True)
+@pytest.mark.parametrize(("sealed", "reason"), [(False, Drop.LATE), (True, Drop.REPLAY)])
+def test_a_replayed_packet_is_dropped_and_counted(sealed: bool, reason: Drop) -> None:
+    pair = pair_of(sealed=sealed)
     data = next_down(pair)
     pair.robot.receive(data, ADDRESS, now=pair.now)
     before = state(pair)
     pair.robot.receive(data, ADDRESS, now=pair.now + 0.1)
-    assert pair.robot.dropped[Drop.REPLAY] == 1
+    assert pair.robot.dropped[reason] == 1
+    assert state(pair) == before
+
+
+def test_a_packet_from_before_the_newest_is_late_though_it_never_came() -> None:
+    pair = pair_of(sealed=True)
+    early, late = next_down(pair), next_down(pair)
+    pair.robot.receive(late, ADDRESS, now=pair.now)
+    before = state(pair)
+    pair.robot.receive(early, ADDRESS, now=pair.now + 0.1)
+    assert pair.robot.dropped[Drop.LATE] == 1
+    assert state(pair) == before
+
+
+def test_a_sealed_packets_number_is_its_counters() -> None:
+    pair = pair_of(sealed=True)
+    session, before = pair.local._session, state(pair)
+    number = session.number
+    head = header.Header(MODEL.id, True, Type.DOWN, number, 0, session.id, 0, 0)
+    data = session._sealer.seal(header.encode(head), b"\0\0", number + 1)
+    pair.robot.receive(data, ADDRESS, now=pair.now)
+    assert pair.robot.dropped[Drop.MALFORMED] == 1
     assert state(pair) == before
 
 
@@ -242,7 +264,7 @@ def test_another_key_or_rank_opens_nothing() -> None:
 
 
 def test_keys_are_checked() -> None:
-    for secrets in ({}, {Rank.OPERATOR: b"short"}):
+    for secrets in ({}, {Rank.OPERATOR: b"x" * 31}):
         with pytest.raises(InvalidValueError):
             Keyring(secrets)
     with pytest.raises(InvalidValueError, match="rank"):
@@ -264,3 +286,71 @@ def test_the_derivation_is_hkdf() -> None:
     for length in (16, 32, 64, 70):
         theirs = HKDF(SHA256(), length, b"salt", b"info").derive(b"secret" * 9)
         assert _derived(b"secret" * 9, b"salt", b"info", length) == theirs
+
+
+def asked(robot: RobotCore, question: Open, address: bytes, now: float, keys: Keyring | None = None) -> list:
+    """What a robot answers to an OPEN: type, address, session and body of each."""
+    head = header.Header(MODEL.id, False, Type.OPEN, 0, 0, 0, 65_535, 0)
+    rank = Rank.OPERATOR if keys is not None else question.rank
+    robot.receive(handshake.sent(Type.OPEN, handshake.encode_open(question), head, keys, rank), address, now=now)
+    found = []
+    for data, to in robot.to_send(now=now):
+        answer = header.decode(data)
+        found.append((answer.type, to, answer.session, data[header.SIZE :]))
+    return found
+
+
+def challenged(robot: RobotCore, nonce: bytes, address: bytes, now: float) -> Open:
+    """The question with the cookie that it's answered with."""
+    question = Open(Rank.OPERATOR, False, nonce)
+    ((kind, _, _, body),) = asked(robot, question, address, now)
+    assert kind is Type.CHALLENGE
+    return question._replace(cookie=handshake.decode_answer(body).given)
+
+
+@pytest.mark.parametrize(
+    ("address", "later", "nonce", "given"),
+    [
+        (ADDRESS, 0.0, b"n" * 16, Type.OPENED),
+        (ADDRESS, 10.0, b"n" * 16, Type.OPENED),
+        (ADDRESS, 20.0, b"n" * 16, Type.CHALLENGE),
+        (b"elsewhere", 0.0, b"n" * 16, Type.CHALLENGE),
+        (ADDRESS, 0.0, b"m" * 16, Type.CHALLENGE),
+    ],
+)
+def test_a_cookie_is_for_an_address_a_nonce_and_a_while(
+    address: bytes, later: float, nonce: bytes, given: Type
+) -> None:
+    robot = RobotCore(MODEL, Random(1).randbytes)
+    question = challenged(robot, b"n" * 16, ADDRESS, 5.0)._replace(nonce=nonce)
+    ((kind, to, _, _),) = asked(robot, question, address, 5.0 + later)
+    assert (kind, to) == (given, address)
+
+
+def test_the_same_question_from_another_address_is_another_session() -> None:
+    robot = RobotCore(MODEL, Random(1).randbytes)
+    sessions = {}
+    for address in (ADDRESS, b"elsewhere"):
+        *_, (kind, to, session, _) = asked(robot, challenged(robot, b"n" * 16, address, 5.0), address, 5.0)
+        assert (kind, to) == (Type.OPENED, address)
+        sessions[session] = address
+    assert len(sessions) == 2
+
+
+def test_an_operators_key_doesnt_make_an_admin() -> None:
+    robot = RobotCore(MODEL, Random(1).randbytes, keys=KEYS)
+    assert asked(robot, Open(Rank.OPERATOR, True, b"n" * 16), ADDRESS, 0.0, KEYS)[0][0] is Type.CHALLENGE
+    assert asked(robot, Open(Rank.ADMIN, True, b"n" * 16), ADDRESS, 0.0, KEYS) == []
+    assert robot.dropped[Drop.AUTHENTICATION] == 1
+
+
+def test_a_local_system_takes_nothing_of_another_session() -> None:
+    pair = pair_of(sealed=False)
+    pair.run(0.05)
+    (data, _), *_ = pair.robot.to_send(now=pair.now + 1.0)
+    before = pair.local._session.newest
+    pair.local.receive(data[:12] + bytes([data[12] ^ 1]) + data[13:], now=pair.now)
+    assert pair.local.dropped[Drop.SESSION] == 1
+    assert pair.local._session.newest == before
+    pair.local.receive(data, now=pair.now)
+    assert pair.local._session.newest > before

@@ -115,6 +115,21 @@ def test_arms_and_head_go_where_they_are_told_as_fast_as_they_are_told() -> None
         assert body.tilt < 0.02
 
 
+def test_a_stop_stops_wheels_arms_and_head_where_they_are() -> None:
+    with CuboBody() as body:
+        body.move("wheels", (0.1, 0.1))
+        for binding in ("arm.left", "arm.right", "tilt"):
+            body.move(binding, (1.5, 0.5))
+        body.go_on(120)
+        body.carry_out("stop", ())
+        body.go_on(60)
+        stopped = body.angles()
+        assert stopped == pytest.approx((0.25, 0.25, 0.25), abs=0.08)
+        body.go_on(480)
+        assert body.angles() == pytest.approx(stopped, abs=0.01)
+        assert body.resting
+
+
 def test_limbs_hold_their_posture_while_it_drives() -> None:
     with CuboBody() as body:
         body.move("wheels", (0.3, 0.1))
@@ -134,6 +149,13 @@ def test_it_senses_a_wall_touches_it_and_says_so() -> None:
         assert nearest < 0.06
         assert happened == ["bumper"]
         assert body.measure("bumper") == (1.0,)
+
+
+def test_where_nothing_is_proximity_says_its_reach() -> None:
+    with CuboBody() as body:
+        assert body.measure("proximity") == (0.8,) * 8
+        body.go_on(240)
+        assert body.measure("proximity") == (0.8,) * 8
 
 
 def test_the_battery_runs_down_faster_under_load() -> None:
