@@ -11,7 +11,7 @@ from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
 OWN_BAR = "our own bar"
-"""The source of a claim that no paper makes."""
+"""The source of a claim that no paper makes; after a section, that of a bar where the paper gives none."""
 
 Cell: TypeAlias = float | int | str | None
 """What stands in a table; None for nothing."""

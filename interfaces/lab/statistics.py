@@ -46,7 +46,7 @@ def bootstrap(values: ArrayLike, seed: int, statistic: Callable[[Array], Array] 
     """A statistic of runs, and the interval that resampling the runs gives it.
 
     Args:
-        values: A figure a run, (k,), k ≥ 1.
+        values: A figure a run, (k,), k ≥ 1; no two runs of one seed, which aren't independent: see `clustered`.
         seed: Seed of the resampling.
         statistic: From (..., k) to (...); the mean unless given.
 
@@ -54,8 +54,28 @@ def bootstrap(values: ArrayLike, seed: int, statistic: Callable[[Array], Array] 
         InvalidValueError: If there are no values, or one isn't finite.
     """
     sample = np.asarray(values, dtype=np.float64)
-    if sample.ndim != 1 or not len(sample) or not np.isfinite(sample).all():
+    if sample.ndim != 1:
+        raise InvalidValueError("values", sample, "finite numbers, one a run")
+    return clustered(sample[:, None], seed, statistic)
+
+
+def clustered(values: ArrayLike, seed: int, statistic: Callable[[Array], Array] = _mean) -> Estimate:
+    """A statistic of runs of which some share a seed, and the interval that resampling the seeds gives it.
+
+    Runs of one seed under several networks have the same operator, so they go well or badly together: drawn one
+    by one, as if each were news, they'd make the interval too narrow. All runs of a seed are drawn at once.
+
+    Args:
+        values: A figure a run, (k, m): m runs of each of k seeds, k, m ≥ 1.
+        seed: Seed of the resampling.
+        statistic: From (..., k m) to (...); the mean unless given.
+
+    Raises:
+        InvalidValueError: If there are no values, or one isn't finite.
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    if sample.ndim != 2 or not sample.size or not np.isfinite(sample).all():
         raise InvalidValueError("values", sample, "finite numbers, one a run")
     picks = np.random.default_rng(seed).integers(0, len(sample), (RESAMPLES, len(sample)))
-    low, high = np.quantile(statistic(sample[picks]), (0.025, 0.975))
-    return Estimate(float(statistic(sample)), float(low), float(high))
+    low, high = np.quantile(statistic(sample[picks].reshape(RESAMPLES, -1)), (0.025, 0.975))
+    return Estimate(float(statistic(sample.ravel())), float(low), float(high))

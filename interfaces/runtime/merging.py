@@ -70,10 +70,20 @@ class Merging:
             left = max(most - math.copysign(g, ahead * g), 0.0)
             pace = _PACE if abs(ahead) > _LITTLE else 1.0 / (_SOFT * h)
             wanted = w - math.copysign(min(abs(ahead) * pace, math.sqrt(_SHARE * left * abs(ahead))), ahead)
-            # It must be able to stop before its ends.
-            up, down = math.sqrt(2.0 * most * max(high - a, 0.0)), math.sqrt(2.0 * most * max(a - low, 0.0))
+            up, down = self._stoppable(high - a, v, most), self._stoppable(a - low, -v, most)
             wanted = min(max(wanted, -fastest, -down), fastest, up)
             new = min(max(wanted, v - most * h), v + most * h)
             positions.append(a + 0.5 * h * (v + new))
             speeds.append(new)
         return positions, speeds
+
+    def _stoppable(self, room: float, v: float, most: float) -> float:
+        """The speed [rad/s] of the next tick with which a joint can still stop before an end.
+
+        Args:
+            room: To the end [rad].
+            v: Its speed towards it [rad/s]: until the tick is over it goes on at the mean of both.
+            most: Its acceleration [rad/s²].
+        """
+        change = most * self._tick
+        return 0.5 * (math.sqrt(max(change**2 + 4.0 * (2.0 * most * room - change * v), 0.0)) - change)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,15 +16,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.physics import Ended, Event, PhysicsConfig, PhysicsProcess, References, Silent
 from interfaces.runtime.physics_messages import (
+    MESSAGE_MOST,
     BodyKind,
     Doing,
     Fault,
     FaultKind,
     Measurement,
     Ready,
+    Setup,
+    TickCounts,
+    decode_news,
 )
+from interfaces.runtime.physics_process import _Parent, tick_body
 from interfaces.teleop import Reference, RobotSite
 from tests.interfaces.test_teleop import laboratory
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing
@@ -220,6 +227,37 @@ def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) ->
         assert 1e-6 < error < 0.02
         assert all(len(m.tau) == 6 for m in measured)
         assert physics.release()
+
+
+@pytest.mark.parametrize("friction", [True, False])
+def test_a_puma_has_friction_if_that_is_asked_for(friction: bool) -> None:
+    bounds: Any = (tuple(map(tuple, (LIMITS.q_min, LIMITS.q_max, LIMITS.qd_max, LIMITS.qdd_max, LIMITS.qddd_max))),)
+    setup = Setup(BodyKind.PUMA560, friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
+    with tick_body(setup) as body, simulated_puma(friction=friction)(NOMINAL) as arm:
+        for made in (body, arm):
+            reality = made._arm.reality  # type: ignore[attr-defined]
+            assert reality.friction is friction
+        assert body._arm.reality.dt == 0.002  # type: ignore[attr-defined]
+
+
+def test_a_fault_waits_until_the_parent_reads_and_measurements_do_not() -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, theirs:
+        theirs.setblocking(False)
+        ours.setblocking(False)
+        counts = TickCounts(1, 0, 0.0, 0, 0, (1,))
+        told, fault = _Parent(theirs, os.getppid()), Fault(1, FaultKind.STARVED, "", 5, (0.0,), 6)
+        number = 0
+        while not told._unsent and number < 100_000:
+            told.tell([Ready(number, False)])
+            number += 1
+        told.tell([fault, Measurement(7, Doing.HOLDING, (0.0,), (0.0,), (), (0.0,), 7, counts)])
+        for _ in range(number):
+            ours.recv(MESSAGE_MOST)
+            told.tell([])
+        assert decode_news(ours.recv(MESSAGE_MOST)) == fault
+        with pytest.raises(BlockingIOError):
+            ours.recv(MESSAGE_MOST)
 
 
 def test_it_refuses_what_can_not_be_sent(clock: WallClock) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.runtime.plan import default_plan, parse_plan, read_plan
+from interfaces.runtime.plan import MAX_BYTES, MAX_COMMANDS, default_plan, parse_plan, read_plan
 from robots import puma560
 from vrs import Insertion, JointTarget, PoseTarget, Profile
 from vrs.errors import FormatError
@@ -54,6 +54,36 @@ def test_a_pose_is_zyz_about_the_base():
     assert X[:3, 3] == pytest.approx([0.45, -0.15, 0.1])
     c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
     assert X[:3, :3] == pytest.approx(np.array([[-c, -s, 0], [-s, c, 0], [0, 0, -1]]))
+
+
+def test_the_middle_angle_turns_about_y():
+    target = parse('{"issue": 0, "move": {"xyz": [0.45, -0.15, 0.1], "zyz_deg": [0, 90, 0]}}').motions[0]
+    assert target.command.target.X[:3, :3] == pytest.approx(np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]))
+
+
+def test_what_happens_is_in_the_order_of_its_times():
+    late = '{"issue": 1, "register": 9, "move": {"pose": "nominal"}}'
+    plan = parse(
+        late,
+        MOVE.replace("1,", "2,", 1),
+        '{"issue": 6, "release": true}',
+        '{"issue": 5, "payload": {"mass_kg": 1}}',
+    )
+    assert [motion.registered_at for motion in plan.motions] == [2, 9]
+    assert [(item.t, item.mass) for item in plan.payloads] == [(5, 1), (6, None)]
+
+
+def test_a_plan_has_an_end():
+    load = '{"issue": %d, "payload": {"mass_kg": 20}}'
+    assert parse(MOVE, load % 1).payloads[0].mass == 20
+    with pytest.raises(FormatError, match=r"\(0, 20\] kg"):
+        parse(MOVE, '{"issue": 1, "payload": {"mass_kg": 20.1}}')
+    moves = [MOVE] * MAX_COMMANDS
+    assert len(parse(*moves).motions) == MAX_COMMANDS
+    with pytest.raises(FormatError, match=f"^plan.jsonl:{MAX_COMMANDS + 1}: more than the {MAX_COMMANDS} commands"):
+        parse(*moves, MOVE)
+    with pytest.raises(FormatError, match="bytes allowed"):
+        parse_plan(MOVE.encode() + b" " * MAX_BYTES, "plan.jsonl", model)
 
 
 @pytest.mark.parametrize(

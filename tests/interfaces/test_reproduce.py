@@ -220,6 +220,17 @@ class TestDoulgeri:
         worse = jitter.conclude(study, (bad, *(result,) * (len(jitter.CASES) - 1)))
         assert [claim.holds for claim in worse.claims[:4]] == [False, False, True, False]
 
+    def test_a_seed_counts_once_however_many_profiles_it_ran_under(self):
+        study = Study(seed=1, runs=2, length=2.0)
+        result = jitter.work(study, "mon@0.2")
+        one = result.adaptive[0]
+        pair = tuple(one._replace(mean=x, time_difference=x) for x in (0.0, 1.0))
+        level = result._replace(adaptive=pair, fixed=(one._replace(mean=1.5, time_difference=1.5),) * 2)
+        found = jitter.conclude(study, (level,) * len(jitter.CASES))
+        less = [claim for claim in found.claims if "adaptive less fixed" in claim.claim]
+        # Two seeds, half of the resamples of which are of one of them alone.
+        assert [claim.interval for claim in less] == [pytest.approx((-1.5, -0.5))] * 2
+
     def test_encoding_is_read_again(self):
         for kind in encoding.MOTIONS:
             sizes = encoding.measure(kind, 1, 2.0 if kind == "moves" else 0.4)
@@ -311,6 +322,13 @@ from interfaces.cli import main
 if __name__ == "__main__":
     main()
 """
+
+
+def test_a_short_study_has_a_motion_in_every_run():
+    """Of seed 63 chance gives a stop alone, half a second after the beginning."""
+    seen, _ = jitter.run("mon@2", 63, 2.0, None)
+    assert seen.moves == 1
+    assert seen.progress == pytest.approx(1.0)
 
 
 def test_a_short_study_has_a_command_in_every_run():

@@ -148,7 +148,7 @@ def test_an_acknowledgement_during_the_stop_counts_when_it_rests() -> None:
     assert len(bench.faults) == 1
 
 
-@pytest.mark.parametrize("what", ["position", "speed", "late"])
+@pytest.mark.parametrize("what", ["position", "little", "speed", "late"])
 def test_a_jump_is_not_followed(what: str) -> None:
     bench, timeline = Bench(), motion()
     bench.loop.receive(rows(sampled(timeline, 1, 900), 1))
@@ -156,6 +156,8 @@ def test_a_jump_is_not_followed(what: str) -> None:
     q, qd, qdd = sampled(timeline, 420, 400, late=0.03 if what == "late" else 0.0)
     if what == "position":
         q = q + np.array([0, 0, 1e-3, 0, 0, 0])
+    if what == "little":
+        q = q + 3.2 * TICK**2 * LIMITS.qdd_max * np.array([0, 1, 0, 0, 0, 0])
     if what == "speed":
         qd = qd + 3.2 * TICK * LIMITS.qdd_max * np.array([0, 0, 0, 1, 0, 0])
     bench.loop.receive(rows(Reference(q, qd, qdd), 420))
@@ -279,6 +281,7 @@ def test_what_makes_no_sense_brings_it_to_rest() -> None:
         rows(good, 400 + AHEAD_MOST + 1),
         Rows(0, 420, False, b""),
         Rows(0, 420, False, bytes(143)),
+        Rows(0, 420, False, bytes(145)),
         Rows(0, 420, False, bytes(144 * (ROWS_MOST + 1))),
         Setup(BodyKind.EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
         Attach(-1.0),
@@ -334,6 +337,27 @@ def test_it_may_be_placed_where_it_was_measured_and_nowhere_else() -> None:
     bench.loop.receive(rows(standing(NOMINAL + 0.04), 120))
     bench.run(0.2)
     assert [fault.kind for fault in bench.faults] == [FaultKind.JUMPED]
+
+
+def test_it_isn_t_placed_where_the_reference_moves() -> None:
+    bench = Bench()
+    bench.run(0.1)
+    q, qd, qdd = standing(NOMINAL + 0.01)
+    bench.loop.receive(rows(Reference(q, qd + 1e-3, qdd), 120, placed=True))
+    bench.run(0.2)
+    assert [fault.kind for fault in bench.faults] == [FaultKind.JUMPED]
+
+
+@pytest.mark.parametrize(("late", "place", "counts"), [
+    (0.0, 0, 0), (0.00015, 1, 0), (0.0009, 3, 0), (0.0015, 4, 1), (0.03, 8, 1),
+])  # fmt: skip
+def test_a_tick_is_counted_by_how_late_it_begins(late: float, place: int, counts: int) -> None:
+    bench = Bench()
+    bench.loop.advance(now=bench.loop.next_deadline() + late)
+    (measured,) = (m for m in bench.loop.take() if isinstance(m, Measurement))
+    assert np.flatnonzero(measured.counts.histogram).tolist() == [place]
+    assert (measured.counts.ticks, measured.counts.late) == (1, counts)
+    assert measured.counts.worst == pytest.approx(late, abs=1e-9)
 
 
 def late_start(late: int) -> Bench:

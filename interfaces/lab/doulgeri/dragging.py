@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, played, tool
 from interfaces.lab.drawing import INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
@@ -32,7 +32,7 @@ SPAN: Final = 0.09
 DELAY: Final = "domain"
 CASES: Final = ("0", "1", "2", "3")
 """Hands."""
-SOURCE: Final = "Section VII, (c)"
+SOURCE: Final = f"Section VII, (c); {OWN_BAR}"
 OVER: Final = 1e-9
 
 

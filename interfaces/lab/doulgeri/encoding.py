@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.changes import changed
 from interfaces.journal import Journal
-from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, arrivals, target, tool
 from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw
 from interfaces.lab.statistics import bootstrap
@@ -24,7 +24,7 @@ RATE: Final = 50.0
 """Frames a second."""
 PULSE: Final = 0.1
 """Period at which a reader of segments is told how far they are complete [s], as servlets do."""
-SOURCE: Final = "Section VII, (b)"
+SOURCE: Final = f"Section VII, (b); {OWN_BAR}"
 MOTIONS: Final = ("moves", "rates", "twist")
 NAMES: Final = {
     "moves": "a move every 2 s",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from interfaces import Designer, Viewer
-from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, Joined, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
@@ -28,7 +28,7 @@ RATE: Final = 50.0
 """Of the viewers [1/s]."""
 STEP: Final = 0.005
 """How often it's looked whether something shows [s]."""
-SOURCE: Final = "Section VII, (d)"
+SOURCE: Final = f"Section VII, (d); {OWN_BAR}"
 OVER: Final = 1e-6
 EDITS: Final = ("retime", "cancel", "via", "pace", "stop", "resume", "undo")
 
@@ -93,9 +93,7 @@ def edits(rng: np.random.Generator) -> dict[str, float]:
             session.issue(Stop())
             session.joined.run(session.now + 1.0)
         commands: dict[str, Command | None] = {
-            "retime": Retime(2, session.joined.engine.receipt(2).execute_at or 0.0)
-            if kind != "retime"
-            else Retime(2, (session.joined.engine.receipt(2).execute_at or 0.0) + 1.0),
+            "retime": Retime(2, (session.joined.engine.receipt(2).execute_at or 0.0) + 1.0),
             "cancel": Cancel(2),
             "via": InsertVia(2, JointTarget(HOME)),
             "pace": ScaleTime(0.7),

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script, tool
 from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.lab.statistics import bootstrap
+from interfaces.lab.statistics import bootstrap, clustered
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
@@ -34,7 +34,7 @@ BEAT: Final = 0.1
 """Between the robot's reports [s]."""
 OVER: Final = 1e-9
 """How far a limit may be passed, by rounding."""
-SOURCE: Final = "Section VII, (a)"
+SOURCE: Final = f"Section VII, (a); {OWN_BAR}"
 
 
 class Seen(NamedTuple):
@@ -134,7 +134,6 @@ def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Se
     given = np.array([pair[0] for pair in made])
     # When the robot's play first came to where the move begins: until then it may have waited.
     there = np.interp([pair[1] for pair in made], *_first(play.p, lab.t))
-    gaps, passed = np.diff(given), np.diff(there)
     assert path.time_difference_mean is not None
     assert path.time_difference_max is not None
     assert path.progress is not None
@@ -149,13 +148,19 @@ def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Se
         path.time_difference_max,
         path.progress,
         float(aside),
-        int(np.count_nonzero((gaps >= TOGETHER) & (passed < 0.5 * gaps))),
+        bursts(given, there),
         float(max(used)),
         float(play.pace.max()),
         sum(at > asked + OVER for asked, at, _ in both),
         len(both),
         len(lab.operator.corrections),
     )
+
+
+def bursts(given: Array, begun: Array) -> int:
+    """How many moves begin at the robot within half of the time after which they were given [s], (k,) each."""
+    gaps, passed = np.diff(given), np.diff(begun)
+    return int(np.count_nonzero((gaps >= TOGETHER) & (passed < 0.5 * gaps)))
 
 
 def _first(p: Array, t: Array) -> tuple[Array, Array]:
@@ -241,7 +246,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
         bootstrap([a.mean - f.mean for a, f in zip(r.adaptive, r.fixed, strict=True)], study.seed)
         for r in results.values()
     ]
-    together = bootstrap([a.mean - f.mean for a, f in zip(adaptive, fixed, strict=True)], study.seed)
+    together, gain = (clustered(_differences(results, field), study.seed) for field in ("mean", "time_difference"))
     smaller = sum(e.is_below_zero for e in errors)
     claims.append(
         Claim(
@@ -262,9 +267,6 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
             late,
             late > 0,
         )
-    )
-    gain = bootstrap(
-        [a.time_difference - f.time_difference for a, f in zip(adaptive, fixed, strict=True)], study.seed
     )
     claims.append(
         Claim(
@@ -312,6 +314,14 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
         ),
     )
     return Findings(tuple(claims), (Table("jitter", title, columns, tuple(rows)),), pictures)
+
+
+def _differences(results: dict[str, Result], field: str) -> Array:
+    """A figure of each run, adaptive less fixed D, (seeds, profiles); a seed gives the same commands everywhere."""
+    return np.array([
+        [getattr(a, field) - getattr(f, field) for a, f in zip(r.adaptive, r.fixed, strict=True)]
+        for r in results.values()
+    ]).T  # fmt: skip
 
 
 def _row(study: Study, case: str, how: str, D: float, seen: tuple[Seen, ...]) -> tuple[Any, ...]:

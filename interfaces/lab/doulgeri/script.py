@@ -38,7 +38,10 @@ def target(rng: np.random.Generator, reach: float = REACH) -> JointTarget:
 
 
 def script(rng: np.random.Generator, length: float) -> tuple[Act, ...]:
-    """Moves that splice, replace and append, now and for later, steering, and stops, up to `length` [s]."""
+    """Moves that splice, replace and append, now and for later, steering, and stops, up to `length` [s].
+
+    Where chance gives stops alone, a move comes at the end: nothing is said of a robot that stood all along.
+    """
     acts, t = [], 0.5
     while t < length:
         choice = rng.random()
@@ -56,6 +59,8 @@ def script(rng: np.random.Generator, length: float) -> tuple[Act, ...]:
             wait, speed = float(rng.choice([0.0, 0.0, 0.5, 2.0])), float(rng.choice([0.3, 0.6, 1.0]))
             acts.append(Act(t, MotionCommand(target(rng), t, t + wait, speed, insertion=how)))
         t += float(rng.exponential(0.8))
+    if all(isinstance(act.command, Stop) for act in acts):
+        acts.append(Act(length, MotionCommand(target(rng), length)))
     return tuple(acts)
 
 

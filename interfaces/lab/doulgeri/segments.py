@@ -11,7 +11,7 @@ from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, target
 from interfaces.lab.drawing import BAD, MUTED, VIRTUAL, draw, legend
 from vrs import Engine, JointTarget, MotionCommand, PolynomialSegment, Profile, Timeline
-from vrs.model import Array
+from vrs.model import Array, frozen_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
@@ -20,6 +20,10 @@ SAME: Final = 1e-9
 """Jumps [rad, rad/s] and time shifts that differ by less [s] count as none."""
 MOVES: Final = 40
 """Moves and redirections of a run."""
+STEP: Final = frozen_array((0.8, -0.5, 0.4, 0.3, 0.4, -0.6))
+"""From home to the first command's target of Fig. 1 [rad]."""
+GOAL: Final = frozen_array(HOME - 0.5 * STEP)
+"""The second command's [rad]."""
 FIG_1: Final = "Fig. 1, eq. (6)"
 
 
@@ -34,12 +38,11 @@ class Example(NamedTuple):
 def example() -> Example:
     """A move, and a second command in its linear segment; nothing is scheduled after it."""
     engine = Engine(MODEL, q=HOME, clock=None)
-    step = np.array([0.8, -0.5, 0.4, 0.3, 0.4, -0.6])
-    engine.execute(MotionCommand(JointTarget(HOME + step), execute_at=0.5, speed=0.6))
+    engine.execute(MotionCommand(JointTarget(HOME + STEP), execute_at=0.5, speed=0.6))
     before = engine.timeline
     line = moving(before)[1]
     t_exec = line.start + 0.5 * line.duration
-    engine.execute(MotionCommand(JointTarget(HOME - 0.5 * step), execute_at=t_exec, speed=0.6))
+    engine.execute(MotionCommand(JointTarget(GOAL), execute_at=t_exec, speed=0.6))
     return Example(before, engine.timeline, t_exec)
 
 
@@ -123,7 +126,7 @@ def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one cas
     uneven, past = max(r.uneven for r in seen), max(r.past for r in seen)
     replaced = {segment.command_id for segment in new} == {1, 2} and new[-1].command_id == 2
     end = float(np.abs(fig.after.sample(fig.after.end) - fig.after.segments[-1].value(fig.after.end)).max())
-    goal = float(np.abs(fig.after.sample(fig.after.end) - _goal(fig)).max())
+    goal = float(np.abs(fig.after.sample(fig.after.end) - GOAL).max())
     later = _appended()
     many = f"{study.runs * MOVES} random splices"
     claims = (
@@ -209,14 +212,6 @@ def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one cas
         height=3.6,
     )
     return Findings(claims, (table,), (picture,))
-
-
-def _goal(fig: Example) -> Array:
-    """The second command's target."""
-    step = np.array([0.8, -0.5, 0.4, 0.3, 0.4, -0.6])
-    goal: Array = HOME - 0.5 * step
-    assert len(fig.after)
-    return goal
 
 
 def _appended() -> float:

@@ -145,7 +145,7 @@ class Paired:
 def paired(first: Group, second: Group, metric: str) -> Paired | None:
     """Compare two combinations in a metric; None if they have no seeds in common that have it.
 
-    Time differences and speeds of runs with a progress below 97 % are taken by their bound, or not at all.
+    Of runs with a progress below 97 % the time difference is taken by its bound, other means not at all.
     """
     one, other = ({row.seed: comparable(row.metrics, metric) for row in group.rows} for group in (first, second))
     pairs = [
@@ -167,11 +167,11 @@ def paired(first: Group, second: Group, metric: str) -> Paired | None:
 
 
 def comparable(metrics: PathComparison, metric: str) -> float | None:
-    """A metric as it may be compared: below 97 % progress the bound of the time difference, and no speed error."""
+    """A metric as it may be compared: below 97 % progress the bound of the time difference, and no other mean."""
     whole = metrics.progress is not None and metrics.progress >= LEAST_PROGRESS
     if metric == "time_difference_mean" and not whole:
         metric = "time_difference_bound"
-    elif metric == "speed_error" and not whole:
+    elif metric in ("path_error_mean", "speed_error") and not whole:
         return None
     value: float | None = getattr(metrics, metric)
     return value

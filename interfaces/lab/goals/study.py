@@ -18,7 +18,7 @@ from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND,
 from interfaces.lab.goals.shortest import Shortest
 from interfaces.lab.goals.trial import Setting, Trip, seen_all, travel
 from interfaces.lab.output import to_json, write_files
-from interfaces.lab.statistics import bootstrap, median
+from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.ipr.chassis import IPR
 from robots.ipr.navigation import route_config
 from robots.onboard.journey import JourneyState
@@ -47,8 +47,8 @@ class Found:
 
     @property
     def ratio(self) -> float:
-        """Length of the route on the map, by the shortest."""
-        return self.trip.planned / self.mapped
+        """Length of the route on the map, by the shortest; nan where either of them is unknown."""
+        return self.trip.planned / self.mapped if math.isfinite(self.mapped) else math.nan
 
 
 def study_of(goals: int) -> Paper:
@@ -84,9 +84,9 @@ def measure(study: Study, case: str) -> Found:
 def conclude_asked(study: Study, found: tuple[Found, ...]) -> Findings:
     """What the issue asks for, of the goals among furniture and doors."""
     _, touched = _count(found)
-    ratios = np.array([one.ratio for one in found])
-    long = int(np.sum(ratios > LONGER))
-    middle = bootstrap(ratios, study.seed, median)
+    known = _ratios(found)
+    long = len(found) - sum(ratio <= LONGER for ratio in known)
+    middle = bootstrap(known, study.seed, median) if known else Estimate(math.nan, math.nan, math.nan)
     blocked = [one for one in found if one.group == ROUND]
     rerouted = sum(one.trip.arrived for one in blocked)
     late = [one for one in found if one.group == LATE]
@@ -160,14 +160,19 @@ def _count(found: Sequence[Found]) -> tuple[int, int]:
     return sum(one.trip.arrived for one in found), sum(bool(one.trip.touched) for one in found)
 
 
+def _ratios(found: Sequence[Found]) -> list[float]:
+    """Of those routes whose length can be compared."""
+    return [one.ratio for one in found if math.isfinite(one.ratio)]
+
+
 def _row(group: str, found: Sequence[Found]) -> tuple[Cell, ...]:
     trips = [one.trip for one in found]
     there = [trip for trip in trips if trip.arrived]
-    ratios = [one.ratio for one in found]
+    ratios = _ratios(found)
     ways = [one.trip.way / one.true for one in found if one.trip.arrived and math.isfinite(one.true)]
     reached, touched = _count(found)
     return (
-        TITLES[group], len(found), reached, touched, _median(ratios), max(ratios), _median(ways),
+        TITLES[group], len(found), reached, touched, _median(ratios), max(ratios, default=math.nan), _median(ways),
         float(np.mean([trip.routes for trip in trips])), _median([trip.time for trip in there]),
         100 * _median([trip.off for trip in there]), math.degrees(_median([trip.turned for trip in there])),
         100 * max(trip.lost for trip in trips),
@@ -195,12 +200,11 @@ def _each(found: Sequence[Found]) -> Table:
 
 def _trip(one: Found) -> tuple[Cell, ...]:
     trip, start, goal = one.trip, one.setting.start, one.setting.goal
-    true = one.true if math.isfinite(one.true) else None
-    planned = trip.planned if math.isfinite(trip.planned) else None
+    lengths = (length if math.isfinite(length) else None for length in (trip.planned, one.mapped, one.true))
     things = ", ".join(dict.fromkeys(touch.thing for touch in trip.touched))
     return (
         one.group, one.setting.room.name, trip.state.value, trip.reason, "yes" if trip.arrived else "no", things,
-        start[0], start[1], goal.x, goal.y, planned, one.mapped, true, trip.way, trip.routes, trip.time,
+        start[0], start[1], goal.x, goal.y, *lengths, trip.way, trip.routes, trip.time,
         100 * trip.off, math.degrees(trip.turned), 100 * trip.lost,
     )  # fmt: skip
 

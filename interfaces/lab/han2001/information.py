@@ -59,7 +59,7 @@ def commands_at_once(T_d: float) -> int:
     way: Channel[int] = Channel(Conditions(delay=OneLate(T_d), service=Service.IN_ORDER), np.random.default_rng(0))
     for k in range(math.ceil(T_d / T) + 10):
         way.send(k, k * T)
-    arrivals = [found.arrived for found in way.receive(math.inf if T_d == math.inf else T_d + 100.0)]
+    arrivals = [found.arrived for found in way.receive(T_d + 100.0)]
     # The late one itself isn't one of them.
     return sum(abs(arrived - arrivals[0]) < 1e-9 for arrived in arrivals[1:])
 

@@ -11,6 +11,7 @@ import numpy as np
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Study, Table
 from interfaces.lab.localization.pictures import Scene, scenes
 from interfaces.lab.localization.trial import (
+    CONTROL,
     STILL,
     Listener,
     Reckoning,
@@ -191,7 +192,9 @@ def _pooled(found: tuple[RoomFound, ...]) -> Table:
         "method", "position, 95 % [cm]", "heading, 95 % [deg]", "largest [cm]", "rooms within bars",
         "mean normalised", "inside 95 % [%]",
     )  # fmt: skip
-    return Table("accuracy", f"errors in {len(found)} rooms, a row of {50} ms each", columns, tuple(rows))
+    return Table(
+        "accuracy", f"errors in {len(found)} rooms, a row of {1000 * CONTROL:g} ms each", columns, tuple(rows)
+    )
 
 
 def _by_room(found: tuple[RoomFound, ...]) -> Table:

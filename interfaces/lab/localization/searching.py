@@ -43,12 +43,6 @@ class Start:
     room: str
     answer: str
     """`right`, `wrong`, `ambiguous` or `none`."""
-    off: float
-    """Of the best place that was named [m]; nan if none was."""
-    turned: float
-    """The same [rad]."""
-    after: float
-    """When the answer came [s]."""
 
 
 @cache
@@ -86,27 +80,23 @@ def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float,
     chosen = setting(room, number, 0.03, seed)
     localizer = Localizer(plan_map(room))
     with body_of(chosen, posture) as body:
-        answered = math.inf
         while body.time < PATIENCE:
             localizer.move(body.time, body.reckoned)
             if body.laser is not None:
                 localizer.see(body.laser)
             if localizer.status is Status.TRACKING:
-                answered = body.time
                 break
             body.drive(0.0, TURN, round(CONTROL / body.reality.dt))
-        truth = body.truth
-    named = (
-        [localizer.posture] if localizer.status is Status.TRACKING else [c.posture for c in localizer.candidates]
-    )
-    offs = [(math.dist(p[:2], truth[:2]), abs(wrapped(p[2] - truth[2]))) for p in named if p is not None]
-    off, turned = min(offs, default=(math.nan, math.nan))
-    right = off <= NEAR and turned <= NEAR_TURN
-    if localizer.status is Status.TRACKING:
-        answer = "right" if right else "wrong"
-    else:
-        answer = "ambiguous" if localizer.status is Status.AMBIGUOUS else "none"
-    return Start(room.name, answer, off, turned, answered)
+        return Start(room.name, _answer(localizer, body.truth))
+
+
+def _answer(localizer: Localizer, truth: tuple[float, float, float]) -> str:
+    """What is to be thought of what a localizer says."""
+    if localizer.posture is None or localizer.status is not Status.TRACKING:
+        return "ambiguous" if localizer.status is Status.AMBIGUOUS else "none"
+    x, y, theta = localizer.posture
+    near = math.dist((x, y), truth[:2]) <= NEAR and abs(wrapped(theta - truth[2])) <= NEAR_TURN
+    return "right" if near else "wrong"
 
 
 def conclude_starts(study: Study, found: tuple[tuple[Start, ...], ...]) -> Findings:  # noqa: ARG001

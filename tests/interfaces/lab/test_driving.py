@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from interfaces.cli.main import app
 from interfaces.lab.driving.attribution import attributed
 from interfaces.lab.driving.operators import STYLES, operator
+from interfaces.lab.driving.output import COMPARED, summary
 from interfaces.lab.driving.run import Case, run
 from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
 from interfaces.teleop.architectures import Transport
@@ -149,6 +150,22 @@ def test_a_paired_difference_has_a_verdict() -> None:
     assert verdict(high, low) == "above"
     assert verdict(low, [x * 1.01 for x in low]) == "equal"
     assert verdict([0.01, 0.05], [0.04, 0.01]) == "unclear"
+
+
+def test_a_summary_pairs_what_ran_under_the_same_network_and_has_the_worst_run() -> None:
+    row = measure(Case("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
+    rows = [
+        replace(row, architecture=who, delay=delay, seed=k, metrics=replace(row.metrics, path_error_max=worst))
+        for who, delay in (("II", "mon"), ("III", "mon"), ("III", "wed"))
+        for k, worst in enumerate((0.02, 0.09, 0.04))
+    ]
+    found = summary(rows, {})
+    assert {(one["first"]["delay"], one["second"]["delay"]) for one in found["paired"]} == {("mon", "mon")}
+    assert [one["metric"] for one in found["paired"]] == list(COMPARED)
+    assert [group["largest"]["path_error_max"] for group in found["groups"]] == [0.09] * 3
+    assert [group["median"]["path_error_max"]["value"] for group in found["groups"]] == [0.04] * 3
+    stopped = [replace(one, metrics=replace(one.metrics, progress=0.5)) for one in rows]
+    assert [one["metric"] for one in summary(stopped, {})["paired"]] == ["path_error_max", "time_difference_mean"]
 
 
 def test_the_command_writes_its_table(tmp_path: Path) -> None:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +15,27 @@ from typer.testing import CliRunner
 
 from interfaces.cli.main import app
 from interfaces.lab import Study, reproduce
-from interfaces.lab.claims import Paper, Part
-from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, setting
+from interfaces.lab.claims import Findings, Paper, Part
+from interfaces.lab.goals import study as goals_study
+from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, SHUT, setting
 from interfaces.lab.goals.shortest import Shortest
-from interfaces.lab.goals.study import EACH, conclude_asked, measure, study_of, write
+from interfaces.lab.goals.study import (
+    EACH,
+    Found,
+    conclude_asked,
+    conclude_physics,
+    conclude_shut,
+    measure,
+    study_of,
+    write,
+)
+from interfaces.lab.goals.trial import Setting, Trip
 from robots.bullet.rooms import Block, Room
+from robots.ipr.chassis import IPR
+from robots.ipr.navigation import route_map
+from robots.ipr.robot import Collision
+from robots.onboard.journey import Goal, JourneyState
+from robots.onboard.routes import Route
 from vrs.errors import InvalidValueError
 
 
@@ -74,6 +93,76 @@ def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
     assert len(rows) == 3
     claims = json.loads(written[0]["summary.json"])["claims"]
     assert claims[0]["measured"] == 2
+
+
+TRIP = Trip(JourneyState.ARRIVED, "", 5.2, 20.0, 1, 5.2, 0.01, 0.01, 0.02, (), np.zeros((2, 3)))
+FAILED = {"state": JourneyState.FAILED, "reason": "no way"}
+
+
+def found(group: str, *, mapped: float = 5.0, **changes: Any) -> Found:
+    where = Setting(Room("square", 6.0, 6.0), (1.0, 1.0, 0.0), Goal(5.0, 5.0, 0.0), (0, 1, 0))
+    return Found(group, where, replace(TRIP, **changes), mapped, mapped)
+
+
+@pytest.fixture(name="without_maps")
+def _without_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(goals_study, "maps", lambda _: [])
+
+
+@pytest.mark.usefixtures("without_maps")
+@pytest.mark.parametrize(
+    ("group", "changes", "said"),
+    [
+        (FURNITURE, {"off": 0.051}, ["reached within"]),
+        (FURNITURE, {"turned": math.radians(2.1)}, ["reached within"]),
+        (FURNITURE, FAILED, ["reached within"]),
+        (FURNITURE, {"touched": (Collision(1.0, "chair"),)}, ["touched"]),
+        (FURNITURE, {"planned": 5.8}, ["longer than"]),
+        (FURNITURE, {"planned": math.nan}, ["longer than"]),
+        (FURNITURE, {"mapped": math.inf}, ["longer than"]),
+        (ROUND, FAILED, ["reached within", "went round"]),
+        (LATE, FAILED, ["reached within", "waited for"]),
+    ],
+)
+def test_claims_on_goals_fail_where_a_trip_did(group: str, changes: dict[str, Any], said: list[str]) -> None:
+    good = [found(FURNITURE), found(ROUND), found(LATE)]
+    assert [claim.claim for claim in conclude_asked(Study(), tuple(good)).claims if not claim.holds] == []
+    made = conclude_asked(Study(), (*good, found(group, **changes))).claims
+    assert [any(word in claim.claim for word in said) for claim in made] == [not claim.holds for claim in made]
+
+
+@pytest.mark.usefixtures("without_maps")
+def test_routes_that_are_mostly_too_long_or_unknown_are_said_so() -> None:
+    for changes in ({"planned": 6.0}, {"mapped": math.inf}):
+        middle = conclude_asked(
+            Study(), tuple(found(group, **changes) for group in (FURNITURE, ROUND, LATE))
+        ).claims[2]
+        assert "median" in middle.claim
+        assert not middle.holds
+
+
+@pytest.mark.usefixtures("without_maps")
+def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
+    def holds(conclude: Callable[..., Findings], *trips: Found) -> list[bool]:
+        return [claim.holds for claim in conclude(Study(), trips).claims]
+
+    shut = found(SHUT, **FAILED)
+    assert holds(conclude_shut, shut) == [True]
+    for wrong in ({}, {"state": JourneyState.ENDED, "reason": "no way"}, FAILED | {"reason": "stuck"}):
+        assert holds(conclude_shut, shut, found(SHUT, **wrong)) == [False]
+    assert holds(conclude_physics, found(PHYSICS)) == [True, True]
+    assert holds(conclude_physics, found(PHYSICS), found(PHYSICS, **FAILED)) == [False, True]
+    assert holds(conclude_physics, found(PHYSICS, touched=(Collision(1.0, "chair"),))) == [True, False]
+
+
+def test_a_way_through_a_door_leads_through_it() -> None:
+    for group in (ROUND, LATE):
+        made = setting(group, 3, 1)
+        closed = [door.at(0.0) for door in made.room.doors if door.share(0.0) == 0.0]
+        route = route_map(made.room, IPR).route(made.start[:2], (made.goal.x, made.goal.y))
+        assert isinstance(route, Route)
+        places = route.places(0.05)
+        assert min(np.hypot(*(places - (door.x, door.y)).T).min() for door in closed) < 0.4
 
 
 def test_a_study_has_as_many_goals_as_are_asked_for() -> None:

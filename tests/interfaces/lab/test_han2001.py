@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from interfaces.lab.claims import Claim, Findings, Study
+from interfaces.lab.driving.run import run
 from interfaces.lab.han2001 import PAPER, architectures, filtering, information
 from interfaces.lab.han2001.architectures import CASES, REPEATED, STREAMED, Found, Seen
+from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 
 SMALL = Study(seed=0, runs=2, length=6.0)
@@ -33,6 +36,11 @@ def test_a_sine_is_lost_and_the_figure_says_so() -> None:
     found = information.work(SMALL, "")
     assert all(claim.holds for claim in found.claims)
     assert found.figures[0].svg.startswith("<?xml")
+
+
+def test_a_sine_that_arrives_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(information, "PROFILE", "none")
+    assert [claim.holds for claim in information.work(SMALL, "").claims] == [True, False]
 
 
 def test_the_modified_filter_saves_what_the_formula_says() -> None:
@@ -59,10 +67,18 @@ GOOD = {
 }  # fmt: skip
 
 
-def concluded(runs: dict[str, Seen]) -> dict[str, Claim]:
-    sim = runs | {"II": made(0.001, 6.0)}
+SIMULATED = "II in simulation"
+
+
+def concluded(runs: dict[str, Seen], others: dict[str, Seen] | None = None) -> dict[str, Claim]:
+    """Claims where the first seed went like this, the second like that, in every case."""
+    both = runs, runs if others is None else others
+    simulated = [them | {"II": them.get(SIMULATED, made(0.001, 6.0))} for them in both]
     results = tuple(
-        Found({who: (one, one) for who, one in (sim if case.startswith("model") else runs).items()}, {})
+        Found(
+            {who: tuple(them[who] for them in (simulated if case.startswith("model") else both)) for who in GOOD},
+            {},
+        )
         for case in CASES
     )
     drawn, architectures.DRAWN = architectures.DRAWN, ()  # type: ignore[misc]
@@ -94,6 +110,48 @@ def test_claims_hold_where_the_figures_say_so() -> None:
 def test_and_don_t_where_they_say_otherwise(who: str, instead: Seen, said: str) -> None:
     failed = [claim.claim for claim in concluded(GOOD | {who: instead}).values() if not claim.holds]
     assert any(said in claim for claim in failed), failed
+
+
+def failed(runs: dict[str, Seen], others: dict[str, Seen] | None = None) -> set[str]:
+    return {text for text, claim in concluded(runs, others).items() if not claim.holds}
+
+
+def test_each_network_has_its_own_bar_of_the_time_difference() -> None:
+    share = f"{REPEATED}: mean time difference as a share of III's"
+    late = {f"mon: {share}", f"wed: {share}", f"thu: {share}", f"domain: {REPEATED}: mean time difference [s]"}
+    assert failed(GOOD | {REPEATED: made(0.007, 2.3, speed=0.03)}) == late
+    assert failed(GOOD | {REPEATED: made(0.007, 2.2, speed=0.03)}) == late - {f"mon: {share}"}
+    assert failed(GOOD | {REPEATED: made(0.007, 0.51, speed=0.03)}) == {
+        f"domain: {REPEATED}: mean time difference [s]"
+    }
+
+
+def test_the_worst_seed_counts_where_it_is_asked_for_and_an_interval_with_both_ends() -> None:
+    bad = failed(GOOD, GOOD | {STREAMED: made(0.06, 3.1, speed=0.03)})
+    assert sum("worst seed" in text for text in bad) == 4
+    assert not any("worst seed" in text for text in failed(GOOD, GOOD | {STREAMED: made(0.049, 3.1, speed=0.03)}))
+    wide = failed(GOOD, GOOD | {SIMULATED: made(0.03, 6.0)})
+    assert any(text.startswith("II keeps the path in simulation") for text in wide)
+
+
+def test_a_run_is_summed_up_with_what_it_broke() -> None:
+    drive = run(architectures.case_of("model", "domain", "timeline", Transport.DATAGRAMS, 0, 6.0))
+    assert architectures.seen(drive).limits_passed == 0
+    fast = drive.drives.copy()
+    fast[40] = 0.6, 0.0
+    # Faster than the limit, and two steps too large.
+    assert architectures.seen(replace(drive, drives=fast)).limits_passed == 2
+    fast[40] = drive.drives[40, 0], 1.0
+    assert architectures.seen(replace(drive, drives=fast)).limits_passed == 1
+    assert architectures._growth(np.arange(9.0)) == 6.0
+
+
+def test_a_seed_counts_once_however_many_networks_it_ran_under() -> None:
+    found = concluded(GOOD, GOOD | {"III": made(0.3, 3.0)})
+    claim = next(one for text, one in found.items() if text.startswith("III's path error stays small"))
+    # Of two seeds a quarter of the resamples are of the worse one alone.
+    assert claim.interval == pytest.approx((6.0, 30.0))
+    assert not claim.holds
 
 
 def test_the_paper_is_in_the_list() -> None:

@@ -13,7 +13,7 @@ from interfaces.lab.driving.legs import point_ahead, way_left
 from interfaces.lab.driving.recorded import name_of, paths
 from interfaces.lab.driving.run import Case
 from interfaces.lab.driving.sweep import comparable
-from interfaces.lab.statistics import bootstrap, median
+from interfaces.lab.statistics import bootstrap, clustered, median
 from vrs.comparison import PathComparison
 from vrs.errors import InvalidValueError
 
@@ -34,6 +34,24 @@ def test_an_interval_is_as_wide_as_theory_says() -> None:
 def test_there_is_no_interval_of_nothing(values: list[float]) -> None:
     with pytest.raises(InvalidValueError):
         bootstrap(values, 0)
+    with pytest.raises(InvalidValueError):
+        clustered(values if np.ndim(values) == 1 else [[1.0], [math.inf]], 0)
+
+
+def test_runs_of_one_seed_are_no_more_news_than_one_of_them() -> None:
+    rng = np.random.default_rng(2)
+    seeds = rng.normal(3.0, 2.0, 30)
+    alone = bootstrap(seeds, 0)
+    # Nine runs that say the same: the interval stays what one of each seed gives, in its own unit.
+    assert clustered(np.tile(seeds[:, None], 9), 0) == pytest.approx(alone)
+    assert clustered(np.tile(seeds[:, None], 9), 0, median) == pytest.approx(bootstrap(seeds, 0, median))
+    # Runs that have nothing to do with each other count as so many more.
+    free = rng.normal(3.0, 2.0, (30, 9))
+    found = clustered(free, 0)
+    assert found.value == pytest.approx(free.mean())
+    one_by_one = bootstrap(free.ravel(), 0)
+    assert found.high - found.low == pytest.approx(one_by_one.high - one_by_one.low, rel=0.3)
+    assert found.high - found.low < 0.5 * (alone.high - alone.low)
 
 
 @pytest.mark.parametrize(("progress", "delay", "speed"), [(0.97, 0.3, 0.2), (0.96, 0.9, None), (None, 0.9, None)])
@@ -42,7 +60,9 @@ def test_what_a_robot_never_reached_has_no_delay(progress: float | None, delay: 
     metrics = PathComparison(**{item.name: given.get(item.name, 0.1) for item in fields(PathComparison)})
     assert comparable(metrics, "time_difference_mean") == delay
     assert comparable(metrics, "speed_error") == speed
-    assert comparable(metrics, "path_error_mean") == 0.1
+    # Nor has a robot that stayed where it was a mean distance from the way it was to go.
+    assert comparable(metrics, "path_error_mean") == (None if speed is None else 0.1)
+    assert comparable(metrics, "path_error_max") == 0.1
 
 
 def test_what_is_ahead_on_a_line_goes_round_its_corners() -> None:

@@ -204,6 +204,12 @@ def test_shorter_paths_are_claimed_as_they_are():
     findings = shorter.conclude(SMALL, tuple(paths[2:] + arriving))
     assert findings.claims[0].measured == pytest.approx(0.9)
     assert not findings.claims[0].holds
+    assert findings.claims[0].interval == pytest.approx((0.9, 0.9))
+    # A network of ten that fails on all paths: what is uncertain is how many such networks are drawn.
+    quick = runs | {Control.DIRECT: (GOOD["behind"], *(GOOD["without"],) * 9)}
+    claim = shorter.conclude(SMALL, (Found(7.0, GOOD["ideal"], quick, {}),) * PATHS).claims[0]
+    assert claim.measured == pytest.approx(0.9)
+    assert claim.interval == pytest.approx((0.7, 1.0), abs=0.101)
     assert [row[0] for row in findings.tables[0].rows][1:] == ["without middleware", "middleware, network"]
 
 
@@ -257,6 +263,61 @@ def test_the_gains_claims_hold(monkeypatch):
     raw = [row for row in found.tables[0].rows if row[0].startswith("the paper's")]
     assert all(row[4] > 0.1 for row in raw)
     assert found.timings[0].holds
+
+
+def test_the_gains_claims_fail_where_it_is_off_and_name_percent():
+    good = gain.Errors(1e-5, 1e-3, 5e-3)
+    assert [claim.measured for claim in gain._accurate("one", {"uniform": good})] == pytest.approx([0.1, 0.5])
+    for bad, holds in (({"p99": 1.01e-3}, [False, True]), ({"largest": 5.01e-3}, [True, False])):
+        claims = gain._accurate("one", {"uniform": good, "other": good._replace(**bad)})
+        assert [claim.holds for claim in claims] == [True, True, *holds]
+
+
+def test_a_guard_that_lets_too_much_pass_fails(monkeypatch):
+    monkeypatch.setattr(gain, "train", lambda *_, **__: gain.default_network())
+    monkeypatch.setattr(gain, "EXAMPLES", 2000)
+    monkeypatch.setattr(gain, "step_time", lambda _: 51e-6)
+    monkeypatch.setattr(gain, "guard", lambda _, given, __: (1.0 + 1e-8, 0.5))
+    found = gain.work(SMALL, "")
+    assert ["J / ε − 1" in claim.claim for claim in found.claims] == [not claim.holds for claim in found.claims]
+    assert not found.timings[0].holds
+    assert found.timings[0].measured == pytest.approx(51.0)
+
+
+def test_a_controller_that_is_no_better_behind_the_middleware_fails():
+    runs = {"without": (GOOD["without"],) * 4, "with": (GOOD["behind"],) * 4}
+    assert wrapping._claim("ipr/one", runs, 0).holds
+    assert wrapping._claim("ipr/one", runs, 0).measured == pytest.approx(0.2)
+    worse = (*(GOOD["behind"],) * 3, GOOD["behind"]._replace(error=0.4))
+    assert not wrapping._claim("ipr/one", runs | {"with": worse}, 0).holds
+
+
+@pytest.mark.parametrize(("arrivals", "error", "letter"), [
+    ((True, True, False), 0.02, "·"), ((False, True, False), 0.02, "n"), ((True, False, False), 0.02, "m"),
+    ((True, True, True), 0.02, "w"), ((True, True, False), 0.041, "e"),
+])  # fmt: skip
+def test_a_letter_says_what_became_of_a_path(arrivals, error, letter, monkeypatch):
+    ideal, behind, without = arrivals
+    monkeypatch.setattr(extent, "run", lambda _, control, delay, *__, **___: (control, delay.name))
+    monkeypatch.setattr(extent, "agent", lambda control, *_: control)
+
+    def seen(told):
+        control, delay = told
+        arrived = ideal if delay == "none" else behind if control is Control.EXACT else without
+        return Seen(arrived, 1.0, 0.1 if control is Control.DIRECT else error, 1.0, Reason.SLOW)
+
+    monkeypatch.setattr(extent, "seen", seen)
+    assert extent._outcome(0, 0.2, extent.varied("alpha", 2.0, 15.0)) == letter
+
+
+def test_enough_runs_succeed_by_their_share_not_by_its_interval():
+    runs = {Control.DIRECT: (GOOD["without"],) * 10, Control.NETWORK: (GOOD["behind"],) * 10}
+    some = runs | {Control.NETWORK: (GOOD["behind"],) * 9 + (GOOD["without"],)}
+    for many, holds in ((10, True), (11, False)):
+        paths = [Found(8.5, GOOD["ideal"], some, {})] * many + [Found(8.5, GOOD["ideal"], runs, {})] * (
+            PATHS - many
+        )
+        assert success.claim("ipr", Control.NETWORK, paths, T_PRED, 0).holds is holds
 
 
 def test_the_paper_is_in_the_list():

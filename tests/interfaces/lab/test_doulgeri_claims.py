@@ -1,0 +1,233 @@
+"""What is claimed of Doulgeri's paper follows from the figures, and fails where they do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from interfaces.lab.claims import Claim, Figure, Study
+from interfaces.lab.doulgeri import (
+    agreement,
+    causality,
+    delays,
+    dragging,
+    encoding,
+    interactivity,
+    jitter,
+    segments,
+)
+from interfaces.messages import Form
+
+STUDY = Study(seed=0, runs=2, length=4.0)
+
+
+@pytest.fixture(autouse=True)
+def _without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (agreement, dragging, encoding, interactivity, jitter, segments):
+        monkeypatch.setattr(module, "draw", lambda *_, **__: Figure("", "", ""))
+
+
+def failed(claims: Iterable[Claim]) -> list[str]:
+    return [claim.claim for claim in claims if not claim.holds]
+
+
+def only(claims: Iterable[Claim], *said: str) -> None:
+    """Those claims fail, and no others."""
+    found = failed(claims)
+    assert len(found) == len(said), found
+    assert all(any(word in claim for claim in found) for word in said), found
+
+
+SHARE = 1.0 - math.exp(-0.8 * 0.5)
+PREDICTED = delays.Seen((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SHARE)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        ({"lateness": (0.0, 1e-8)}, ["come late"]),
+        ({"ages": (0.0, 0.0, 1e-8)}, ["age of frames"]),
+        ({"ages": (-1e-8, 0.0, 0.0)}, ["age of frames"]),
+        ({"postponed": 0.1}, ["postponed"]),
+        ({"falsified": SHARE + 0.011}, ["largest difference"]),
+        ({"falsified": 0.8 * SHARE, "foretold": 0.8 * SHARE}, ["share of predicted"]),
+    ],
+)
+def test_delays_of_predicted_frames(changes: dict[str, Any], said: list[str]) -> None:
+    setting = delays.SETTINGS["-Df, predicted"]
+    only(delays._claims(STUDY, setting, [PREDICTED._replace(**changes)] * 2), *said)
+
+
+def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
+    setting = delays.SETTINGS["-Df"]
+    seen = PREDICTED._replace(ages=(0.5, 0.5, 0.5), falsified=0.0)
+    only(delays._claims(STUDY, setting, [seen] * 2))
+    only(delays._claims(STUDY, setting, [seen, seen._replace(falsified=0.01)]), "none being predicted")
+    shares = np.tile(-np.expm1(-0.8 * np.array(delays.LEADS)), (3, 1))
+    only(delays._lead_claims(STUDY, shares))
+    only(delays._lead_claims(STUDY, 0.85 * shares), "0.1 s", "0.5 s", "1 s")
+
+
+NOWHERE = np.zeros((1, 3))
+HAND = dragging.Seen(0.005, 0.02, 0.05, 0.0, 1.0, 0, 200, 5e-4, 0.3, np.zeros(1), NOWHERE, NOWHERE, NOWHERE)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"rejected": 1}, ["rejected"]),
+        ({"answered": 0.021}, ["an input moves"]),
+        ({"lag": 0.11}, ["latency"]),
+        ({"following": 0.0101}, ["following error"]),
+        ({"largest": 0.031}, ["largest distance"]),
+        ({"limits": 1.001}, ["limits"]),
+        ({"real": 0.0011}, ["the real tool is off"]),
+    ],
+)
+def test_dragging(changes: dict[str, Any], said: list[str]) -> None:
+    only(dragging.conclude(STUDY, (HAND, HAND, None, None)).claims)
+    # One hand of two: of the interval's end a quarter of the resamples are that one alone.
+    only(dragging.conclude(STUDY, (HAND, HAND._replace(**changes), None, None)).claims, *said)
+
+
+def test_encoding() -> None:
+    good = encoding.Sizes(120.0, 60.0, 100.0, 100.0, 1e-3, 0.0)
+    only(encoding.conclude(STUDY, ([good] * 2,) * 3).claims)
+    by_hand = encoding.conclude(STUDY, ([good] * 2, [good, good._replace(segments=115.0)], [good] * 2)).claims
+    only(by_hand, "bytes of segments")
+    only(
+        encoding.conclude(STUDY, ([good, good._replace(rebuilt=1e-11)], [good] * 2, [good] * 2)).claims,
+        "off by at most",
+    )
+    said = encoding.conclude(
+        STUDY, ([good, good._replace(commands=119.0)], [good] * 2, [good._replace(commands=140.0)] * 2)
+    )
+    only(said.claims, "a move every 2 s: bytes", "twist by hand, 50 inputs a second: bytes")
+
+
+RUN = jitter.Seen(0.001, 0.002, 0.004, 1.0, 2.0, 1.0, 0.0, 0, 1.0, 1.05, 0, 10, 0)
+FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"aside": 0.0011}, ["off the virtual"]),
+        ({"bursts": 1}, ["bursts"]),
+        ({"pace": 1.051}, ["pace"]),
+        ({"limits": 1.001}, ["largest speed"]),
+        ({"postponed": 1}, ["moves postponed at the robot"]),
+        ({"progress": 0.96}, ["least share"]),
+        ({"mean": 0.021}, ["mean path error"]),
+        ({"time_difference": 3.1}, ["mean time difference"]),
+    ],
+)
+def test_jitter(changes: dict[str, Any], said: list[str]) -> None:
+    def claims(*adaptive: jitter.Seen) -> Sequence[Claim]:
+        result: Any = jitter.Result(-2.0, adaptive, (FIXED,) * 2, ())  # type: ignore[arg-type]
+        return jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims
+
+    only(claims(RUN, RUN))
+    only(claims(RUN, RUN._replace(**changes)), *said)
+
+
+def test_a_fixed_offset_that_postpones_nothing_is_said_so() -> None:
+    result: Any = jitter.Result(-2.0, (RUN,) * 2, (FIXED._replace(postponed=0),) * 2, ())  # type: ignore[arg-type]
+    only(jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims, "a fixed D postpones")
+
+
+def test_a_burst_is_moves_that_begin_within_half_of_the_time_between_them() -> None:
+    given = np.array([0.0, 1.0, 1.4, 3.4, 3.9])
+    assert jitter.bursts(given, given + 2.0) == 0
+    assert jitter.bursts(given, np.array([2.0, 2.51, 2.9, 3.91, 4.16])) == 0
+    # What was given within half a second may come together.
+    assert jitter.bursts(given, np.array([2.0, 2.49, 2.5, 3.49, 3.73])) == 3
+
+
+def test_the_fixed_offset_hides_what_95_percent_of_the_packets_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[float | None] = []
+    monkeypatch.setattr(jitter, "run", lambda _, __, ___, D: (given.append(D), ())[1:] * 2)
+    jitter.work(STUDY, "mon@2")
+    quantile = jitter.delay_profile("mon").quantile(0.95)
+    assert given == [None, -quantile] * 2
+
+
+AGREED = agreement.Seen(1.0, 0.3, (0.1,), (0.5,), 0.1, 1.0, np.zeros(1), np.zeros(1))
+QUIET = AGREED._replace(corrections=(), durations=())
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "said"),
+    [
+        ("late", {"agreed": 10.1}, ["late by"]),
+        ("blocked", {"agreed": math.inf}, ["blocked in a move: timelines agree"]),
+        ("blocked", {"unlinked": 0.0}, ["stay apart"]),
+        ("late", {"unlinked": 0.0}, []),
+        ("late", {"limits": 1.001}, ["limits"]),
+        ("blocked", {"noticed": 0.41}, ["turns to where"]),
+        ("lossless", {"corrections": (0.1,)}, ["no losses: corrections"]),
+        ("lossy", {"agreed": 11.0}, ["lost, 10 % twice: timelines"]),
+    ],
+)
+def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
+    good = {"late": AGREED, "blocked": AGREED, "lossless": QUIET, "lossy": QUIET}
+    bad = good | {case: good[case]._replace(**changes)}
+    only(agreement.conclude(STUDY, tuple([seen] * 2 for seen in good.values())).claims)
+    only(agreement.conclude(STUDY, tuple([good[name], bad[name]] for name in good)).claims, *said)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"position_jump": 2e-9}, ["largest jump [rad]"]),
+        ({"velocity_jump": 2e-9}, ["largest jump [rad/s]"]),
+        ({"changed": 1}, ["segments that changed"]),
+        ({"uneven": 2e-9}, ["difference of shifts"]),
+        ({"past": 2e-9}, ["largest change before"]),
+        ({"tails": 0}, ["segments that changed", "difference of shifts"]),
+    ],
+)
+def test_segments(changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = segments.Spliced(0.0, 0.0, 5, 0, 0.0, 0.0)._replace(**changes)
+    monkeypatch.setattr(segments, "splice", lambda _: seen)
+    only(segments.work(STUDY, "").claims, *said)
+
+
+def test_causality(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(causality, "over_a_link", lambda D, _, __: (3, 9 if D else 10, 10))
+    monkeypatch.setattr(causality, "both_sites", lambda D, _, __: (0, 1, 10))
+    only(causality.work(STUDY, "").claims, "D = −D_f: commands", "D = +D_b: commands", "D = −D_f: postponed")
+    monkeypatch.setattr(causality, "over_a_link", lambda *_: (3, 10, 10))
+    monkeypatch.setattr(causality, "both_sites", lambda *_: (0, 0, 10))
+    only(causality.work(STUDY, "").claims, "D = 0: postponed")
+
+
+SCRUBBED = interactivity.Scrubbed(
+    {Form.SEGMENTS: 0.01, Form.FRAMES: 0.28}, 0.0, (8.0, 1.5, 1.5), 0.0, (0.0,), (0.0,)
+)
+
+
+@pytest.mark.parametrize(
+    ("edit", "changes", "said"),
+    [
+        ({}, {}, []),
+        ({"stop": 0.26}, {}, ["an edit shows after"]),
+        ({"undo": math.inf}, {}, ["carried out and shown", "an edit shows after", "undo while live"]),
+        ({}, {"seek": {Form.SEGMENTS: 0.021, Form.FRAMES: 0.28}}, ["segments: first frame"]),
+        ({}, {"seek": {Form.SEGMENTS: 0.01, Form.FRAMES: 0.291}}, ["frames: first frame"]),
+        ({}, {"dragged": 0.01}, ["isn't dragged"]),
+        ({}, {"live": (8.0, 1.6, 1.5)}, ["going live"]),
+        ({}, {"others": 0.021}, ["keep their age"]),
+    ],
+)
+def test_interactivity(
+    edit: dict[str, float], changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(interactivity, "edits", lambda _: dict.fromkeys(interactivity.EDITS, 0.25) | edit)
+    monkeypatch.setattr(interactivity, "scrub", lambda _: SCRUBBED._replace(**changes))
+    only(interactivity.work(STUDY, "").claims, *said)

@@ -1,0 +1,168 @@
+"""What is claimed of the localization follows from the figures, and fails where they do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from interfaces.lab.claims import Findings, Study
+from interfaces.lab.localization import searching
+from interfaces.lab.localization.accuracy import (
+    AS_BUILT,
+    BUILT,
+    METHODS,
+    PLAN,
+    SLOW,
+    RoomFound,
+    conclude_rooms,
+)
+from interfaces.lab.localization.searching import (
+    Carried,
+    Start,
+    Twofold,
+    conclude_carried,
+    conclude_starts,
+    conclude_symmetric,
+)
+from interfaces.lab.localization.trial import Track
+from interfaces.lab.localization.unobservable import Axis, conclude_axes
+from robots.onboard.localizer import Status
+
+SPREAD = np.array([0.002, 0.002, 0.001])
+"""Deviations of x, y [m] and heading [rad] of somebody who keeps all bars."""
+
+
+def track(*, place: float = 1.0, turn: float = 1.0, doubt: float = 1.0, outlier: float = 0.0) -> Track:
+    """Errors so many times as large as they may be, honest but for what `doubt` is larger than they are."""
+    rng = np.random.default_rng(0)
+    spread = SPREAD * (place, place, turn)
+    errors = rng.normal(size=(4000, 3)) * spread
+    errors[-1, 0] += outlier
+    return Track(errors, np.tile(np.diag((doubt * spread) ** 2), (4000, 1, 1)))
+
+
+GOOD = track()
+
+
+def room(name: str = "", bad: Track = GOOD) -> RoomFound:
+    """A room in which everybody keeps the bars, but for one."""
+    tracks = dict.fromkeys(METHODS, GOOD) | ({name: bad} if name else {})
+    return RoomFound(1, "room", 0, 0.01, 10.0, 0, (4, 4), tracks, None)
+
+
+def failed(conclude: Callable[..., Findings], found: Sequence[Any]) -> list[str]:
+    return [claim.claim for claim in conclude(Study(), tuple(found)).claims if not claim.holds]
+
+
+ACCURATE = [
+    ({"place": 2.2}, ["95 % of position", "rooms of 3"]),
+    ({"turn": 3.0}, ["95 % of heading", "rooms of 3"]),
+    ({"outlier": 0.11}, ["largest position"]),
+    ({"doubt": 0.8}, ["mean squared normalised", "inside the 95 %"]),
+    ({"doubt": 1.4}, ["mean squared normalised", "inside the 95 %"]),
+    ({"doubt": 1.2}, []),
+]
+
+
+@pytest.mark.parametrize("name", [PLAN, AS_BUILT])
+@pytest.mark.parametrize(("changes", "said"), ACCURATE)
+def test_claims_on_accuracy_fail_where_the_errors_are_too_large(
+    name: str, changes: dict[str, float], said: list[str]
+) -> None:
+    assert failed(conclude_rooms, [room()] * 3) == []
+    found = failed(conclude_rooms, [room(name, track(**changes))] * 3)
+    assert all(claim.startswith(f"{name}: ") for claim in found)
+    assert len(found) == len(said)
+    assert all(any(word in claim for claim in found) for word in said)
+
+
+def test_a_built_map_has_bars_of_its_own_and_a_slow_sweep_has_none() -> None:
+    assert failed(conclude_rooms, [room(BUILT, track(place=2.2, turn=3.0))] * 3) == []
+    found = failed(conclude_rooms, [room(BUILT, track(place=6.5, turn=6.5))] * 3)
+    assert ["95 % of" in claim and claim.startswith(BUILT) for claim in found] == [True, True]
+    assert failed(conclude_rooms, [room(SLOW, track(place=10.0))] * 3) == []
+
+
+def test_one_room_of_three_or_a_posture_that_is_missing_is_enough_to_fail() -> None:
+    assert any(
+        "rooms of 3" in claim for claim in failed(conclude_rooms, [room(), room(PLAN, track(place=2.2)), room()])
+    )
+    lost = track()
+    lost.errors[2000] = np.nan
+    assert any("95 % of position" in claim for claim in failed(conclude_rooms, [room(PLAN, lost)]))
+
+
+def test_the_figures_are_in_the_units_that_the_claims_name() -> None:
+    claims = {
+        claim.claim: claim.measured for claim in conclude_rooms(Study(), (room(PLAN, track(outlier=0.5)),)).claims
+    }
+    # 95 % of Rayleigh's distribution, and of the absolute normal one.
+    assert claims[f"{PLAN}: 95 % of position errors [cm]"] == pytest.approx(0.2 * 2.448, rel=0.03)
+    assert claims[f"{PLAN}: 95 % of heading errors [deg]"] == pytest.approx(math.degrees(0.001) * 1.96, rel=0.03)
+    assert claims[f"{PLAN}: largest position error [cm]"] == pytest.approx(50.0, abs=1.0)
+
+
+def starts(**count: int) -> list[list[Start]]:
+    return [[Start("room", answer)] * many for answer, many in count.items()]
+
+
+def test_claims_on_starts_fail_where_too_few_are_found_or_too_many_wrong() -> None:
+    assert failed(conclude_starts, starts(right=95, none=4, wrong=1)) == []
+    assert failed(conclude_starts, starts(right=94, ambiguous=6)) == ["of 100 starts found [%]"]
+    assert failed(conclude_starts, starts(right=98, wrong=2)) == ["wrong and confident [%]"]
+
+
+@pytest.mark.parametrize(("status", "posture", "answer"), [
+    (Status.TRACKING, (1.09, 2.0, 0.05), "right"), (Status.TRACKING, (1.08, 2.08, 0.0), "wrong"),
+    (Status.TRACKING, (1.0, 2.0, math.radians(3.1)), "wrong"), (Status.AMBIGUOUS, (1.0, 2.0, 0.0), "ambiguous"),
+    (Status.SEARCHING, (1.0, 2.0, 0.0), "none"), (Status.SEARCHING, None, "none"),
+])  # fmt: skip
+def test_an_answer_is_right_within_10_cm_and_3_deg(
+    status: Status, posture: tuple[float, float, float] | None, answer: str
+) -> None:
+    told: Any = SimpleNamespace(status=status, posture=posture)
+    assert searching._answer(told, (1.0, 2.0, 0.0)) == answer
+
+
+TWOFOLD = Twofold("room", "ambiguous", 2, 2, 0.05)
+
+
+@pytest.mark.parametrize("bad", [
+    Twofold("room", "tracking", 2, 2, 0.05), Twofold("room", "ambiguous", 1, 2, 0.05),
+    Twofold("room", "ambiguous", 4, 2, 0.05), Twofold("room", "ambiguous", 2, 2, 0.11),
+    Twofold("room", "ambiguous", 2, 2, math.nan),
+])  # fmt: skip
+def test_a_symmetric_room_that_is_taken_for_another_fails(bad: Twofold) -> None:
+    assert failed(conclude_symmetric, [TWOFOLD] * 3) == []
+    assert len(failed(conclude_symmetric, [TWOFOLD, bad])) == 1
+
+
+@pytest.mark.parametrize(("noticed", "off", "said"), [
+    (3.1, 0.01, "noticed"), (math.inf, 0.01, "noticed"), (1.0, 0.11, "found again"), (1.0, math.nan, "found again"),
+])  # fmt: skip
+def test_a_robot_that_never_finds_itself_again_fails(noticed: float, off: float, said: str) -> None:
+    good = Carried("room", 2.0, 1.0, 6.0, 0.01)
+    assert failed(conclude_carried, [good] * 2) == []
+    (claim,) = failed(conclude_carried, [good, Carried("room", 2.0, noticed, 6.0, off)])
+    assert said in claim
+
+
+@pytest.mark.parametrize(("bad", "said"), [
+    (Axis("corridor", 0.94, 0.0, 1.0, 0.01, 0.95), "named"),
+    (Axis("single wall", 1.0, 0.0, 0.09, 0.01, 0.95), "times"),
+    (Axis("room", 0.0, 0.94, 0.01, 0.01, 0.95), "nothing"),
+])  # fmt: skip
+def test_an_axis_that_is_not_named_fails(bad: Axis, said: str) -> None:
+    good = [
+        Axis("corridor", 1.0, 0.0, 1.0, 0.01, 0.95), Axis("single wall", 1.0, 0.0, 1.0, 0.01, 0.95),
+        Axis("room", 0.0, 1.0, 0.01, 0.01, 0.95),
+    ]  # fmt: skip
+    assert failed(conclude_axes, good) == []
+    (claim,) = failed(conclude_axes, [bad])
+    assert said in claim
+    assert claim.startswith(bad.place)
