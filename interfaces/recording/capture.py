@@ -32,6 +32,7 @@ from interfaces.recording.messages import (
 )
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, virtual_pose
 from interfaces.stream.wire.commands import command_wire
+from interfaces.stream.wire.fields import text
 from interfaces.teleop import Correction, Deed, OperatorSite, Report
 from vrs.commands import Profile
 from vrs.model import Array, RobotModel
@@ -226,12 +227,16 @@ class Capture:
 
     def write_out(self) -> None:
         """Write what waits, by time."""
-        due, self._due = self._due, []
-        due.sort(key=itemgetter(0))
-        for t, message in due:
+        for t, message in self.taken():
             if self.put is None:
                 return
             self.put(message, t=t)
+
+    def taken(self) -> list[tuple[float, Message]]:
+        """What waits to be written, by time [s]; it waits no longer."""
+        due, self._due = self._due, []
+        due.sort(key=itemgetter(0))
+        return due
 
     def _times(self, now: float) -> Array:
         """Times of the samples that are due [s], (k,)."""
@@ -379,6 +384,6 @@ def _anchor(number: int, correction: Correction, truth: Timeline, version: int) 
         segments=segment_entries(truth.segments),
         end=correction.end,
         error=correction.error.tolist(),
-        reason=correction.reason,
+        reason=text(correction.reason),
         timeline_version=version,
     )

@@ -18,6 +18,7 @@ from interfaces.recording.recorder import Recorder
 from interfaces.recording.sink import Sink
 from interfaces.runtime.happenings import correction_events
 from interfaces.software import software
+from interfaces.stream.wire import fields
 from interfaces.teleop import Correction, Deed, Report, RobotLine
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
@@ -96,7 +97,7 @@ class _LiveCapture(Capture):
 
     def tell(self, t: float, kind: str, text: str) -> None:
         """Write down an event."""
-        self.add(t, EventEntry(t, kind, text))
+        self.add(t, EventEntry(t, kind, fields.text(text)))
 
     def show_links(self, robot: str, paced: Paced, t: Array, q: Array) -> None:
         """Let the links of a robot, `virtual` or `real`, be shown; see `show`."""
@@ -147,7 +148,7 @@ class LiveRecorder:
             driver="live",
             title=f"live {model.name}",
             seed=seed,
-            delay=link.delay.name,
+            delay=fields.text(link.delay.name),
             offset=what.offset,
             service=str(link.service),
             link_loss=what.link_loss,
@@ -255,9 +256,7 @@ class LiveRecorder:
             late = self._begin.late
             if late is not None:
                 receipts = tuple(one for one in receipts if one.command_id > late.newest)
-        put = self._capture.put
         self.leave()
-        self._capture.put = put
         self._rest = End(now), receipts
 
     def close(self) -> None:
@@ -267,12 +266,13 @@ class LiveRecorder:
         end, receipts = self._rest
         if recorder is None:
             return
-        if not self._stopped:
+        if self._stopped:
+            # What happened since isn't there: the file isn't whole.
+            recorder.close(None)
+        else:
             capture.receipts(end.t, "virtual", receipts)
             capture.whole(end.t)
-            capture.write_out()
-        capture.put = None
-        recorder.close(end)
+            recorder.close(end, last=[message for _, message in capture.taken()])
         self._look()
 
     def health(self) -> dict[str, Any]:

@@ -78,8 +78,8 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     title: Text
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] | None = None
     """Of everything random in the run; None where nothing is."""
-    delay: Word
-    """Delay profile, as it was asked for."""
+    delay: Text
+    """Delay profile, as it was asked for: one of a file has its path."""
     offset: Word
     """`adaptive`, `fixed:S`, or `OWN`; `none` of a mobile robot whose architecture has none."""
     service: Word

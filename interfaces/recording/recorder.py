@@ -5,6 +5,7 @@ Nobody waits for the disk. What finds no room is counted and left out; a disk th
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,7 +26,7 @@ PERIOD = 0.05
 STALLED = 0.75
 """A disk that takes nothing for so long is called a problem [s]."""
 PATIENCE = 5.0
-"""How long closing waits for the disk [s]."""
+"""How long closing waits for a disk that takes nothing [s]."""
 
 
 class Recorder:
@@ -70,6 +71,8 @@ class Recorder:
         self._told = 0
         self._wake, self._closing = Event(), False
         self._end: End | None = None
+        self._last: Iterable[Message] = ()
+        self._ended = False
         self._busy: float | None = None
         self._failed = ""
         self._opened: float | None = None
@@ -103,7 +106,7 @@ class Recorder:
         busy = self._busy
         if busy is not None and (waited := self._clock.now() - busy) > STALLED:
             return f"recording stalls: the disk has taken nothing for {waited:.1f} s"
-        if not self._thread.is_alive() and not self._writer.finished:
+        if not self._thread.is_alive() and not self._ended:
             return "recording failed: its thread has ended"
         return None
 
@@ -125,23 +128,27 @@ class Recorder:
             self._queue.append((number, data, t))
         return True
 
-    def close(self, end: End, *, patience: float = PATIENCE) -> bool:
+    def close(self, end: End | None, *, patience: float = PATIENCE, last: Iterable[Message] = ()) -> bool:
         """Write what waits and the end, and close the file.
 
         Args:
-            end: The last message.
-            patience: How long to wait for the disk [s].
+            end: The last message; None for none: the file reads as cut.
+            patience: How long to wait for a disk that takes nothing [s].
+            last: What is written before the end, at its time, whether there's room or not.
 
         Returns:
             Whether all of that is in the file; otherwise `problem` says why not.
         """
         with self._lock:
-            self._end, self._closing = end, True
+            self._end, self._last, self._closing = end, last, True
         self._wake.set()
-        self._thread.join(patience)
+        size = -1
+        while self._thread.is_alive() and self.size > size:
+            size = self.size
+            self._thread.join(patience)
         if self._thread.is_alive() and not self._failed:
             self._failed = f"recording failed: the disk didn't take the end within {patience:g} s"
-        return not self._failed
+        return self._ended and not self._failed
 
     def _run(self) -> None:
         try:
@@ -152,9 +159,8 @@ class Recorder:
                 self._busy = None
             self._busy = self._clock.now()
             self._drain()
-            assert self._end is not None
-            self._writer.finish(self._end)
-            self.acknowledged = self._written
+            self._finish()
+            self.acknowledged, self._ended = self._written, True
         except RecordingError as error:
             self._failed = str(error)
             self._give_up()
@@ -165,6 +171,7 @@ class Recorder:
         writer, queue = self._writer, self._queue
         while queue:
             number, data, t = queue.popleft()
+            self._busy = self._clock.now()
             before = writer.blocks
             self._tell(t)
             writer.write_encoded(number, data, t)
@@ -181,6 +188,23 @@ class Recorder:
             self.acknowledged = self._written
             self._opened = None
 
+    def _finish(self) -> None:
+        """Write what comes last, and close the file."""
+        writer, end = self._writer, self._end
+        if end is None:
+            writer.flush()
+            writer.abandon()
+            return
+        for message in self._last:
+            self._busy = self._clock.now()
+            number, data = encoded(message)
+            if len(data) > LONGEST:
+                self._counts[number] += 1
+            else:
+                writer.write_encoded(number, data, end.t)
+        self._tell(end.t)
+        writer.finish(end)
+
     def _tell(self, t: float) -> None:
         """Say in the file how much had no room, where that has changed."""
         if (total := sum(self._counts)) != self._told:
@@ -189,8 +213,6 @@ class Recorder:
             self._writer.write_encoded(*encoded(Dropped(t, drops)), t)
 
     def _give_up(self) -> None:
-        try:
+        with contextlib.suppress(RecordingError):
             self._writer.abandon()
-        except RecordingError:
-            self._writer.finished = True
         self._queue.clear()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import msgspec
 import numpy as np
 
 from interfaces.recording.capture import Capture, Paced
+from interfaces.recording.channels import Message
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.messages import Begin, End, EventEntry, PacketEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose
@@ -20,6 +22,7 @@ from interfaces.runtime.attribution import CAUSES, Attribution, Measures, Offset
 from interfaces.runtime.keeping import RunFacts, Turn
 from interfaces.runtime.run import Event, Packet, TwinRun
 from interfaces.software import software
+from interfaces.stream.wire.fields import text
 from interfaces.teleop import OperatorSite
 from vrs.commands import Lateness
 from vrs.errors import FormatError
@@ -68,7 +71,7 @@ class RunRecorder:
             if sink is not None:
                 sink.close()
         else:
-            self._capture.put = self._writer.write
+            self._capture.put = self._put
 
     def turn(self, turn: Turn) -> None:
         """Write down what has happened."""
@@ -87,7 +90,7 @@ class RunRecorder:
             capture.add(now, RealSample(now, play, q, reference))
         capture.show(self._real, t, turn.q_real, capture.model.forward, real_pose)
         self._tell_links(capture, t, turn.q_real, *capture.advance(now=turn.now))
-        self._write_out(capture)
+        capture.write_out()
 
     def _tell_links(self, capture: Capture, t: Array, q_real: Array, t_virtual: Array, q_virtual: Array) -> None:
         # Both robots have samples at the same times, but for the last ones of a run.
@@ -101,7 +104,7 @@ class RunRecorder:
     def _tell_event(self, event: Event, t: float) -> None:
         if event not in self._events and self._capture is not None:
             self._events.add(event)
-            self._capture.add(t, EventEntry(float(event.t), event.kind, event.text))
+            self._capture.add(t, EventEntry(float(event.t), event.kind, text(event.text)))
 
     def _tell_packet(self, number: int, packet: Packet, t: float) -> None:
         if self._packets.get(number) != packet and self._capture is not None:
@@ -129,7 +132,9 @@ class RunRecorder:
         for event in run.events:
             self._tell_event(event, end)
         capture.whole(end)
-        self._write_out(capture, flush=True)
+        capture.write_out()
+        if self._writer is not None:
+            self._try(self._writer.flush)
 
     def finish(self, attributions: Sequence[Attribution] = (), offsets: Sequence[OffsetOutcome] = ()) -> None:
         """Close the file, with what its summary says beside what can be computed from it."""
@@ -140,16 +145,17 @@ class RunRecorder:
             "attributions": [asdict(item) for item in attributions],
             "offsets": [asdict(item) for item in offsets],
         }
-        try:
-            writer.finish(End(self._end, extras))
-        except RecordingError as error:
-            self._fail(error)
+        self._try(lambda: writer.finish(End(self._end, extras)))
 
-    def _write_out(self, capture: Capture, *, flush: bool = False) -> None:
+    def _put(self, message: Message, *, t: float) -> None:
+        writer = self._writer
+        if writer is not None:
+            self._try(lambda: writer.write(message, t=t))
+
+    def _try(self, do: Callable[[], None]) -> None:
+        """Do something with the file; a disk that doesn't take it ends the recording."""
         try:
-            capture.write_out()
-            if flush and self._writer is not None:
-                self._writer.flush()
+            do()
         except RecordingError as error:
             self._fail(error)
 
@@ -159,7 +165,8 @@ class RunRecorder:
         if self._capture is not None:
             self._capture.put = None
         if writer is not None:
-            writer.abandon()
+            with contextlib.suppress(RecordingError):
+                writer.abandon()
 
 
 class _Extras(msgspec.Struct, frozen=True):

@@ -20,6 +20,7 @@ from interfaces.runtime.laboratory import Body, Laboratory
 from interfaces.runtime.offset import spelled
 from interfaces.runtime.plan import PlannedCommand
 from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.stream.wire.fields import text
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from vrs import Engine, Lateness, ManualClock, Receipt, Status
 from vrs.commands import Cancel, Command, InsertVia, Retime
@@ -108,8 +109,9 @@ class TwinSession:
         """When the operator did something last, or will [s]; infinity while that's unknown."""
         link = conditions.forward
         self._facts = RunFacts(
-            model, start, title, seed, link.delay.name, spelled(offset), str(link.service), LINK_LOSS, STEP
-        )
+            model, start, text(title), seed, text(link.delay.name), spelled(offset), str(link.service),
+            LINK_LOSS, STEP,
+        )  # fmt: skip
         self._keeper = keeper
         if keeper is not None:
             keeper.begin(self._facts, self.operator)

@@ -28,7 +28,7 @@ class UdpCounts:
     clients: int = 0
     expired: int = 0
     refused: int = 0
-    """Datagrams of clients beyond the limit."""
+    """Datagrams of clients beyond the limit, or for which the machine has no socket."""
     overflowed: int = 0
     """Datagrams dropped because too many bytes were on their way."""
     unsent: int = 0
@@ -133,13 +133,9 @@ class UdpProxy:
     def _welcome(self, address: SocketAddress) -> _Client | None:
         if len(self._clients) >= self._most:
             return None
-        family, target = self._target
-        sock = socket.socket(family, socket.SOCK_DGRAM)
         try:
-            sock.setblocking(False)
-            sock.connect(target)
+            sock = _connected(*self._target)
         except OSError:
-            sock.close()
             return None
         client = self._clients[address] = _Client(address, sock, self._clock.now())
         asyncio.get_running_loop().add_reader(sock, self._from_server, client)
@@ -186,10 +182,27 @@ class UdpProxy:
                 self._drop(client)
                 self.counts.expired += 1
         if self._clients:
-            earliest = min(client.last for client in self._clients.values())
-            self._idle_timer.set(max(earliest, now) + self._idle)
+            # Who is due already has something on its way, whose arrival moves its time on.
+            due = (client.last + self._idle for client in self._clients.values())
+            self._idle_timer.set(min((t for t in due if t > now), default=now + self._idle))
 
     def _drop(self, client: _Client) -> None:
         asyncio.get_running_loop().remove_reader(client.sock)
         client.sock.close()
         self._clients.pop(client.address, None)
+
+
+def _connected(family: socket.AddressFamily, target: SocketAddress) -> socket.socket:
+    """A non-blocking socket that talks to the server alone.
+
+    Raises:
+        OSError: If the machine has none, or no way there.
+    """
+    sock = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        sock.setblocking(False)
+        sock.connect(target)
+    except OSError:
+        sock.close()
+        raise
+    return sock

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 from collections.abc import Iterable, Iterator
 from functools import partial
@@ -26,6 +27,7 @@ from interfaces.recording.poses import LINK_RATE, POSE_RATE, frames, placed_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
 from interfaces.software import software
+from interfaces.stream.wire.fields import text
 from interfaces.teleop import Deed
 from interfaces.teleop.architectures import OperatorSite
 from interfaces.teleop.architectures.equipment import CONTROL, grid_of
@@ -39,7 +41,7 @@ from vrs.model import Array
 Timed: TypeAlias = tuple[float, Message]
 """A message and its time [s]."""
 LONGEST_WORD = 200
-"""Characters of a profile's or an operator's name that are kept."""
+"""Characters of an operator's name that are kept."""
 
 
 class DriveRecorder:
@@ -86,7 +88,8 @@ class DriveRecorder:
             writer.finish(End(float(drive.t[-1])))
         except RecordingError as error:
             self.problem = str(error)
-            writer.abandon()
+            with contextlib.suppress(RecordingError):
+                writer.abandon()
 
     def _commanded(self, deed: Deed) -> None:
         self._deeds.append((deed, self._site.engine.timeline))
@@ -102,9 +105,9 @@ class DriveRecorder:
             t=0.0,
             robot="ipr",
             driver="laboratory",
-            title=f"{', '.join(named)}, seed {case.seed}",
+            title=text(f"{', '.join(named)}, seed {case.seed}"),
             seed=case.seed,
-            delay=case.delay[:LONGEST_WORD],
+            delay=text(case.delay),
             offset="adaptive" if case.architecture == "timeline" else "none",
             service=case.transport.service.value,
             link_loss="hold",
@@ -116,7 +119,7 @@ class DriveRecorder:
                 body=case.robot,  # type: ignore[arg-type]
                 architecture=case.architecture,
                 transport=case.transport.value,
-                operator=case.operator[:LONGEST_WORD],
+                operator=text(case.operator)[:LONGEST_WORD],
                 length=case.length,
                 period=case.constants.period,
                 position=case.position,

@@ -78,8 +78,8 @@ def array(values: list[float]) -> Array:
 
 
 def text(words: str) -> str:
-    """Text for people, cut off where it's too long."""
-    return words[:LONGEST_TEXT]
+    """Text for people, cut off where it's too long; what UTF-8 can't say, of a file's name, is a question mark."""
+    return words[:LONGEST_TEXT].encode("utf-8", "replace").decode("utf-8")
 
 
 def digits(epoch: int | None) -> str | None:

@@ -9,101 +9,15 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, LinkConditions, TraceDelay, delay_profile
+from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, delay_profile
 from interfaces.link.proxy import Address, Proxy, ProxySettings
 from interfaces.link.proxy.tcp import SEGMENT, WINDOW_BYTES
-from vrs.clock import WallClock
-
-LIMIT = 20.0
-"""Longest wait for anything [s]."""
-ANY = Address("127.0.0.1", 0)
-
-
-class Peer(asyncio.DatagramProtocol):
-    """A UDP socket that keeps what it got, and may echo."""
-
-    def __init__(self, echo=False):
-        self.echo, self.inbox = echo, asyncio.Queue()
-
-    def connection_made(self, transport):
-        self.transport = transport
-
-    def datagram_received(self, data, address):
-        self.inbox.put_nowait((data, address))
-        if self.echo:
-            self.transport.sendto(data, address)
-
-
-def both_ways(conditions):
-    return LinkConditions.symmetric(conditions)
-
-
-def run(scenario, conditions=None, *, tcp=None, udp=False, **settings):
-    """Run a scenario with a proxy before a server: tcp handles its connections, udp echoes."""
-
-    async def body():
-        clock = WallClock()
-        port, server, transports = 0, None, []
-        if tcp is not None:
-            server = await asyncio.start_server(tcp, "127.0.0.1", 0)
-            port = server.sockets[0].getsockname()[1]
-        else:
-            transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-                lambda: Peer(echo=udp), local_addr=("127.0.0.1", 0)
-            )
-            transports.append(transport)
-            port = transport.get_extra_info("sockname")[1]
-        asked = ProxySettings(
-            ANY,
-            Address("127.0.0.1", port),
-            conditions or LinkConditions(),
-            tcp=tcp is not None,
-            udp=tcp is None,
-            **settings,
-        )
-        proxy = Proxy(asked, clock, np.random.default_rng(0))
-        await proxy.start()
-        try:
-            async with asyncio.timeout(LIMIT):
-                await scenario(proxy, clock)
-        finally:
-            proxy.close()
-            for transport in transports:
-                transport.close()
-            if server is not None:
-                server.close()
-                await server.wait_closed()
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
-
-    asyncio.run(body())
-
-
-async def until(condition):
-    """Let the loop turn until a condition holds; the limit on the scenario ends a vain wait."""
-    while not condition():
-        await asyncio.sleep(0.001)
-
-
-async def client_of(proxy):
-    return await asyncio.open_connection(proxy.listening.host, proxy.listening.port)
-
-
-async def echo(reader, writer):
-    while data := await reader.read(65536):
-        writer.write(data)
-        await writer.drain()
-    writer.close()
-
-
-async def udp_client(proxy):
-    address = (proxy.listening.host, proxy.listening.port)
-    _, peer = await asyncio.get_running_loop().create_datagram_endpoint(Peer, remote_addr=address)
-    return peer
+from tests.interfaces.link.proxied import ANY, both_ways, client_of, echo, run, until
 
 
 def test_tcp_arrives_whole_and_not_before_the_delay():
@@ -292,6 +206,44 @@ def test_a_long_delay_fills_the_window_and_no_more():
     run(scenario, both_ways(Conditions(delay=ConstantDelay("c", 1000.0))), tcp=echo)
 
 
+def test_many_small_packets_fill_the_window_too(monkeypatch):
+    monkeypatch.setattr("interfaces.link.proxy.tcp.WINDOW_PACKETS", 20)
+
+    async def scenario(proxy, clock):
+        _, writer = await client_of(proxy)
+        await until(lambda: proxy._tcp.connections)
+        (connection,) = proxy._tcp.connections
+        await until(lambda: connection.server.open)
+        for sent in range(1, 21):
+            assert connection.client._transport.is_reading()
+            writer.write(b"x")
+            await until(lambda sent=sent: proxy.statistics()["tcp"]["forward"]["sent"] == sent)
+        assert not connection.client._transport.is_reading()
+        writer.transport.abort()
+
+    run(scenario, both_ways(Conditions(delay=ConstantDelay("c", 1000.0))), tcp=echo)
+
+
+def test_a_proxy_may_begin_again_at_once_on_the_same_port():
+    async def says_bye(reader, writer):
+        writer.write(b"bye")
+        writer.close()
+
+    async def scenario(proxy, clock):
+        # Who closes first keeps the port for minutes: here the proxy does.
+        reader, writer = await client_of(proxy)
+        assert await reader.read() == b"bye"
+        writer.close()
+        await until(lambda: not proxy._tcp.connections)
+        proxy.close()
+        again = Proxy(replace(proxy._settings, listen=proxy.listening), clock, np.random.default_rng(0))
+        await again.start()
+        assert again.listening == proxy.listening
+        again.close()
+
+    run(scenario, tcp=says_bye)
+
+
 def test_connections_beyond_the_limit_are_reset():
     async def scenario(proxy, clock):
         first = await client_of(proxy)
@@ -313,81 +265,6 @@ def test_connections_beyond_the_limit_are_reset():
         assert (counts["accepted"], counts["refused"], counts["most_at_once"]) == (2, 1, 1)
 
     run(scenario, tcp=echo, most_clients=1)
-
-
-def test_udp_passes_both_ways_not_before_the_delay_each_client_its_own():
-    async def scenario(proxy, clock):
-        clients = [await udp_client(proxy) for _ in range(3)]
-        began = clock.now()
-        for i, client in enumerate(clients):
-            client.transport.sendto(b"from %d" % i)
-        for i, client in enumerate(clients):
-            data, _ = await client.inbox.get()
-            assert data == b"from %d" % i
-            assert clock.now() - began >= 0.1
-            client.transport.close()
-        udp = proxy.statistics()["udp"]
-        assert (udp["clients"], udp["most_at_once"], udp["forward"]["arrived"]) == (3, 3, 3)
-
-    run(scenario, both_ways(Conditions(delay=ConstantDelay("c", 0.05))), udp=True)
-
-
-def test_udp_follows_a_trace_with_losses_and_duplicates():
-    forward = Conditions(delay=TraceDelay("trace", (0.08, None, 0.01)), duplicate=0.0)
-    backward = Conditions(duplicate=1.0)
-
-    async def scenario(proxy, clock):
-        client = await udp_client(proxy)
-        for data in (b"slow", b"lost", b"fast"):
-            client.transport.sendto(data)
-        got = [(await client.inbox.get())[0] for _ in range(4)]
-        assert got == [b"fast", b"fast", b"slow", b"slow"]
-        udp = proxy.statistics()["udp"]
-        assert udp["forward"]["lost"] == {"loss": 1}
-        assert udp["backward"]["copies"] == 2
-        client.transport.close()
-
-    run(scenario, LinkConditions(forward, backward), udp=True)
-
-
-def test_an_idle_udp_client_is_forgotten_but_not_its_datagrams_on_the_way():
-    forward = Conditions(delay=ConstantDelay("c", 0.3))
-
-    async def scenario(proxy, clock):
-        client = await udp_client(proxy)
-        client.transport.sendto(b"slow")
-        assert (await client.inbox.get())[0] == b"slow"
-        await until(lambda: proxy.statistics()["udp"]["expired"] == 1)
-        client.transport.sendto(b"again")
-        assert (await client.inbox.get())[0] == b"again"
-        assert proxy.statistics()["udp"]["clients"] == 2
-        client.transport.close()
-
-    run(scenario, LinkConditions(forward, Conditions()), udp=True, udp_idle=0.05)
-
-
-def test_udp_clients_beyond_the_limit_are_refused():
-    async def scenario(proxy, clock):
-        first, second = await udp_client(proxy), await udp_client(proxy)
-        first.transport.sendto(b"a")
-        assert (await first.inbox.get())[0] == b"a"
-        second.transport.sendto(b"b")
-        await until(lambda: proxy.statistics()["udp"]["refused"] == 1)
-        assert second.inbox.empty()
-        for client in (first, second):
-            client.transport.close()
-
-    run(scenario, udp=True, most_clients=1)
-
-
-def test_a_full_sized_datagram_passes():
-    async def scenario(proxy, clock):
-        client = await udp_client(proxy)
-        client.transport.sendto(bytes(65_507))
-        assert len((await client.inbox.get())[0]) == 65_507
-        client.transport.close()
-
-    run(scenario, udp=True)
 
 
 def test_segments_are_as_long_as_on_an_ethernet():

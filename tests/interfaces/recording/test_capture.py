@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
+from interfaces.recording import sink
 from interfaces.recording.capture import Paced
+from interfaces.recording.figures import summary
 from interfaces.recording.messages import HistoryEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
@@ -17,6 +20,9 @@ from interfaces.recording.runs import RunRecorder
 from interfaces.recording.track import REAL, VIRTUAL
 from interfaces.report.summary import summarize, to_json
 from interfaces.runtime.bodies import exact_arm
+from interfaces.runtime.keeping import RunFacts, Turn
+from interfaces.runtime.plan import parse_plan
+from interfaces.runtime.run import Event
 from interfaces.runtime.virtual import run_twins
 from interfaces.teleop import OperatorSite
 from tests.interfaces.recording import shown
@@ -106,6 +112,29 @@ def test_a_run_is_in_the_file_while_it_goes_on(tmp_path):
         assert not recording.damage
 
 
+def test_names_of_files_that_are_long_or_no_utf_8_can_be_read_back(tmp_path):
+    deep = tmp_path.joinpath(*["d" * 60] * 4)
+    deep.mkdir(parents=True)
+    (deep / "caf\udce9.csv").write_text("delay_s\n0.1\n")
+    plan = parse_plan(b'{"issue": 0.1, "move": {"pose": "ready"}}', "caf\udce9.jsonl", MODEL)
+    run = taken(tmp_path / "run.mcap", f"trace:{deep}/caf\udce9.csv", plan=plan)
+    assert (run.title, run.delay) == ("caf?", f"trace:{deep}/caf?.csv")
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert (recording.session.title, recording.session.delay) == (run.title, run.delay)
+        assert to_json(summary(recording)) == to_json(summarize(run))
+
+
+def test_texts_of_any_length_can_be_read_back(tmp_path):
+    recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
+    recorder.begin(RunFacts(MODEL, NOMINAL, "a", 0, "none", "adaptive", "datagram", "hold", 0.02), site)
+    recorder.turn(
+        Turn(0.0, 0, *(np.empty((0, *n)) for n in ((), (6,), (6,))), (), (), (Event(0.0, "late", "x" * 3000),), ())
+    )
+    recorder.finish()
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert [event.text for event in recording.events] == ["x" * 2000]
+
+
 def test_samples_of_both_robots_are_the_runs_rows(tmp_path):
     run = taken(tmp_path / "run.mcap", "mon")
     with open_recording(tmp_path / "run.mcap") as recording:
@@ -137,22 +166,29 @@ def test_a_disk_that_takes_nothing_ends_the_recording_and_not_the_run(tmp_path, 
     assert to_json(summarize(run)) == to_json(summarize(taken(tmp_path / "run.mcap")))
 
 
-def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path, monkeypatch):
-    from interfaces.recording import sink
+class Small:
+    """A disk that's soon full, and says so once more when the file is closed."""
 
-    class Small:
-        def __init__(self, path):
-            self.file, self.room = path.open("wb", buffering=0), 30_000
+    def __init__(self, path):
+        self.file, self.room = path.open("wb", buffering=0), 30_000
 
-        def write(self, data):
-            some = bytes(data)[: min(self.room, 1000)]
-            self.room -= len(some)
-            return self.file.write(some)
+    def write(self, data):
+        some = bytes(data)[: min(self.room, 1000)]
+        self.room -= len(some)
+        return self.file.write(some)
 
-        def close(self):
-            self.file.close()
+    def close(self):
+        self.file.close()
+        raise OSError(errno.ENOSPC, "full")
 
+
+@pytest.fixture
+def small(monkeypatch):
     monkeypatch.setattr(sink.Sink, "create", classmethod(lambda cls, path: cls(Small(path), str(path))))
+
+
+@pytest.mark.usefixtures("small")
+def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path):
     recorder = RunRecorder(tmp_path / "run.mcap")
     run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
     recorder.finish()
@@ -162,6 +198,16 @@ def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path, monkeypatch):
         track = recording.track(REAL)
         assert 10 < len(track.t) < len(run.t)
         assert (track.q == run.q_real[: len(track.t)]).all()
+
+
+@pytest.mark.usefixtures("small")
+def test_a_disk_that_fills_up_amid_commands_stops_no_command(tmp_path):
+    recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
+    facts = RunFacts(MODEL, NOMINAL, "many", 0, "none", "adaptive", "datagram", "hold", 0.02)
+    recorder.begin(facts, site)
+    for k in range(1100):
+        site.execute(MotionCommand(JointTarget(NOMINAL), execute_at=10.0 + 0.5 * k), now=0.001 * k)
+    assert "takes no more after 30000 bytes" in recorder.problem
 
 
 def test_what_moves_is_shown_at_a_rate_and_what_stands_once_a_second():
@@ -203,3 +249,24 @@ def test_many_commands_between_two_turns_are_all_written(tmp_path):
         assert [entry.number for entry in recording.commands] == list(range(1, 1101))
         assert len(recording.edits) == 1101
         assert recording.timeline == made.site.engine.timeline
+
+
+def test_what_later_commands_made_of_receipts_is_in_a_cut_file_too(tmp_path):
+    made = Sitting(tmp_path / "run.mcap", 1)
+    for k in range(70):
+        made.clock = 0.01 * k
+        made.tell(MotionCommand(JointTarget(NOMINAL + 0.05 * (k % 3)), execute_at=10.0 + 2.0 * k))
+        made.capture.advance(now=made.clock)
+    made.tell(MotionCommand(JointTarget(NOMINAL), execute_at=140.0))
+    made.capture.advance(now=made.clock)
+    made.capture.write_out()
+    made.writer.flush()
+    made.writer.abandon()
+    receipts = made.site.engine.receipts
+    assert receipts[65].superseded_by == 71
+    with open_recording(tmp_path / "run.mcap") as recording:
+        told, known = (
+            [(r.command_id, r.status, r.execute_at, r.end, r.shift, r.superseded_by) for r in found]
+            for found in (recording.receipts("virtual"), receipts)
+        )
+        assert told == known

@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import _status
+from interfaces.recording import messages as m
 from interfaces.recording.export import tables, write_csv, write_parquet
 from interfaces.recording.recording import open_recording
 from interfaces.report.html import render
 from interfaces.report.summary import summarize, to_json
+from tests.interfaces.recording import recorded
 from tests.interfaces.recording.taken import MODEL, taken
+from vrs import JointTarget, MotionCommand
 from vrs.errors import InvalidValueError
 
 NAMES = {"virtual", "real", "commands", "receipts", "segments", "edits", "packets", "link", "events"}
@@ -89,6 +92,75 @@ def test_commands_say_what_became_of_them(whole, tmp_path):
     assert {(float(row["t_s"]), row["kind"], row["text"]) for row in events} >= {
         (event.t, event.kind, event.text) for event in run.events
     }
+
+
+def test_receipts_edits_and_packets_are_what_the_run_says(whole, tmp_path):
+    run, path = whole
+    folder = tmp_path / "csv"
+    folder.mkdir()
+    (folder / "receipts.csv").write_text("an older one\n" * 1000)
+    with open_recording(path) as recording:
+        write_csv(tables(recording), folder)
+        edits, link = recording.edits, recording.link
+    told = read(folder / "receipts.csv")
+    for site, receipts in (("virtual", run.receipts_virtual), ("real", run.receipts_real)):
+        rows = [row for row in told if row["site"] == site]
+        assert [int(row["command_id"]) for row in rows] == [r.command_id for r in receipts]
+        assert [row["status"] for row in rows] == [str(r.status) for r in receipts]
+        assert [row["reason"] for row in rows] == [r.reason for r in receipts]
+        assert [row["superseded_by"] for row in rows] == [shown_as(r.superseded_by) for r in receipts]
+        assert [row["undone"] for row in rows] == [str(r.undone).lower() for r in receipts]
+        for name in ("issued_at", "asked_at", "execute_at", "end", "shift"):
+            assert [row[f"{name}_s"] for row in rows] == [shown_as(getattr(r, name)) for r in receipts]
+    moves = [row for row in read(folder / "commands.csv") if row["command"] == "move"]
+    for name in ("issued_at", "asked_at"):
+        assert [row[f"{name}_s"] for row in moves] == [shown_as(getattr(r, name)) for r in run.receipts_virtual]
+    assert [row["q2_rad"] for row in moves] == [
+        "" if r.q is None else shown_as(float(r.q[1])) for r in run.receipts_virtual
+    ]
+    assert all(json.loads(row["content"])["type"] == "move" for row in moves)
+    told = read(folder / "edits.csv")
+    assert [(int(row["edit"]), row["at_s"], row["end_s"]) for row in told] == [
+        (edit.number, shown_as(edit.at), shown_as(edit.timeline.end)) for edit in edits
+    ]
+    assert [(row["real_id"], row["arrived_s"]) for row in read(folder / "packets.csv")] == [
+        (shown_as(packet.real_id), shown_as(packet.arrived)) for packet in run.packets
+    ]
+    assert [
+        (row["direction"], row["arrived_s"], row["lost"], row["attempts"]) for row in read(folder / "link.csv")
+    ] == [
+        (entry.direction, shown_as(entry.arrived), str(entry.lost).lower(), str(entry.attempts)) for entry in link
+    ]
+    joints = [row["joint"] for row in read(folder / "segments.csv")]
+    assert joints[:7] == ["1", "2", "3", "4", "5", "6", "1"]
+
+
+def test_what_was_refused_taken_back_lost_or_sent_again_is_told(tmp_path):
+    messages, _, _ = recorded.motion(1.5)
+    move = MotionCommand(JointTarget(recorded.HOME))
+    messages += [
+        (1.5, m.CommandEntry.of(3, 1.5, None, None)),
+        (1.5, m.CommandEntry.of(4, 1.5, move, None, refused=True)),
+        (1.5, m.PacketEntry(3, 7, 1.5, 1.6, 5)),
+    ]
+    path = recorded.write(tmp_path / "run.mcap", messages, end=1.5)
+    with open_recording(path) as recording:
+        found = {
+            table.name: {column.name: column.values for column in table.columns} for table in tables(recording)
+        }
+    commands, link, packets = (found[name] for name in ("commands", "link", "packets"))
+    assert list(zip(commands["command"], commands["refused"], strict=True))[-2:] == [
+        ("undo", False),
+        ("move", True),
+    ]
+    rows = zip(link["direction"], link["lost"], link["attempts"], strict=True)
+    assert set(rows) == {("forward", False, 1), ("backward", True, 2)}
+    assert (packets["command_id"][-1], packets["real_id"][-1], packets["arrived_s"][-1]) == (7, 5, 1.6)
+
+
+def shown_as(value):
+    """A number in a table; nothing where there's none."""
+    return "" if value is None else repr(value)
 
 
 def test_parquet_holds_the_same_with_units(whole, tmp_path):

@@ -6,15 +6,19 @@ import asyncio
 import contextlib
 import json
 import time
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import pytest
 
 from interfaces import connect
 from interfaces.cli.main import _status
-from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.recording import sink
+from interfaces.link import Conditions, LinkConditions, TraceDelay, delay_profile
+from interfaces.recording import Recorder, sink
 from interfaces.recording.figures import figures, summary
-from interfaces.recording.live import LiveRecording
+from interfaces.recording.live import LiveRecorder, LiveRecording
+from interfaces.recording.messages import EventEntry, HistoryEntry, ReceiptEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import REAL
@@ -23,9 +27,10 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.network import Impair, Way
 from interfaces.stream.server import application
+from interfaces.teleop import OperatorSite, Report, RobotLine
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until
 from tests.interfaces.recording import shown
-from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
+from vrs import Insertion, JointTarget, MotionCommand, Status, SteerCommand
 
 
 @contextlib.asynccontextmanager
@@ -150,6 +155,93 @@ def test_a_recording_that_breaks_is_told_and_nothing_else_happens(tmp_path, monk
 
     asyncio.run(main())
     assert told == ["recording failed: a fault of ours"]
+    with open_recording(tmp_path / "live.mcap") as recording:
+        assert recording.end is None
+        assert recording.damage.cut
+
+
+def alone(path, way=None):
+    """A recorder of an operator's site whose robot is far away."""
+    link = LinkConditions() if way is None else LinkConditions.symmetric(way)
+    line = RobotLine(OperatorSite(MODEL, NOMINAL, now=0.0), link, np.random.default_rng(0))
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8)
+    recorder.open()
+    return recorder, line
+
+
+def test_what_the_robot_tells_is_written_down_once(tmp_path):
+    recorder, line = alone(tmp_path / "live.mcap")
+    heard, q = line.operator.listener, NOMINAL + 0.1
+    goals = [MotionCommand(JointTarget(NOMINAL + 0.1 * k), insertion=Insertion.APPEND) for k in (1, 2, 3)]
+    receipts = [line.operator.execute(goal, now=0.1) for goal in goals]
+    recorder.advance(now=0.2, connected=True)
+    said = ["never met", "never met", "", "", "no message", "no message", ""]
+    for k, halted in enumerate(said):
+        at = 0.3 + 0.1 * (k // 2)
+        heard.reported(Report(1, k + 1, at, None, 0, at, 1.0, q, at, at - 0.2, halted), now=0.3 + 0.1 * k)
+    heard.answered(1, receipts[0], now=1.1)
+    heard.answered(2, replace(receipts[1], execute_at=receipts[1].execute_at + 0.5), now=1.2)
+    heard.answered(3, replace(receipts[2], status=Status.REJECTED, reason="too far"), now=1.3)
+    recorder.advance(now=1.4, connected=True)
+    line.link.backward.send(b"report", 1.4, 6)
+    assert line.link.backward.receive(1.5)
+    recorder.advance(now=1.5, connected=False)
+    assert not recorder._recorder.put(EventEntry(1.5, "other", "x" * 9 * 2**20), t=1.5)
+    assert recorder.health()["dropped"] == 1
+    recorder.finish(now=1.6)
+    assert line.operator.listener is None
+    with open_recording(tmp_path / "live.mcap") as recording:
+        assert recording.session.began == 5e8
+        assert [(round(event.t, 9), event.kind) for event in recording.events] == [
+            (0.2, "up"), (0.5, "followed"), (0.7, "halted"), (0.9, "followed"), (1.2, "late"), (1.3, "diverged"),
+            (1.5, "down"),
+        ]  # fmt: skip
+        track = recording.track(REAL)
+        assert track.t == pytest.approx([0.3, 0.4, 0.5, 0.6])
+        assert track.play == pytest.approx(track.t - 0.2)
+        assert (track.q == q).all()
+        assert len(recording._logs[REAL].entries()) == 4
+        assert [(entry.direction, entry.sent) for entry in recording.link] == [("backward", 1.4)]
+        assert len(recording.receipts("real")) == 3
+
+
+def test_what_was_before_a_late_recording_isnt_told_again(tmp_path):
+    line = RobotLine(OperatorSite(MODEL, NOMINAL, now=0.0), LinkConditions(), np.random.default_rng(0))
+    line.operator.execute(MotionCommand(JointTarget(READY)), now=0.0)
+    line.advance(now=0.1)
+    path = tmp_path / "live.mcap"
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8, now=60.0)
+    assert recorder.health()["written_s"] == 60.0
+    recorder.open()
+    line.operator.execute(MotionCommand(JointTarget(NOMINAL)), now=60.1)
+    recorder.advance(now=60.2, connected=True)
+    recorder.finish(now=60.3)
+    assert recorder.health()["written_s"] == 60.3
+    with open_recording(path) as recording:
+        assert [entry.receipt.command_id for entry in recording.commands] == [2]
+        assert recording.session.t == 60.0
+        assert not recording.link
+        told = recording._logs["/commands"].entries()
+        assert [one.receipt.command_id for one in told if isinstance(one, ReceiptEntry)] == [2]
+
+
+def test_what_is_written_at_the_end_needs_no_room(tmp_path, monkeypatch):
+    monkeypatch.setattr("interfaces.recording.live.Recorder", partial(Recorder, room=12_000))
+    way = Conditions(delay=TraceDelay(f"trace:{'x' * 500}.csv", (0.01,)))
+    recorder, line = alone(tmp_path / "live.mcap", way)
+    for k in range(20):
+        goal = JointTarget(READY if k % 2 else NOMINAL)
+        line.operator.execute(MotionCommand(goal, insertion=Insertion.APPEND), now=0.1 * k)
+        recorder.advance(now=0.1 * k, connected=True)
+        while recorder._recorder._queue:
+            time.sleep(0.001)
+    recorder.finish(now=2.0)
+    assert recorder.health()["dropped"] == 0
+    with open_recording(recorder.path) as recording:
+        assert [r.command_id for r in recording.receipts("virtual")] == list(range(1, 21))
+        assert recording.session.delay == way.delay.name
+        assert recording.changes[-1].edit == 20
+        assert isinstance(recording.changes[-1], HistoryEntry)
 
 
 def test_vrs_serve_records(tmp_path, capsys):

@@ -13,9 +13,11 @@ import pytest
 
 from interfaces.recording import Recorder, RecordingError, RecordingWriter, open_recording
 from interfaces.recording import messages as m
+from interfaces.recording.sink import Sink
 from tests.interfaces.recording import recorded
 from tests.interfaces.recording.disks import Disk, Failing, Hanging, Slow
 from vrs import ManualClock
+from vrs.errors import InvalidValueError
 
 
 def until(true: Callable[[], object], seconds: float = 10.0) -> float:
@@ -72,6 +74,41 @@ def test_a_short_write_at_every_place(tmp_path: Path, how: str) -> None:
             with open_recording(path) as recording:
                 assert recording.damage.cut or recording.end is not None
     assert last > 10
+
+
+@pytest.mark.parametrize(
+    ("how", "said"), [(0, "takes no more after 4"), (None, "takes no more"), (OSError(5, ""), "Inp")]
+)
+def test_a_disk_that_failed_once_is_given_nothing_more(how: OSError | int | None, said: str) -> None:
+    """There may be room again: what came then would stand behind a hole."""
+
+    class Fickle(Disk):
+        def take(self, data: bytes | memoryview) -> int | None:
+            if self.calls != 2:
+                return super().take(data)
+            if isinstance(how, OSError):
+                raise how
+            return how
+
+    disk = Fickle()
+    sink = Sink(disk, "here")
+    sink.write(b"some")
+    with pytest.raises(RecordingError, match=said):
+        sink.write(b"lost")
+    with pytest.raises(RecordingError, match="it failed before"):
+        sink.write(b"more")
+    assert disk.data == b"some"
+
+
+def test_a_writer_says_up_to_when_all_is_there() -> None:
+    writer = RecordingWriter(Disk(), recorded.begin())
+    for t in (0.2, 0.1):
+        writer.write(m.EventEntry(t, "other", "late"), t=t)
+    assert writer.written == 0.0
+    writer.flush()
+    assert writer.written == 0.2
+    with pytest.raises(InvalidValueError, match="of up to 8388608 bytes"):
+        writer.write(m.EventEntry(0.3, "other", "x" * 9 * 2**20), t=0.3)
 
 
 @pytest.fixture
@@ -135,6 +172,36 @@ def test_a_hanging_disk_stops_nobody_and_what_is_left_out_is_counted(tmp_path: P
         assert len(recording.track("/real/joints").t) == taken + 1
 
 
+def test_much_at_once_is_no_stall(clock: ManualClock, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Steady(Disk):
+        def take(self, data: bytes | memoryview) -> int | None:
+            if self.calls > 2:
+                clock.advance(0.5)
+                told.append(recorder.problem)
+            return super().take(data)
+
+    told: list[str | None] = []
+    monkeypatch.setattr("interfaces.recording.writer.LARGE", 1_000)
+    recorder = Recorder(Steady(), recorded.begin(), clock=clock)
+    for number in range(100):
+        recorder.put(recorded.sample(number), t=number * recorded.STEP)
+    until(lambda: recorder.acknowledged > 90)
+    assert len(told) > 10
+    assert set(told) == {None}
+    assert recorder.close(m.End(2.0))
+
+
+def test_blocks_span_as_long_as_is_asked(tmp_path: Path) -> None:
+    disks = Disk(), Disk()
+    for flush, disk in zip((0.05, 0.5), disks, strict=True):
+        recorder = Recorder(disk, recorded.begin(), flush=flush)
+        for number in range(120):
+            recorder.put(recorded.sample(number), t=number * recorded.STEP)
+        assert recorder.close(m.End(2.0))
+    assert disks[0].calls > 30
+    assert disks[1].calls < 20
+
+
 def test_closing_doesnt_wait_for_ever(clock: ManualClock) -> None:
     disk = Hanging()
     recorder = Recorder(disk, recorded.begin(), clock=clock)
@@ -162,6 +229,7 @@ def test_what_is_acknowledged_is_in_the_file(tmp_path: Path) -> None:
         until(recording.poll)
         assert recording.span[1] == 100 * recorded.STEP
         assert recorder.close(m.End(2.0))
+        assert recorder.acknowledged == 101
         until(recording.poll)
         assert not recording.damage
         assert recording.end == m.End(2.0)
@@ -178,6 +246,59 @@ def test_a_message_that_is_too_long_is_left_out(tmp_path: Path) -> None:
     assert recorder.dropped == {"/session": 1}
     assert recorder.close(m.End(1.0))
     assert recorder.problem is None
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert recording.dropped == {"/session": 1}
+
+
+def test_what_comes_last_needs_no_room(tmp_path: Path) -> None:
+    events = [m.EventEntry(1.0, "other", f"{k} {'x' * 100}") for k in range(1000)]
+    recorder = Recorder(tmp_path / "run.mcap", recorded.begin(), room=5_000)
+    assert recorder.put(events[0], t=1.0)
+    much = m.EventEntry(1.0, "other", "x" * 9 * 2**20)
+    assert recorder.close(m.End(1.0), last=[*events[1:500], much, *events[500:]])
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert [event.text for event in recording.events] == [event.text for event in events]
+        assert recording.dropped == {"/events": 1}
+        assert not recording.damage
+
+
+def test_closing_waits_as_long_as_the_disk_takes_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Tough(Disk):
+        def take(self, data: bytes | memoryview) -> int | None:
+            time.sleep(0.02)
+            return super().take(data)
+
+    monkeypatch.setattr("interfaces.recording.writer.LARGE", 2_000)
+    recorder = Recorder(Tough(), recorded.begin())
+    events = [m.EventEntry(1.0, "other", "x" * 1000)] * 40
+    start = time.monotonic()
+    assert recorder.close(m.End(1.0), patience=0.2, last=events)
+    assert time.monotonic() - start > 0.3
+
+
+def test_without_an_end_it_reads_as_cut(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", recorded.begin())
+    assert recorder.put(recorded.sample(7), t=7 * recorded.STEP)
+    assert recorder.close(None)
+    assert (recorder.problem, recorder.acknowledged) == (None, 1)
+    assert numbers(tmp_path / "run.mcap") == [7]
+    with open_recording(tmp_path / "run.mcap") as recording:
+        assert recording.end is None
+        assert recording.damage.cut
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_thread_that_ends_is_a_problem() -> None:
+    class Odd(Disk):
+        def take(self, data: bytes | memoryview) -> int | None:
+            if self.calls > 2:
+                raise MemoryError
+            return super().take(data)
+
+    recorder = Recorder(Odd(), recorded.begin())
+    recorder.put(recorded.sample(0), t=0.0)
+    assert not recorder.close(m.End(1.0))
+    assert recorder.problem == "recording failed: its thread has ended"
 
 
 @pytest.mark.parametrize("path", ["/dev/full", "/nowhere/run.mcap", "/"])

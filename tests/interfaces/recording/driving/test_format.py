@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 from collections import defaultdict
@@ -18,8 +19,10 @@ from interfaces.recording.channels import CHANNELS
 from interfaces.recording.driving.recorder import DriveRecorder
 from interfaces.recording.driving.rooms import room_entry, room_of
 from interfaces.recording.rerun import rerun
+from interfaces.recording.sink import Sink
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
 from robots.ipr.robot import PLACES, place
+from tests.interfaces.recording.disks import Failing
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
 from vrs.errors import FormatError
 
@@ -104,14 +107,32 @@ def test_recording_changes_nothing_of_a_run() -> None:
     assert (drive.learned, drive.sent_bytes) == (alone.learned, alone.sent_bytes)
 
 
+def test_a_disk_that_fills_up_is_a_problem_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full(Failing):
+        def close(self) -> None:
+            super().close()
+            raise OSError(errno.ENOSPC, "full")
+
+    disk, recorder = Full(4, how="full"), DriveRecorder(tmp_path / "run.mcap")
+    drive = run(Case("timeline", robot="bare", length=1.0), witness=recorder)
+    monkeypatch.setattr(Sink, "create", classmethod(lambda cls, path: cls(disk, str(path))))
+    recorder.finish(drive)
+    assert disk.closed
+    assert recorder.problem == f"recording failed: {recorder.path}: No space left on device"
+
+
 def test_packets_on_their_way_at_the_end_are_told_from_lost_ones(tmp_path: Path) -> None:
-    trace = tmp_path / "trace.csv"
+    trace = tmp_path / ("d" * 200) / "caf\udce9.csv"
+    trace.parent.mkdir()
     trace.write_text("delay_s\n" + '0.1\n""\n0.2\n5\n' * 500, encoding="utf-8")
     case = Case("timeline", delay=f"trace:{trace}", robot="bare", length=4.0)
     recorder = DriveRecorder(tmp_path / "run.mcap")
     drive = run(case, witness=recorder)
     recorder.finish(drive)
     with open_recording(recorder.path) as recording:
+        assert recording.session.delay == f"trace:{trace.parent}/caf?.csv"
         forward = [entry for entry in recording.link if entry.direction == "forward"]
         assert sum(entry.size for entry in forward) == drive.sent_bytes
         lost = {round(entry.sent, 6) for entry in forward if entry.lost}
