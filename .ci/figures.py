@@ -12,22 +12,25 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+from interfaces.lab.claims import interval_said, said
+
 DOCS: Final = Path(__file__).resolve().parents[1] / "docs" / "reproduce"
 CLAIMS: Final = "| claim | source | expected | measured | 95 % | holds |"
 
 
 def _row(cells: list[Any]) -> str:
-    return f"| {' | '.join(map(_said, cells))} |"
-
-
-def _said(cell: Any) -> str:
-    return "" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+    return f"| {' | '.join(map(said, cells))} |"
 
 
 def _claimed(claim: dict[str, Any]) -> str:
-    ends = None if claim["interval"] is None else " to ".join(_said(float(end)) for end in claim["interval"])
     verdict = "yes" if claim["holds"] else "**no**"
-    return _row([*(claim[name] for name in ("claim", "source", "expected", "measured")), ends, verdict])
+    return _row(
+        [
+            *(claim[name] for name in ("claim", "source", "expected", "measured")),
+            interval_said(claim["interval"]),
+            verdict,
+        ]
+    )
 
 
 def brought_up(text: str, result: dict[str, Any]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -15,6 +15,18 @@ OWN_BAR = "our own bar"
 
 Cell: TypeAlias = float | int | str | None
 """What stands in a table; None for nothing."""
+
+
+def said(cell: Cell) -> str:
+    """A cell as it's shown."""
+    if cell is None:
+        return ""
+    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+
+
+def interval_said(interval: Sequence[float] | None) -> str:
+    """An interval as it's shown."""
+    return "" if interval is None else " to ".join(map(said, interval))
 
 
 @dataclass(frozen=True, slots=True)

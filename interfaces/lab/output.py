@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from interfaces.lab.claims import Cell, Claim, Figure, Reproduction
+from interfaces.lab.claims import Cell, Claim, Figure, Reproduction, interval_said, said
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -116,9 +116,9 @@ def rich_tables(reproduction: Reproduction) -> list[RichTable]:
         ):
             table.add_column(name, ratio=share, overflow="fold")
         for claim in claims:
-            ends = "" if claim.interval is None else " to ".join(_said(end) for end in claim.interval)
+            ends = interval_said(claim.interval)
             holds = "yes" if claim.holds else "[bold red]NO[/]"
-            cells = claim.claim, claim.source, _said(claim.expected), _said(claim.measured), ends
+            cells = claim.claim, claim.source, said(claim.expected), said(claim.measured), ends
             table.add_row(*(cell.replace("[", r"\[") for cell in cells), holds)
         made.append(table)
     for plain in found.tables:
@@ -126,12 +126,6 @@ def rich_tables(reproduction: Reproduction) -> list[RichTable]:
         for k, name in enumerate(plain.columns):
             table.add_column(name.replace("[", r"\["), justify="left" if k == 0 else "right")
         for row in plain.rows:
-            table.add_row(*(_said(cell).replace("[", r"\[") for cell in row))
+            table.add_row(*(said(cell).replace("[", r"\[") for cell in row))
         made.append(table)
     return made
-
-
-def _said(cell: Cell) -> str:
-    if cell is None:
-        return ""
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)

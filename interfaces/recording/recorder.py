@@ -5,7 +5,6 @@ Nobody waits for the disk. What finds no room is counted and left out; a disk th
 
 from __future__ import annotations
 
-import contextlib
 from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
@@ -61,7 +60,7 @@ class Recorder:
             for message in first:
                 self._writer.write(message, t=session.t)
         except RecordingError:
-            self._writer.abandon()
+            self._writer.give_up()
             raise
         self._flush, self._room = flush, room
         self._queue: deque[tuple[int, bytes, float]] = deque()
@@ -213,6 +212,5 @@ class Recorder:
             self._writer.write_encoded(*encoded(Dropped(t, drops)), t)
 
     def _give_up(self) -> None:
-        with contextlib.suppress(RecordingError):
-            self._writer.abandon()
+        self._writer.give_up()
         self._queue.clear()

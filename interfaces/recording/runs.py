@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -165,8 +164,7 @@ class RunRecorder:
         if self._capture is not None:
             self._capture.put = None
         if writer is not None:
-            with contextlib.suppress(RecordingError):
-                writer.abandon()
+            writer.give_up()
 
 
 class _Extras(msgspec.Struct, frozen=True):

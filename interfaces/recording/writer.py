@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import msgspec
@@ -149,6 +150,11 @@ class RecordingWriter:
         """
         self.finished = True
         self._sink.close()
+
+    def give_up(self) -> None:
+        """Close the file after it has failed: what closing it says is no news."""
+        with contextlib.suppress(RecordingError):
+            self.abandon()
 
 
 def encoded(message: Message) -> tuple[int, bytes]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import Any, Final
 
+from interfaces.lab.claims import interval_said, said
 from interfaces.report.markup import table
 from interfaces.report.verdicts import Json, Verdicts
 from vrs.errors import FormatError
@@ -112,8 +113,8 @@ def _claims(claims: Iterable[Json]) -> str:
 
 
 def _row(claim: Json) -> str:
-    ends = "" if claim["interval"] is None else " to ".join(map(_said, claim["interval"]))
-    cells = _said(claim["expected"]), _said(claim["measured"]), ends, claim["source"]
+    ends = interval_said(claim["interval"])
+    cells = said(claim["expected"]), said(claim["measured"]), ends, claim["source"]
     verdict = "holds" if claim["holds"] else "fails"
     return (
         f'<tr class="{verdict}"><th scope="row">{escape(claim["claim"])}</th>'
@@ -143,10 +144,6 @@ def _pictures(found: Verdicts) -> str:
 
 def _blank(cell: object) -> object:
     return "" if cell is None else cell
-
-
-def _said(cell: object) -> str:
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
 
 
 def _asset(name: str) -> str:

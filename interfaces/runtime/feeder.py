@@ -55,7 +55,7 @@ class Feeder:
 
     def failed(self, fault: Fault) -> None:
         """The body comes to rest by itself: nothing is fed until it does."""
-        self._fault, self._stale = fault, True
+        self._fault = fault
 
     def advance(self, *, now: float) -> tuple[Report | Ping, ...]:
         """Do what is due by now [s], and feed the body; say what is to be sent to the operator."""

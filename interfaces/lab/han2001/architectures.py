@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -150,9 +151,7 @@ def _above_zero(text: str, source: str, values: Array, seed: int) -> Claim:
 
 
 def _papers(study: Study, found: dict[str, Found]) -> tuple[Claim, ...]:
-    def of(cases: Sequence[str], who: str, value: Callable[[Seen], float]) -> Array:
-        return _pooled(found, cases, who, value)
-
+    of = partial(_pooled, found)
     sim, micro, heavy = ([f"{robot} {profile}" for profile in PROFILES] for robot in ROBOTS)
     real, slow = (*micro, *heavy), [case for case in sim if not case.endswith("domain")]
     ii_sim = clustered(of(sim, "II", _largest), study.seed, median)

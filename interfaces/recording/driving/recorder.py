@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import heapq
 from collections.abc import Iterable, Iterator
 from functools import partial
@@ -88,8 +87,7 @@ class DriveRecorder:
             writer.finish(End(float(drive.t[-1])))
         except RecordingError as error:
             self.problem = str(error)
-            with contextlib.suppress(RecordingError):
-                writer.abandon()
+            writer.give_up()
 
     def _commanded(self, deed: Deed) -> None:
         self._deeds.append((deed, self._site.engine.timeline))

@@ -30,6 +30,11 @@ function range({ least, zero = false }, low, high) {
   return [middle - half, middle + half];
 }
 
+/** Whether a part of a page that's seen is to be drawn anew, as that's wanted or its last picture is so old [ms]. */
+export function isDue(part, at, every) {
+  return part.visible && (part.wanted || at - part.drawn >= every);
+}
+
 /** Of what is due to be drawn, what was drawn longest ago: so nothing waits for ever where all is due always. */
 export function stalest(due) {
   return due.reduce((oldest, one) => (one.drawn < oldest.drawn ? one : oldest), due[0]);

@@ -1,5 +1,5 @@
 // Live plots of a mobile robot: how far the real one is from the path, how much later, and what the network does.
-import { Chart, stalest } from "./chart.js";
+import { Chart, isDue, stalest } from "./chart.js";
 import { save, textOf } from "./csv.js";
 import { figure, mark, write } from "./dom.js";
 import { Messages } from "./messages.js";
@@ -107,7 +107,7 @@ export function mount(station, box) {
       return;
     }
     if (UPlot instanceof Promise) return;
-    const chart = stalest(charts.filter((one) => one.visible && (one.wanted || at - one.drawn > period)));
+    const chart = stalest(charts.filter((one) => isDue(one, at, period)));
     if (!chart) return;
     if (!chart.plot) chart.begin(UPlot, colour);
     chart.draw(view);

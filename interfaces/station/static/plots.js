@@ -1,5 +1,5 @@
 // Live plots: how far the robots are apart, why, and what the network does.
-import { ACROSS, Chart, stalest, swatch } from "./chart.js";
+import { ACROSS, Chart, isDue, stalest, swatch } from "./chart.js";
 import { save, textOf } from "./csv.js";
 import { clockText, h, mark, write } from "./dom.js";
 import { Figures } from "./figures.js";
@@ -50,6 +50,7 @@ class Plots {
     this.happenings = new Happenings(station);
     this.charts = graphs(this.samples.joints).map((graph) => new Chart(graph));
     this.figures = new Figures();
+    this.parts = [...this.charts, this.figures];
     this.head = new PlotHead(SPANS, { chosen: () => this.choose(), save: () => this.save() });
     this.colour = palette(station, () => this.again());
     this.basis = "timeline";
@@ -99,7 +100,7 @@ class Plots {
   }
 
   again() {
-    for (const part of [...this.charts, this.figures]) part.wanted = true;
+    for (const part of this.parts) part.wanted = true;
   }
 
   /** What is shown now; null where nothing is known yet. */
@@ -134,12 +135,10 @@ class Plots {
     this.say(view, at);
     if (!this.UPlot) return;
     this.compare(view, at);
-    const seen = this.charts.filter((chart) => chart.visible);
-    const period = Math.max(this.head.span[2], (this.cost * seen.length) / SHARE);
-    const due = (part, every) => part.wanted || at - part.drawn >= every;
-    const waiting = seen.filter((chart) => due(chart, period));
-    if (this.figures.visible && due(this.figures, COUNTED)) waiting.push(this.figures);
-    const part = stalest(waiting);
+    const seen = this.charts.filter((chart) => chart.visible).length;
+    const period = Math.max(this.head.span[2], (this.cost * seen) / SHARE);
+    const due = this.parts.filter((part) => isDue(part, at, part === this.figures ? COUNTED : period));
+    const part = stalest(due);
     if (!part) return;
     if (part === this.figures) part.draw(view, this.title(view));
     else this.draw(part, view);
