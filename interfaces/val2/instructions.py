@@ -17,7 +17,8 @@ from interfaces.val2.memory import where
 from interfaces.val2.motions import MOTIONS
 from interfaces.val2.operands import Ask, Operands
 from interfaces.val2.operations import Real, Slots
-from interfaces.val2.settings import AT_ONCE, AT_REST
+from interfaces.val2.ports import ALTER_PERIOD
+from interfaces.val2.settings import ALTERING, AT_ONCE, AT_REST
 from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Instruction, Number, Unary, Variable
 
 StepFunction: TypeAlias = Callable[[Slots], int]
@@ -71,6 +72,26 @@ def _standing(context: Context, ask: Ask | None, following: Any) -> Generator[fl
     if ask is not None:
         ask()
         yield from until(context, context.arm.settled)
+    return following
+
+
+def _altering(context: Context, ask: Ask, following: int, *, ends: bool) -> Generator[float, None, int]:
+    """Go on a period after a correction has begun, or when the arm stands.
+
+    What a REACTI dropped before it began is asked for again.
+    """
+    dropped = context.dropped
+    yield from until(context, context.arm.ready)
+    while context.dropped != dropped:
+        dropped = context.dropped
+        yield from until(context, context.arm.settled)
+        ask()
+        yield from until(context, context.arm.ready)
+    if ends:
+        yield from until(context, context.arm.settled)
+    over = context.now + (0.0 if ends else ALTER_PERIOD)
+    while context.now < over:
+        yield over
     return following
 
 
@@ -179,6 +200,16 @@ def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) ->
             return _special(c, following)
 
         return now
+    if (altering := ALTERING.get(i.keyword)) is not None:
+        ask_for = altering(o, c)
+        corrects = i.keyword == "ALTOUT" or len(i.operands) > 2
+
+        def alter(s: Slots) -> int:
+            ask = ask_for(s)
+            ask()
+            return _special(c, Waiting(_altering(c, ask, following, ends=not corrects)))
+
+        return alter
     if (at_rest := AT_REST.get(i.keyword)) is not None:
         prepare = at_rest(o, c)
         return lambda s: _special(c, Waiting(_standing(c, prepare(s), following)))

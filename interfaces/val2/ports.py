@@ -7,9 +7,12 @@ answer to what was asked comes later, and `answered` says when.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
+
+ALTER_PERIOD: Final = 0.028
+"""How long a program takes for a correction by ALTOUT at least [s], as in VAL-II."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,10 +153,10 @@ class ArmPort(Protocol):
         """AT, ours: execution time of the next motion [s]; None for as soon as it can."""
 
     def alter(self, values: tuple[float, ...], *, now: float) -> None:
-        """ALTOUT: correct the path by X, Y, Z [mm] and turns about x, y, z [deg]."""
+        """ALTOUT: correct the tool's place by X, Y, Z [mm] and a turn [deg], a rotation vector."""
 
     def set_alter(self, mode: int | None, *, now: float) -> None:
-        """ALTER with a mode's bits (1: cumulative, 2: world axes), NOALTER with None."""
+        """ALTER with a mode's bits (1: cumulative, 2: world axes, those of BASE), NOALTER with None."""
 
     def brake(self, *, now: float) -> None:
         """BRAKE, REACTI, ABORT: decelerate within the limits, drop what was to come."""

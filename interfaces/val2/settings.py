@@ -115,11 +115,20 @@ def _alter(o: Operands, c: Context) -> Callable[[Slots], Ask]:
         def ask() -> None:
             c.arm.set_alter(bits, now=c.now)
             if corrects:
+                c.powered()
                 c.arm.alter(values, now=c.now)
 
         return ask
 
     return prepare
+
+
+def _correct(o: Operands, c: Context) -> Callable[[Slots], Ask]:
+    def ask(*values: float) -> None:
+        c.powered()
+        c.arm.alter(values, now=c.now)
+
+    return numbers(o, 6, ask, all_given=False)
 
 
 def _here(o: Operands, c: Context) -> Callable[[Slots], Ask]:
@@ -146,10 +155,6 @@ def _here(o: Operands, c: Context) -> Callable[[Slots], Ask]:
 AT_ONCE: Final[dict[str, Preparation]] = {
     **dict.fromkeys(_CONFIGURATIONS, _configure),
     "ACCEL": _accelerate,
-    "ALTER": _alter,
-    "ALTOFF": lambda _, c: lambda _: lambda: c.arm.set_alter(None, now=c.now),
-    "ALTON": _alter,
-    "ALTOUT": lambda o, c: numbers(o, 6, lambda *v: c.arm.alter(v, now=c.now), all_given=False),
     "AT": lambda o, c: numbers(o, 1, c.arm.at),
     "CLOSE": lambda _, c: lambda _: lambda: c.arm.set_hand(False),
     "COARSE": lambda o, c: _tolerance(o, c, fine=False),
@@ -159,7 +164,6 @@ AT_ONCE: Final[dict[str, Preparation]] = {
     "FINE": lambda o, c: _tolerance(o, c, fine=True),
     "HERE": _here,
     "IGNORE": lambda o, c: numbers(o, 1, c.reactions.ignore),
-    "NOALTER": lambda _, c: lambda _: lambda: c.arm.set_alter(None, now=c.now),
     "NONULL": lambda o, c: lambda _: lambda: c.arm.set_nulling(False, always=o.says("ALWAYS")),
     "NULL": lambda o, c: lambda _: lambda: c.arm.set_nulling(True, always=o.says("ALWAYS")),
     "OPEN": lambda _, c: lambda _: lambda: c.arm.set_hand(True),
@@ -171,6 +175,15 @@ AT_ONCE: Final[dict[str, Preparation]] = {
     "TIMER": _set_timer,
 }
 """What is done at once, and takes no time."""
+
+ALTERING: Final[dict[str, Preparation]] = {
+    "ALTER": _alter,
+    "ALTOFF": lambda _, c: lambda _: lambda: c.arm.set_alter(None, now=c.now),
+    "ALTON": _alter,
+    "ALTOUT": _correct,
+    "NOALTER": lambda _, c: lambda _: lambda: c.arm.set_alter(None, now=c.now),
+}
+"""What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
 
 
 def _tool(o: Operands, c: Context) -> Callable[[Slots], Ask]:

@@ -1,4 +1,4 @@
-"""ALTER: corrections from outside, as steering."""
+"""ALTER: corrections of where the tool stands, each a straight motion by exactly what was asked for."""
 
 from __future__ import annotations
 
@@ -7,36 +7,49 @@ from typing import Final
 import numpy as np
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.motion.places import AXES, Frames
-from vrs.commands import Frame, SteerCommand
+from interfaces.val2.values import Transformation
+from vrs.planning.course import rotations
 
-PERIOD: Final = 0.028
-"""Time in which a correction is made [s], as in VAL-II."""
 CUMULATIVE: Final = 1
 """Bit of the mode: each correction adds to those before."""
 WORLD: Final = 2
-"""Bit of the mode: along the world's axes, not the tool's."""
+"""Bit of the mode: along the axes of BASE, not the tool's."""
+MODES: Final = range(4)
+_SAME: Final = 1e-6
+"""Elements of poses nearer than this are one [mm]."""
 
 
 class Alterations:
-    """What ALTOUT asked for since ALTER."""
+    """Where corrections since ALTER lead."""
 
     def __init__(self) -> None:
         self.mode: int | None = None
         """None while the path isn't altered."""
-        self._sum = np.zeros(6)
+        self._nominal: Transformation | None = None
+        """Where the tool would be without corrections."""
+        self._newest: Transformation | None = None
+        """Where the newest correction leads."""
 
     def set(self, mode: int | None) -> None:
-        """Begin, or end with None."""
-        self.mode = mode
-        self._sum = np.zeros(6)
+        """Begin, or end with None.
 
-    def steering(self, values: tuple[float, ...], frames: Frames) -> SteerCommand:
-        """Steer so that a correction is made in one period.
+        Raises:
+            ValError: If there's no such mode.
+        """
+        if mode is not None and mode not in MODES:
+            detail = f"mode {mode}: {MODES[0]} to {MODES[-1]}; 1 is cumulative, 2 along world axes, 3 both"
+            raise ValError("Illegal value", detail)
+        self.mode, self._nominal, self._newest = mode, None, None
+
+    def corrected(self, values: tuple[float, ...], destination: Transformation) -> Transformation:
+        """The tool's place after a correction.
+
+        Without CUMULATIVE a correction counts from the uncorrected place: where the tool was going before the first
+        correction, or since something else has moved it.
 
         Args:
-            values: X, Y, Z [mm] and turns about x, y, z [deg], of the tool's tip.
-            frames: The tool.
+            values: X, Y, Z [mm], and the turn of the tip: a rotation vector's x, y, z [deg].
+            destination: Where the tool goes.
 
         Raises:
             ValError: If the path isn't altered, or the values aren't six finite numbers.
@@ -46,11 +59,19 @@ class Alterations:
         asked = np.array(values, dtype=np.float64)
         if asked.shape != (6,) or not np.isfinite(asked).all():
             raise ValError("Illegal value", "a correction is X, Y, Z [mm] and three turns [deg]")
-        step = asked if self.mode & CUMULATIVE else asked - self._sum
-        self._sum = self._sum + step
-        v, w = step[:3] / 1000.0 / PERIOD, np.radians(step[3:]) / PERIOD
+        before = self._newest
+        if before is None or np.abs(before.X - destination.X).max() > _SAME:
+            before = self._nominal = destination
+        start = before if self.mode & CUMULATIVE or self._nominal is None else self._nominal
+        X, turn = np.array(start.X), rotations(np.radians(asked[None, 3:]))[0]
         if self.mode & WORLD:
-            return SteerCommand(twist=np.concatenate([AXES @ v, AXES @ w]), frame=Frame.BASE)
-        tip = frames.tip()
-        v, w = tip[:3, :3] @ v, tip[:3, :3] @ w
-        return SteerCommand(twist=np.concatenate([v - np.cross(w, tip[:3, 3]), w]), frame=Frame.TOOL)
+            X[:3, :3] = turn @ X[:3, :3]
+            X[:3, 3] += asked[:3]
+        else:
+            X[:3, 3] += X[:3, :3] @ asked[:3]
+            X[:3, :3] = X[:3, :3] @ turn
+        return Transformation(X)
+
+    def taken(self, place: Transformation) -> None:
+        """A correction was asked for that leads to a place."""
+        self._newest = place

@@ -76,6 +76,36 @@ class Arm(Requests):
         if self._dry is None:
             self._hand.actuate(hand, now)
 
+    def alter(self, values: tuple[float, ...], *, now: float) -> None:
+        """ALTOUT; the arm must not be on another motion.
+
+        What was asked for the next motion, its speed and the hand, waits for that.
+        """
+        self._look(now)
+        if self._moves(now):
+            raise ValError("Robot is moving", "the path is altered between motions: BREAK comes first")
+        if not self.answered(now=now):
+            raise ValError("Robot is moving", "what was asked before has no answer yet")
+        place = self._alterations.corrected(values, self._frames.where(self._goal(), 0.0).tool)
+        if self._dry is not None:
+            self._dry = self._frames.solve(place, self._dry, ())
+        else:
+            rolls = self._continuous and self._delay is None
+            ends = self._delay_span()[1]
+            command = MotionCommand(
+                target=PoseTarget(self._frames.pose(place)),
+                execute_at=ends if ends > now else None,
+                motion=Motion.LINE,
+                insertion=Insertion.APPEND,
+                deviation=math.inf if rolls else 0.0,
+                pace=bounded(self._pace.pace),
+                tool=self._frames.tip(),
+            )
+            self._correction = self._bound = number = self._send(command, True, now)
+            self._recent.append((number, command))
+            self._delay = None
+        self._alterations.taken(place)
+
     def _move(
         self,
         target: Location,

@@ -79,6 +79,8 @@ class Progress:
         """What was asked for to take those out of the plan, and has no answer."""
         self._bound: int | None = None
         """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
+        self._correction: int | None = None
+        """The newest correction by ALTOUT."""
         self._made = Manner()
         """How the newest motion was asked for."""
         self._made_words: tuple[str, ...] = ()
@@ -196,7 +198,7 @@ class Progress:
             for (command, begins), over in zip(motions, ends, strict=False)
             if begins is not None and begins <= now < over
         )
-        if motions and (motions[-1][1] is None or motions[-1][1] > now):
+        if self._moves(-math.inf) and (motions[-1][1] is None or motions[-1][1] > now):
             self._manners.next, self._words = self._made, self._made_words
             self._hand.give_back()
         self._recent.clear()
@@ -243,8 +245,8 @@ class Progress:
         return min((t for t in times if t > now), default=math.inf)
 
     def _moves(self, now: float) -> bool:
-        """Whether the arm is on a motion that a program or the monitor asked for."""
-        return bool(self._recent) and now < self.robot.timeline.end
+        """Whether the arm is on a motion that a program or the monitor asked for, and no correction by ALTOUT."""
+        return bool(self._recent) and self._recent[-1][0] != self._correction and now < self.robot.timeline.end
 
     def _send(self, command: Command | None, straight: bool, now: float) -> int:
         number = self.robot.ask(command, now=now)

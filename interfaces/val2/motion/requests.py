@@ -93,17 +93,6 @@ class Requests(Progress):
             raise ValError("Illegal value", "a time is finite")
         self._at = t
 
-    def alter(self, values: tuple[float, ...], *, now: float) -> None:
-        """ALTOUT; the arm must not be on a motion."""
-        self._look(now)
-        if self._moves(now):
-            raise ValError("Robot is moving", "the path is altered between motions: BREAK comes first")
-        command = self._alterations.steering(values, self._frames)
-        self._recent.clear()
-        self._bound = None
-        if self._dry is None:
-            self._send(command, False, now)
-
     def set_alter(self, mode: int | None, *, now: float) -> None:
         """ALTER, NOALTER."""
         self._look(now)

@@ -364,36 +364,6 @@ def test_the_newest_motion_can_be_taken_back():
     assert close(bench.here(), SQUARE[0]) < 1e-9
 
 
-@pytest.mark.parametrize("mode", [0, 1, 2, 3])
-def test_alter_steers_the_tip(mode):
-    bench = Bench()
-    bench.move(from_oat(0, 500, 50, 90, 60, 0))
-    bench.settle()
-    place = bench.here().tool
-    with pytest.raises(ValError, match=r"\*Path isn't altered\*"):
-        bench.arm.alter((1, 0, 0, 0, 0, 0), now=bench.now)
-    bench.arm.set_alter(mode, now=bench.now)
-    for k in range(60):
-        sway = (k + 1) * 1.0
-        asked = 1.0 if mode & 1 else sway
-        bench.arm.alter((0, asked, 0, 0, 0, 0), now=bench.now)
-        bench.sleep(0.028)
-    bench.arm.set_alter(None, now=bench.now)
-    bench.settle()
-    moved = bench.here().tool.X[:3, 3] - place.X[:3, 3]
-    axis = np.eye(3)[1] if mode & 2 else place.X[:3, 1]
-    assert moved @ axis == pytest.approx(60.0, abs=12.0)
-    assert np.linalg.norm(np.cross(moved, axis)) < 2.0
-
-
-def test_alter_waits_for_motions():
-    bench = Bench()
-    bench.arm.set_alter(0, now=0.0)
-    bench.arm.move(SQUARE[0], straight=False, now=0.0)
-    with pytest.raises(ValError, match=r"\*Robot is moving\*"):
-        bench.arm.alter((1, 0, 0, 0, 0, 0), now=0.0)
-
-
 @pytest.mark.parametrize("value", [0.0, -5.0, math.inf, math.nan])
 def test_impossible_settings_are_refused(value):
     arm = Bench().arm
