@@ -94,7 +94,7 @@ _TABLE: Final = (
     Command("RENAME", "new=old", "Rename a program.", idle=True),
     Command("RESET", "", "Turn all outputs off."),
     Command("RETRY", "", "Go on with a program that stands, at the step that was interrupted.", idle=True),
-    Command("REWIND", "t | -t", "Show where the arm was at a time, or so long ago [s].", need=_LOOK, ours=True),
+    Command("REWIND", "t | -t", "Show what WHERE showed at a time, or so long ago [s].", need=_LOOK, ours=True),
     Command("SIGNAL", "| n,-m,..", "Turn signals on, or off with a minus; show them.", need=_ARGUMENT),
     Command("SPEED", "| percent", "Show or set the monitor speed; it counts at once.", need=_ARGUMENT),
     Command("STATUS", "", "Show the program, its step and cycles, speeds, power.", need=_LOOK),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -10,6 +13,9 @@ OPEN: Final = 100.0
 """Opening of a hand that's open [mm]."""
 HAND_TIME: Final = 0.05
 """What the hand takes unless the parameter HAND.TIME says otherwise [s]."""
+
+REMEMBERED: Final = 10_000
+"""Movements that can be looked back at."""
 
 Gripped = Callable[[float, bool], None]
 """Is told when the hand takes hold of something (True) or lets go [s]."""
@@ -26,13 +32,33 @@ class _Order:
     holds: bool
 
 
+@dataclass(frozen=True, slots=True)
+class _Movement:
+    """An even movement of the hand; it stays where that ends."""
+
+    start: float
+    """[s]."""
+    end: float
+    """[s]."""
+    before: float
+    """Opening at the start [mm]."""
+    to: float
+    """Opening at the end [mm]."""
+
+    def opening(self, t: float) -> float:
+        """Opening at a time [s], [mm]."""
+        if t >= self.end:
+            return self.to
+        share = max((t - self.start) / (self.end - self.start), 0.0)
+        return self.before + share * (self.to - self.before)
+
+
 class Hand:
-    """A hand that opens and closes evenly in HAND.TIME."""
+    """A hand that opens and closes evenly in HAND.TIME. It remembers when it did."""
 
     def __init__(self, parameters: Mapping[str, float], gripped: Gripped | None) -> None:
         self._parameters, self._gripped = parameters, gripped
-        self._from = self._to = OPEN
-        self._start = self._end = 0.0
+        self._movements = deque([_Movement(-math.inf, -math.inf, OPEN, OPEN)], maxlen=REMEMBERED)
         self._holds = False
         self._orders: list[_Order] = []
         self.wanted: float | bool | None = None
@@ -43,7 +69,7 @@ class Hand:
     @property
     def end(self) -> float:
         """When it's done with what it does now [s]."""
-        return self._end
+        return self._movements[-1].end
 
     @property
     def waits(self) -> bool:
@@ -51,16 +77,28 @@ class Hand:
         return bool(self._orders)
 
     @property
+    def _to(self) -> float:
+        return self._movements[-1].to
+
+    @property
     def goal(self) -> float:
         """Opening that it goes to in the end [mm]."""
         return self._orders[-1].to if self._orders else self._to
 
-    def opening(self, now: float) -> float:
-        """Opening at a time [s], [mm]."""
-        if now >= self._end:
-            return self._to
-        share = max((now - self._start) / (self._end - self._start), 0.0)
-        return self._from + share * (self._to - self._from)
+    def opening(self, t: float, started: Callable[[int], float | None] | None = None) -> float:
+        """Opening at a time [s], [mm].
+
+        Args:
+            t: In the past, as far as that is remembered; or later.
+            started: Says when a motion begins [s], None for unknown; with it, what goes with motions to come counts.
+        """
+        movement = self._movements[max(bisect_right(self._movements, t, key=lambda one: one.start) - 1, 0)]
+        for order in self._orders:
+            begins = None if started is None else started(order.number)
+            if begins is None or begins > t:
+                break
+            movement = self._movement(order.to, begins, movement.opening(begins))
+        return movement.opening(t)
 
     def ask(self, number: int, hand: float | bool | None) -> None:
         """Let it move when a motion begins: as the motion says, else as was asked for the next one."""
@@ -97,11 +135,14 @@ class Hand:
         self._orders.clear()
         self.wanted, self.relax = None, False
 
+    def _movement(self, to: float, t: float, before: float) -> _Movement:
+        return _Movement(t, t + max(self._parameters.get("HAND.TIME", HAND_TIME), 0.0), before, to)
+
     def _move(self, to: float, holds: bool, t: float) -> None:
-        self._from, self._to = self.opening(t), to
-        self._start, self._end = t, t + max(self._parameters.get("HAND.TIME", HAND_TIME), 0.0)
+        t = max(t, self._movements[-1].start)
+        self._movements.append(self._movement(to, t, self.opening(t)))
         if holds is not self._holds and self._gripped is not None:
-            self._gripped(self._end if holds else t, holds)
+            self._gripped(self.end if holds else t, holds)
         self._holds = holds
 
 

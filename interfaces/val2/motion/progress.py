@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import deque
 from collections.abc import MutableMapping
 from typing import Final
@@ -13,7 +14,7 @@ from interfaces.stream.control import OVERRULED
 from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.altering import Alterations
-from interfaces.val2.motion.hand import Gripped, Hand
+from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand
 from interfaces.val2.motion.pacing import MonitorSpeed
 from interfaces.val2.motion.places import Frames, in_millimetres, location_error
 from interfaces.val2.motion.robot import Fate, Robot
@@ -58,6 +59,8 @@ class Progress:
         self.robot = robot
         self.parameters: MutableMapping[str, float] = {} if parameters is None else parameters
         self._frames = Frames(robot.model)
+        self._framed = deque([(-math.inf, self._frames)], maxlen=REMEMBERED)
+        """Since when TOOL and BASE have been which [s]."""
         self._manners = Manners()
         self._hand = Hand(self.parameters, gripped)
         self._alterations = Alterations()
@@ -103,9 +106,15 @@ class Progress:
         return None if q is None else self._frames.where(q, self._hand.opening(now))
 
     def past(self, t: float, *, now: float) -> Where:
-        """Where the arm was, or will be, at a time [s]."""
+        """Where the arm was, or will be, at a time [s]: with the tool, the base and the hand as they were then."""
         self._look(now)
-        return self._frames.where(self.robot.timeline.sample(t), self._hand.opening(t))
+        frames = self._framed[max(bisect_right(self._framed, t, key=lambda since: since[0]) - 1, 0)][1]
+        return frames.where(self.robot.timeline.sample(t), self._hand.opening(t, self._begins))
+
+    def _frame(self, frames: Frames) -> None:
+        """Let tool and base be others from now on."""
+        self._frames = frames
+        self._framed.append((self._now, frames))
 
     def _goal(self) -> Array:
         """Joints at the destination [rad], (6,)."""

@@ -51,7 +51,7 @@ class Requests(Progress):
 
     def set_tool(self, tool: Transformation) -> None:
         """TOOL."""
-        self._frames = self._frames.with_tool(tool)
+        self._frame(self._frames.with_tool(tool))
 
     def tool(self) -> Transformation:
         """The tool transformation."""
@@ -59,7 +59,7 @@ class Requests(Progress):
 
     def set_base(self, base: Transformation) -> None:
         """BASE."""
-        self._frames = self._frames.with_base(base)
+        self._frame(self._frames.with_base(base))
 
     def base(self) -> Transformation:
         """The base transformation."""

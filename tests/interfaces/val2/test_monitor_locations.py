@@ -141,3 +141,22 @@ def test_rewind_shows_the_past_and_where_real_has_no_other_twin_here(sitting):
     )
     assert numbers(sitting.type(f"REWIND {t}"))[8:14] == pytest.approx(then, abs=0.002)
     assert sitting.type("WHERE REAL").startswith("*No other twin*")
+
+
+def test_rewinding_shows_the_hand_the_tool_and_the_base_of_then(sitting):
+    seen = []
+    for command in (
+        "DO DELAY 0",
+        "DO CLOSEI",
+        "TOOL TRANS(0,0,100)",
+        "BASE 100,0,0",
+        "DO OPENI",
+        "DO DRIVE 1,5,100",
+    ):
+        sitting.type(command)
+        seen.append((sitting.now, numbers(sitting.type("WHERE"))))
+        sitting.pass_time(1.0)
+    for t, where in seen:
+        assert numbers(sitting.type(f"REWIND {t:.6f}"))[2:] == where
+    assert [where[-1] for _, where in seen] == [100.0, 0.0, 0.0, 0.0, 100.0, 100.0]
+    assert numbers(sitting.type("REWIND 0"))[-1] == 100.0
