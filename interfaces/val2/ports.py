@@ -20,7 +20,7 @@ class Where:
     """Where an arm is."""
 
     tool: Transformation
-    """The tool's tip, in the frame that BASE made of the world."""
+    """The tool's tip in the world, in which BASE says where the robot stands."""
     joints: PrecisionPoint
     hand: float
     """Opening of the hand [mm]."""
@@ -132,7 +132,7 @@ class ArmPort(Protocol):
         """The tool transformation."""
 
     def set_base(self, base: Transformation) -> None:
-        """BASE: the frame in which locations are, relative to the world."""
+        """BASE: where the robot stands in the world in which locations are."""
 
     def base(self) -> Transformation:
         """The base transformation."""

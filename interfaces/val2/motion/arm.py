@@ -59,8 +59,7 @@ class Arm(Requests):
 
     def align(self, *, now: float) -> None:
         """ALIGN."""
-        world = self._frames.base @ self.destination(now=now).tool
-        self._move(self._frames.base.inverse() @ aligned(world), False, now)
+        self._move(aligned(self.destination(now=now).tool), False, now)
 
     def delay(self, seconds: float, *, now: float) -> None:
         """DELAY."""

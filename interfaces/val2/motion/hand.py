@@ -90,7 +90,7 @@ class Hand:
 
         Args:
             t: In the past, as far as that is remembered; or later.
-            started: Says when a motion begins [s], None for unknown; with it, what goes with motions to come counts.
+            started: Says when a motion begins [s], None for unknown; with it, orders of motions to come count.
         """
         movement = self._movements[max(bisect_right(self._movements, t, key=lambda one: one.start) - 1, 0)]
         for order in self._orders:

@@ -49,6 +49,7 @@ class Frames:
     model: RobotModel
     tool: Transformation = NULL
     base: Transformation = NULL
+    """Where the robot stands in the world in which locations are."""
 
     def with_tool(self, tool: Transformation) -> Frames:
         """The same with another tool."""
@@ -68,14 +69,13 @@ class Frames:
     def where(self, q: Array, hand: float) -> Where:
         """Where joints [rad], (6,), put the tool."""
         flange = from_base(self.model.forward(q))
-        tip = self.base.inverse() @ flange @ self.tool
+        tip = self.base @ flange @ self.tool
         return Where(tip, to_val_joints(q, self.model.limits), hand)
 
     def pose(self, place: Transformation) -> Array:
         """Pose of the last link in the robot's base frame, (4, 4) [m], that puts the tool at a place."""
-        if self.tool is NULL:
-            return to_base(place if self.base is NULL else self.base @ place)
-        return to_base(self.base @ place @ self.tool.inverse())
+        near = place if self.base is NULL else self.base.inverse() @ place
+        return to_base(near if self.tool is NULL else near @ self.tool.inverse())
 
     def place(self, location: Location) -> Transformation:
         """The tool at a location."""

@@ -121,7 +121,7 @@ def test_tool_and_base_are_shown_and_set(sitting):
     assert numbers(sitting.type("WHERE"))[2] == pytest.approx(1019.85, abs=0.01)
     sitting.type("TOOL NULL", "BASE 100,,50")
     where = numbers(sitting.type("WHERE"))
-    assert where[:3] == pytest.approx([-120.3, 150.05, 869.85], abs=0.01)
+    assert where[:3] == pytest.approx([79.7, 150.05, 969.85], abs=0.01)
     assert numbers(sitting.type("BASE"))[:3] == [100, 0, 50]
     assert sitting.type("TOOL nowhere").startswith("*Undefined")
 
@@ -160,3 +160,30 @@ def test_rewinding_shows_the_hand_the_tool_and_the_base_of_then(sitting):
         assert numbers(sitting.type(f"REWIND {t:.6f}"))[2:] == where
     assert [where[-1] for _, where in seen] == [100.0, 0.0, 0.0, 0.0, 100.0, 100.0]
     assert numbers(sitting.type("REWIND 0"))[-1] == 100.0
+
+
+def test_base_is_how_the_robot_has_been_moved(sitting):
+    """VAL's example: after BASE 300,,-50,30 it has been shifted 300 mm in +X, 50 mm down, and turned by 30 deg."""
+    sitting.type("DO READY", "DO LEFTY", AWAY)
+    stood = sitting.joints()
+    sitting.type("BASE 300,,-50,30")
+    x, y, z, o, a, t = numbers(sitting.type("WHERE"))[:6]
+    cos, sin = np.cos(np.radians(30)), np.sin(np.radians(30))
+    assert (x, y, z) == pytest.approx((300 + 400 * cos, 400 * sin, 150), abs=0.01)
+    assert (o, a, t) == pytest.approx((90 + 30, 0, 0), abs=0.01)
+    assert sitting.joints() == stood
+    sitting.type(f"DO MOVE TRANS({300 + 405 * cos - 10 * sin},{405 * sin + 10 * cos},145,120,0,0)")
+    sitting.type("DO BASE")
+    assert numbers(sitting.type("WHERE"))[:6] == pytest.approx([405, 10, 195, 90, 0, 0], abs=0.02)
+
+
+def test_a_location_stays_where_it_is_when_the_robot_is_moved(sitting):
+    sitting.type("DO READY", "DO LEFTY", AWAY, "DO SET part = HERE", "BASE 50")
+    sitting.type("DO MOVE part")
+    assert numbers(sitting.type("WHERE"))[0] == pytest.approx(400, abs=0.01)
+    sitting.type("BASE NULL")
+    assert numbers(sitting.type("WHERE"))[0] == pytest.approx(350, abs=0.01)
+    sitting.type("BASE 0,0,0,90", "DO SET was = HERE", "DO DRAW 10,0,0")
+    assert numbers(sitting.type("DO TYPE /F9.3, DX(HERE)-DX(was), DY(HERE)-DY(was)"))[:2] == pytest.approx(
+        [10, 0], abs=0.01
+    )

@@ -152,7 +152,7 @@ def test_tool_and_base_change_where_and_how_things_are():
     tool, base = from_oat(0, 30, 120, 90, -90, 0), from_oat(50, 20, -10, 90 + 30, -90, 0)
     bench.arm.set_tool(tool)
     bench.arm.set_base(base)
-    place = base.inverse() @ from_oat(0, 450, 100, *DOWN)
+    place = base @ from_oat(0, 450, 100, *DOWN)
     bench.move(place)
     bench.settle()
     assert close(bench.here(), place) < 1e-9
