@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
 from interfaces.val2 import forms, kinds, walk
+from interfaces.val2.alone import stray
+from interfaces.val2.compiler import refusal
+from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
 from interfaces.val2.errors import Place, ValError
 from interfaces.val2.grammar import SIGNIFICANT
+from interfaces.val2.memory import mismatch
+from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import directive, lines_of, split_comment
-from interfaces.val2.signals import INTERNAL, OUTPUTS
+from interfaces.val2.signals import legal, settable
 from interfaces.val2.slots import Kind, nearest
 from interfaces.val2.source import SourceFile, parse_file
-from interfaces.val2.structure import survey
+from interfaces.val2.structure import Structure, survey
 from interfaces.val2.syntax import (
     Apply,
     Assign,
     Call,
+    Case,
     Decompose,
     Expression,
     For,
+    Format,
     Ignored,
     Instruction,
     Local,
@@ -33,8 +40,11 @@ from interfaces.val2.syntax import (
     Statement,
     Step,
     Unary,
+    Value,
     Variable,
 )
+from robots import puma560
+from vrs.engine import Engine
 
 MOST_ERRORS: Final = 100
 """Lines that can't be read, of which a file's check tells."""
@@ -119,6 +129,8 @@ def check(source: SourceFile) -> list[Finding]:
 class _Checker:
     def __init__(self, source: SourceFile) -> None:
         self._programs = {program.name: program for program in source.programs}
+        self._context = Context(Arm(EngineRobot(Engine(puma560.model()))))
+        """For what compiling shows; nothing runs in it."""
         self._set: dict[str, set[str]] = defaultdict(set)
         """Programs by which names are set; the empty name stands for all."""
         self._known: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
@@ -154,7 +166,8 @@ class _Checker:
 
     def program(self, program: Program) -> Iterator[Finding]:
         """What is wrong with a program."""
-        yield from (_error(error) for error in survey(program)[1])
+        structure, errors = survey(program)
+        yield from (_error(error) for error in errors)
         own = self._own(program)
         parameters = {parameter.name for parameter in program.parameters}
         known = {
@@ -165,6 +178,7 @@ class _Checker:
         }
         usable = self._set[program.name] | {name for name in self._set[""] if name not in own}
         reported: set[str] = set()
+        yield from _cases(program, structure, known)
         for number, step in enumerate(program.steps, 1):
             for finding in self._step(step, known, usable, reported):
                 error = finding.error.at(program=program.name, step=number, place=step.at)
@@ -175,11 +189,18 @@ class _Checker:
         if isinstance(statement, Ignored):
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
-        for error in (*self._calls(statement), *_numbers(statement)):
-            yield _error(error)
+        yield from (_warning(error) for error in _capped(statement))
+        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement)]
         for expression, wanted in walk.reads(statement):
-            for error in kinds.mistakes(expression, wanted, known):
-                yield _error(error)
+            errors += kinds.mistakes(expression, wanted, known)
+        if isinstance(statement, For) and statement.variable.prefix:
+            errors.append(mismatch(statement.variable))
+        if not errors and stray(step, step.at) is None:
+            # What is no mistake here and can't be compiled would stop the program when it comes there.
+            uncompilable = refusal(step, self._context)
+            errors += [] if uncompilable is None else [uncompilable]
+        yield from (_error(error) for error in errors)
+        for expression, wanted in walk.reads(statement):
             yield from self._unset(expression, wanted, usable, reported)
 
     def _unset(
@@ -189,7 +210,7 @@ class _Checker:
         match expression:
             case Variable(name, _, at) if name not in usable and name not in reported:
                 reported.add(name)
-                located = name[0] == "#" or wanted in ("location", "frame")
+                located = name[0] == "#" or wanted in ("location", "frame", "point")
                 what = "Undefined location" if located else "Undefined value"
                 yield _error(ValError(what, f"{name}; nothing in the file sets it", place=at))
             case Apply("DEFINED" | "SWITCH" | "PARAMETER"):
@@ -223,6 +244,27 @@ class _Checker:
         return ValError("Undefined program", f"{name}{close.lower()}", place=at)
 
 
+def _cases(program: Program, structure: Structure, known: dict[str, str]) -> Iterator[Finding]:
+    """CASE of what is neither a number nor a string, and VALUE of what can't be the same."""
+    for i, step in enumerate(program.steps):
+        head = structure.blocks.get(i)
+        values: tuple[Expression, ...] = ()
+        match step.statement:
+            case Case(value):
+                given, values = value, (value,)
+            case Value(values) if head is not None and isinstance(
+                case := program.steps[head.start].statement, Case
+            ):
+                given = case.value
+            case _:
+                continue
+        wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
+        for value in values:
+            for mistake in kinds.mistakes(value, wanted, known):
+                error = mistake.at(program=program.name, step=i + 1, place=step.at)
+                yield _error(error)
+
+
 def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
     """The parts of an expression, and whether each has to be a location."""
     if isinstance(expression, Apply):
@@ -242,9 +284,7 @@ def _given(statement: Statement) -> str:
     match statement:
         case Assign() | For() | Decompose():
             return "real"
-        case Set(_, value):
-            return "frame" if kinds.kind_of(value, {}) == "frame" else ""
-        case Instruction("HERE"):
+        case Set() | Instruction("HERE"):
             return "frame"
     return ""
 
@@ -273,6 +313,9 @@ _RANGES: Final[dict[tuple[str, int], tuple[float, float, str]]] = {
     ("WAIT.EVENT", 1): (0, 1e6, "seconds, not negative"),
     ("SPEED", 0): (1e-3, 1e6, "a speed above 0"),
     ("AT", 0): (0, 1e9, "seconds, not negative"),
+    ("ALTER", 1): (0, 3, "a mode, 0 to 3"),
+    ("ALTON", 1): (0, 3, "a mode, 0 to 3"),
+    ("TIMER", 0): (TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
 }
 
 
@@ -287,13 +330,47 @@ def _numbers(statement: Statement) -> Iterator[ValError]:
         low, high, allowed = _RANGES.get((statement.keyword, i), (-1e300, 1e300, ""))
         if not low <= value <= high:
             yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
-        if statement.keyword == "SIGNAL" and not any(abs(value) in r for r in (OUTPUTS, INTERNAL, (0.0,))):
-            yield ValError("Illegal digital signal", "allowed: 1 to 32, 2001 to 2032", place=operand.at)
         if statement.keyword == "PARAMETER":
             row = forms.PARAMETERS[statement.words[0]]
             if not row.low <= value <= row.high:
                 allowed = f"{row.low:g} to {row.high:g} {row.unit}"
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
+
+
+def _signals(statement: Statement) -> Iterator[ValError]:
+    """Signals that are written down and that there aren't."""
+    named: list[tuple[Expression | Format | None, Callable[[float], int]]] = []
+    match statement:
+        case Instruction("SIGNAL", operands):
+            named += [(operand, settable) for operand in operands]
+        case Instruction("IGNORE", operands):
+            named += [(operand, legal) for operand in operands]
+        case React(signal):
+            named.append((signal, legal))
+    for expression, _ in walk.reads(statement):
+        for part in walk.parts(expression):
+            if isinstance(part, Apply) and part.function == "SIG":
+                named += [(argument, legal) for argument in part.arguments]
+    for number, check_number in named:
+        value = None if isinstance(number, Format) else _constant(number)
+        if value is None or isinstance(number, Format) or number is None:
+            continue
+        try:
+            check_number(value)
+        except ValError as error:
+            yield error.at(place=number.at)
+
+
+def _capped(statement: Statement) -> Iterator[ValError]:
+    """Shares that are written down and count as less."""
+    if not isinstance(statement, Instruction) or statement.keyword not in ("SPEED", "DRIVE", "ACCEL"):
+        return
+    for i, operand in enumerate(statement.operands):
+        value = _constant(operand)
+        percent = i == 2 if statement.keyword == "DRIVE" else i or not {"MMPS", "IPS"} & set(statement.words)
+        if operand is not None and value is not None and value > MOST_PERCENT and percent:
+            detail = f"{statement.keyword} {value:.9g} % counts as {MOST_PERCENT:g} %"
+            yield ValError("Value out of range", detail, place=operand.at)
 
 
 def _alike_names(text: str) -> Iterator[Finding]:

@@ -89,6 +89,19 @@ def compiled(program: Program, context: Context) -> Code:
     return _Compiler(program, context).code()
 
 
+def refusal(step: Step, context: Context) -> ValError | None:
+    """Why a step that stands alone can never be done, by its text; None where its text is right."""
+    try:
+        compiler = _Compiler(Program("", (), (step,)), context)
+    except ValError:
+        return None  # Labels and structures are those of its program.
+    try:
+        compiler.statement(0, step)
+    except ValError as error:
+        return error
+    return None
+
+
 class _Compiler:
     def __init__(self, program: Program, context: Context) -> None:
         self.program, self.context = program, context
@@ -115,7 +128,7 @@ class _Compiler:
 
     def _step(self, i: int, step: Step) -> StepFunction:
         try:
-            return self._statement(i, step)
+            return self.statement(i, step)
         except ValError as error:
             failure = error
 
@@ -128,7 +141,7 @@ class _Compiler:
         """Number of the slot in which the FOR at a step keeps its limits."""
         return self.kept.setdefault(i, self.names + len(self.kept))
 
-    def _statement(self, i: int, step: Step) -> StepFunction:
+    def statement(self, i: int, step: Step) -> StepFunction:
         context, x, following, jumps = self.context, self.x, i + 1, self.structure.jumps
         match step.statement:
             case Blank() | Do() | AnyValue() as plain:

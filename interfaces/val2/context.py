@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 SPECIAL: Final = -1
 """What a step returns instead of the next step's index when `Context.pending` holds what is to be done."""
 DEAR: Final = 9
+MOST_PERCENT: Final = 100.0
+"""Of speeds and accelerations: more counts as this."""
 TIMERS: Final = range(16)
 SLICE: Final = 0.016
 """How often a wait looks at what changes with time alone [s]: V+'s cycle."""
@@ -149,6 +151,11 @@ class Context:
         if warning not in self.warned:
             self.warned.add(warning)
             self.events.append(warning)
+
+    def capped(self, word: str, value: float, most: float = MOST_PERCENT, unit: str = "%") -> None:
+        """Say that a value counts as less where it's more than can be."""
+        if value > most:
+            self.warn(Warned(f"{word} {value:.9g} {unit} counts as {most:.9g} {unit}"))
 
     def timer(self, number: float) -> int:
         """The index of a timer.

@@ -201,6 +201,7 @@ class Controller:
         self.context.now = max(now, self.context.now)
         code = compiled(Program("", (), (step,)), self.context)
         if not self.running:
+            self.context.warned.clear()
             self._do, self._due = Task(self.context, code, [], cycles=1), True
             return
         try:

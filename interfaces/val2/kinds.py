@@ -25,14 +25,17 @@ POINT: Final = "precision point"
 _RELATIONS: Final = ("==", "<>", "<", "<=", ">", ">=")
 _SHOWN: Final[Mapping[str, str]] = {
     "real": "a number", "string": "a string", "frame": "a transformation", "location": "a location",
-    POINT: "a precision point",
+    POINT: "a precision point", "point": "a precision point",
 }  # fmt: skip
 _FITS: Final[Mapping[str, tuple[str, ...]]] = {
     "real": ("real",),
     "string": ("string",),
     "frame": ("frame",),
+    "point": (POINT,),
     "location": ("frame", POINT, "location"),
 }
+_STANDING: Final = ("HERE", "DEST")
+"""Functions that give joints where a precision point is wanted."""
 
 
 def kind_of(expression: Expression, known: Mapping[str, str]) -> str:
@@ -69,6 +72,8 @@ def mistakes(expression: Expression, wanted: Kind, known: Mapping[str, str]) -> 
         known: What is known of names without a prefix.
     """
     kind = kind_of(expression, known)
+    if wanted == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
+        kind = POINT
     if kind and wanted in _FITS and kind not in _FITS[wanted]:
         yield ValError("Mixed types", f"{_SHOWN[kind]} where {_SHOWN[wanted]} is wanted", place=expression.at)
         return

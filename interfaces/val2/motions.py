@@ -45,6 +45,7 @@ def _drive(o: Operands, c: Context) -> Callable[[Slots], Ask]:
         number, angle, percent = joint(s), change(s), speed(s)
         if number not in range(1, 7):
             raise ValError("Illegal joint number", f"{number:.9g}: 1 to 6")
+        c.capped("DRIVE at", percent)
         return lambda: c.arm.drive(int(number), angle, percent, now=c.now)
 
     return prepare

@@ -105,6 +105,9 @@ class ArmPort(Protocol):
     def set_speed(self, speed: float, *, turn: float | None, unit: str, always: bool) -> None:
         """Program speed: in a unit of `%`, `MMPS` or `IPS`; of turning [%]."""
 
+    def fastest(self, unit: str) -> float:
+        """The greatest program speed that counts, in a unit of `%`, `MMPS` or `IPS`."""
+
     def set_acceleration(self, up: float, down: float) -> None:
         """ACCEL: shares of the limits [%]."""
 

@@ -25,8 +25,11 @@ def _speed(o: Operands, c: Context) -> Callable[[Slots], Ask]:
 
     def prepare(s: Slots) -> Ask:
         speed, turning = value(s), None if turn is None else turn(s)
+        c.capped("SPEED of turning", turning or 0.0)
         if o.says("MONITOR"):
+            c.capped("Monitor SPEED", speed)
             return lambda: c.arm.set_monitor_speed(speed, now=c.now)
+        c.capped("SPEED", speed, c.arm.fastest(unit), unit)
         return lambda: c.arm.set_speed(speed, turn=turning, unit=unit, always=always)
 
     return prepare
@@ -38,6 +41,7 @@ def _accelerate(o: Operands, c: Context) -> Callable[[Slots], Ask]:
 
     def prepare(s: Slots) -> Ask:
         values = up(s), down(s)
+        c.capped("ACCEL", max(values))
         return lambda: c.arm.set_acceleration(*values)
 
     return prepare

@@ -51,9 +51,23 @@ def legal(number: float) -> int:
     Raises:
         ValError: If there's no such signal.
     """
-    if number == int(number) and (n := abs(int(number))) and (n in OUTPUTS or n in INPUTS or n in INTERNAL):
-        return n
-    raise ValError("Illegal digital signal", f"{number:.9g}: 1 to 32, 1001 to 1032, 2001 to 2032")
+    return _one_of(number, (OUTPUTS, INPUTS, INTERNAL))
+
+
+def settable(number: float) -> int:
+    """The number of a signal that a program may set, without its sign; 0 stands for none.
+
+    Raises:
+        ValError: If there's no such signal.
+    """
+    return _one_of(number, (OUTPUTS, INTERNAL)) if number else 0
+
+
+def _one_of(number: float, groups: Sequence[range]) -> int:
+    if any(abs(number) in group for group in groups):
+        return abs(int(number))
+    allowed = ", ".join(f"{group[0]} to {group[-1]}" for group in groups)
+    raise ValError("Illegal digital signal", f"{number:.9g}; allowed: {allowed}")
 
 
 class Signals:
@@ -81,10 +95,7 @@ class Signals:
         Raises:
             ValError: If one of them is none of these; then nothing has changed.
         """
-        wanted = [int(n) for n in numbers if n != 0 and legal(n)]
-        for number in wanted:
-            if abs(number) in INPUTS:
-                raise ValError("Illegal digital signal", f"{abs(number)} is an input")
+        wanted = [int(n) for n in numbers if settable(n)]
         for number in wanted:
             self._turn(abs(number), number > 0)
 

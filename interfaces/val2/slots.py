@@ -10,9 +10,9 @@ from typing import Final, Literal, TypeAlias
 from interfaces.val2.errors import Place, ValError
 
 Kind: TypeAlias = Literal[
-    "real", "string", "location", "any", "label", "program", "variable", "frame", "array", "text"
+    "real", "string", "location", "any", "label", "program", "variable", "frame", "point", "array", "text"
 ]
-"""What an operand is: `frame` is a location that is no precision point, `variable` something to be set."""
+"""What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set."""
 Origin: TypeAlias = Literal["VAL", "VAL-II", "V+", "ours"]
 """Where a word is known from; VAL-II took over what VAL has, and V+ what VAL-II has."""
 

@@ -62,7 +62,7 @@ def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
         case Assign(target, value):
             yield value, "string" if target.prefix == "$" else "real"
         case Set(target, value):
-            yield value, "location"
+            yield value, "point" if target.prefix == "#" else "frame"
         case Decompose(_, value):
             yield value, "location"
         case Instruction("HERE", (Compound(parts=(*others, _)),)):

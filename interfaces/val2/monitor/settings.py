@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 
 from interfaces.val2 import forms
+from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.commands import unique
@@ -67,7 +68,10 @@ def speed(desk: Desk, rest: str, *, now: float) -> None:
     if rest in {"", "?"}:
         desk.say(f"Monitor speed {layout.number(arm.monitor_speed())} %")
         return
-    arm.set_monitor_speed(desk.number(rest, now=now), now=now)
+    wanted = desk.number(rest, now=now)
+    arm.set_monitor_speed(wanted, now=now)
+    if wanted > MOST_PERCENT:
+        desk.say(f"*Warning* SPEED {layout.number(wanted)} % counts as {MOST_PERCENT:g} %", style=Style.NOTE)
 
 
 def signal(desk: Desk, rest: str, *, now: float) -> None:

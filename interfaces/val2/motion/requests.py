@@ -7,6 +7,7 @@ import math
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion.places import with_word
 from interfaces.val2.motion.progress import Progress
+from interfaces.val2.motion.speeds import Speed
 from interfaces.val2.values import Transformation
 
 
@@ -22,6 +23,10 @@ class Requests(Progress):
     def set_speed(self, speed: float, *, turn: float | None, unit: str, always: bool) -> None:
         """SPEED."""
         self._manners.set_speed(speed, turn, unit, always)
+
+    def fastest(self, unit: str) -> float:
+        """The greatest program speed that counts."""
+        return 1.0 / Speed(1.0, unit).linear_share(self.robot.model)
 
     def set_acceleration(self, up: float, down: float) -> None:
         """ACCEL."""

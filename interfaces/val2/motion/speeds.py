@@ -28,7 +28,7 @@ class Speed:
     turn: float = 100.0
     """Of turning [%], for straight lines."""
 
-    def _linear(self, model: RobotModel) -> float:
+    def linear_share(self, model: RobotModel) -> float:
         """Share of the tool's nominal speed."""
         if self.unit == "%":
             return self.value / 100.0
@@ -36,7 +36,7 @@ class Speed:
 
     def share(self, model: RobotModel) -> float:
         """Share of the nominal speeds for a joint-interpolated motion."""
-        return bounded(self._linear(model))
+        return bounded(self.linear_share(model))
 
     def line_share(self, model: RobotModel, start: Array, goal: Array) -> float:
         """Share of the nominal speeds for a straight line between poses of the tool's tip, (4, 4) [m].
@@ -46,7 +46,7 @@ class Speed:
         way = float(np.linalg.norm(goal[:3, 3] - start[:3, 3])) / model.tool_speed
         cosine = 0.5 * (float(np.sum(goal[:3, :3] * start[:3, :3])) - 1.0)
         turn = math.acos(min(max(cosine, -1.0), 1.0)) / model.tool_turn_speed
-        slowest = max(way / self._linear(model), turn / (self.turn / 100.0))
+        slowest = max(way / self.linear_share(model), turn / (self.turn / 100.0))
         return bounded(max(way, turn) / slowest) if slowest > 0 else self.share(model)
 
 

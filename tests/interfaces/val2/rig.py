@@ -177,6 +177,10 @@ class FakeArm:
         """SPEED."""
         self._note(self._seen, "set_speed", speed, turn, unit, always)
 
+    def fastest(self, unit: str) -> float:
+        """A PUMA's."""
+        return {"%": 100.0, "MMPS": 500.0}.get(unit, 19.685)
+
     def set_acceleration(self, up: float, down: float) -> None:
         """ACCEL."""
         self._note(self._seen, "set_acceleration", up, down)

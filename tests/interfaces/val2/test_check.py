@@ -57,6 +57,27 @@ def found(*lines, sections=""):
         ("SPEED 0", "Value out of range", 7),
         ("SIGNAL 1, 1001", "Illegal digital signal", 11),
         ("PARAMETER HAND.TIME = -1", "Value out of range", 23),
+        ("SET p = #PPOINT(1)", "Mixed types", 9),
+        ("SET #q = TRANS(1)", "Mixed types", 10),
+        ("SET #q = NULL:NULL", "Mixed types", 10),
+        ("y = #HERE", "Mixed types", 5),
+        ("y = #DEST", "Mixed types", 5),
+        ("#y = TRANS(1)", "Mixed types", 6),
+        ("SET $t = HERE", "Variable type mismatch", 5),
+        ("x = DX(#HERE)", "Mixed types", 8),
+        ("x = DISTANCE(HERE, #HERE)", "Mixed types", 20),
+        ("SET e = SHIFT(#HERE BY 1)", "Mixed types", 15),
+        ("HERE $s", "Invalid location", 1),
+        ('PROMPT "x", #q', "Variable type mismatch", 13),
+        ("DECOMPOSE $a[0] = HERE", "Variable type mismatch", 11),
+        ("DECOMPOSE #a[0] = HERE", "Variable type mismatch", 11),
+        ("IF SIG(1, 33) GOTO 7", "Illegal digital signal", 11),
+        ("SIGNAL 33", "Illegal digital signal", 8),
+        ("SIGNAL 1.5", "Illegal digital signal", 8),
+        ("IGNORE 0", "Illegal digital signal", 8),
+        ("REACT -1033", "Illegal digital signal", 7),
+        ("TIMER 16 = 0", "Value out of range", 7),
+        ("ALTER (1) 4", "Value out of range", 11),
         ("MOVE", "Missing argument", 5),
         ("x = (1", "Syntax error", 7),
     ],
@@ -73,12 +94,12 @@ def test_mistakes_are_found_where_they_are(line, what, column):
         ["FOR i = 1 TO 3", "x[i] = i", "END", "TYPE x[2], LAST(x[])"],
         ['PROMPT "n", n, $s', "TYPE n, $s", '$t = $DECODE($s, ",", 0)'],
         ["CALL main", "IF DEFINED(p) GOTO 5", "5 MOVE HERE"],
-        ["SET p = #PPOINT(1,2,3,4,5,6)", "MOVE p"],
+        ["SET #p = #PPOINT(1,2,3,4,5,6)", "MOVE #p"],
         ["PARAMETER HAND.TIME = 0.5", "x = PARAMETER(HAND.TIME) + SWITCH(CP)"],
         ["MOVET #PPOINT(0), TRUE", "MOVEST HERE, 40", "BASE 1, 2", "BASE NULL", "TOOL NULL"],
         ['$a = "x" + "y"', 'IF $a == "xy" GOTO 1', "1 TYPE $a, /F8.2, 3, NULL"],
         ["SIGNAL 0, -2001", "WAIT SIG(1001, -2)", "DELAY 0", "x = 1", "SIGNAL -x"],
-        ["a = 1", "CASE a OF", 'VALUE 1, "x":', "ANY", "END"],
+        ["a = 1", "CASE a OF", "VALUE 1, 2:", "ANY", "END"],
     ],
 )
 def test_sound_programs_are_left_alone(lines):
@@ -212,3 +233,41 @@ def test_vrs_check_of_what_isnt_there_is_one_line(tmp_path, capsys):
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "can't be read" in said
+
+
+@pytest.mark.parametrize(
+    ("lines", "line", "what", "column"),
+    [
+        (["x = 1", "SET #q = x"], 3, "Mixed types", 10),
+        (["SET p = NULL", "SET #q = p"], 3, "Mixed types", 10),
+        (["SET p = NULL", "TYPE SIN(p)"], 3, "Mixed types", 10),
+        (["FOR $i = 1 TO 3", "END"], 2, "Variable type mismatch", 5),
+        (["CASE HERE OF", "VALUE 1:", "END"], 2, "Mixed types", 6),
+        (['$s = "a"', "CASE $s OF", 'VALUE "a", 1:', "END"], 4, "Mixed types", 12),
+        (["CASE 1 OF", 'VALUE "a":', "END"], 3, "Mixed types", 7),
+        (["SET #q = #HERE", "y = #q"], 3, "Mixed types", 5),
+    ],
+)
+def test_types_over_several_lines(lines, line, what, column):
+    assert [(f[1], f[3], f[4]) for f in found(*lines)] == [(what, line, column)]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["SET #q = HERE", "SET #r = DEST", "SET #s = #q", "SET p = HERE", "y = 1", "MOVE #q"],
+        ["SIGNAL 0, -32, 2032", "IGNORE 1001", "REACT -2001", "x = SIG(-1032)"],
+        ['$s = "a"', "CASE $s OF", 'VALUE "a", $s + "b":', "END", "CASE 1 OF", "VALUE 1, 2:", "ANY", "END"],
+    ],
+)
+def test_what_is_of_the_right_kind_is_left_alone(lines):
+    assert found(*lines) == []
+
+
+@pytest.mark.parametrize(
+    "line", ["SPEED 150", "SPEED 50, 101 ALWAYS", "SPEED 300 MONITOR", "DRIVE 1, 1, 120", "ACCEL 200"]
+)
+def test_what_counts_as_less_is_said(line):
+    ((severity, what, detail, *_),) = found(line)
+    assert (severity, what) == ("warning", "Value out of range")
+    assert detail.endswith("counts as 100 %")

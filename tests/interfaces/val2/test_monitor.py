@@ -188,7 +188,9 @@ def test_monitor_speed_counts_at_once(sitting):
     for wrong in ("0", "-5", "abc", "1,2"):
         assert sitting.type(f"SPEED {wrong}").startswith("*"), wrong
     assert sitting.arm.monitor_speed() == 50.0
-    assert sitting.type("SPEED 150", "SPEED") == "Monitor speed 100 %\n"
+    assert sitting.type("SPEED 150", "SPEED") == "*Warning* SPEED 150 % counts as 100 %\nMonitor speed 100 %\n"
+    for _ in range(2):
+        assert sitting.type("DO SPEED 150") == "*Warning* SPEED 150 % counts as 100 %\n"
 
 
 def test_at_schedules_a_motion_undo_takes_it_back(sitting):

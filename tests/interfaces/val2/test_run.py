@@ -181,3 +181,15 @@ def test_vrs_run_says_what_is_wrong_in_one_line(tmp_path, capsys):
     for bad in (tmp_path / "missing.v2", tmp_path):
         assert vrs("run", bad) == 2
         assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_speeds_that_count_as_less_are_said_once():
+    text = program(
+        "FOR i = 1 TO 3", "SPEED 150", "END", "SPEED 900 MMPS", "SPEED 120 MONITOR", "SPEED 100,100 ALWAYS",
+        "DRIVE 1, 1, 130", "BREAK",
+    )  # fmt: skip
+    _, _, told = twins(text)
+    assert told == [
+        "SPEED 150 % counts as 100 %", "SPEED 900 MMPS counts as 500 MMPS", "Monitor SPEED 120 % counts as 100 %",
+        "DRIVE at 130 % counts as 100 %",
+    ]  # fmt: skip
