@@ -34,7 +34,7 @@ class Edit:
     command_id: int | None
     """The command that made it; None where the journal didn't see that."""
     at: float
-    """The engine's time [s]; −∞ offline."""
+    """Nothing changed before this time [s]: the engine's when its timeline was still the one before; −∞ offline."""
     others: tuple[tuple[float, int], ...] = ()
     """Commands that came meanwhile and begin at these times [s], where the journal saw only what they made."""
 
@@ -72,6 +72,7 @@ class Journal:
         owners = self._timeline.owners(0, len(self._timeline))
         self._newest = max((*ids, *owners), default=0)
         self._edits: deque[Edit] = deque(maxlen=KEPT)
+        self._seen = self.past
         self.number = 0
         """Number of the newest edit; 0 before the first."""
 
@@ -111,12 +112,13 @@ class Journal:
                     begun.append((receipt.execute_at, receipt.command_id))
             alone = self.engine.timeline.version == self._timeline.version + 1 and len(begun) == 1
             self._write(begun[0][1] if alone else None, () if alone else tuple(begun))
+        self._seen = self.past
         return self.number
 
     def _write(self, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
         before, self._timeline = self._timeline, self.engine.timeline
         self.number += 1
-        self._edits.append(Edit(self.number, before, self._timeline, command_id, self.past, others))
+        self._edits.append(Edit(self.number, before, self._timeline, command_id, self._seen, others))
 
     def since(self, number: int) -> tuple[Edit, ...]:
         """The edits after one, oldest first; where they aren't all kept, the newest alone, by nobody known."""
