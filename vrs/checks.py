@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable
 
 import numpy as np
@@ -11,14 +12,19 @@ from numpy.typing import ArrayLike
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
 
+LARGEST = 1e9
+"""Size of the largest value that a command may ask for, in any unit: squares and products are far from overflow."""
+SMALLEST = sys.float_info.min
+"""Size of the smallest number besides 0 [2.2e-308]; what is divided by a subnormal one overflows."""
+
 
 def finite(name: str, value: object, allowed: str = "a finite number") -> float:
-    """Return value as a float.
+    """Return value as a float; a subnormal number counts as 0.
 
     Raises:
         InvalidValueError: If value is not a real number, or NaN or infinite.
     """
-    if type(value) is float and math.isfinite(value):
+    if type(value) is float and SMALLEST <= abs(value) < math.inf:
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidValueError(name, value, allowed)
@@ -28,7 +34,7 @@ def finite(name: str, value: object, allowed: str = "a finite number") -> float:
         raise InvalidValueError(name, value, allowed) from None
     if not math.isfinite(number):
         raise InvalidValueError(name, value, allowed)
-    return number
+    return 0.0 if 0.0 < abs(number) < SMALLEST else number
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...] | None, allowed: str) -> Array:
@@ -47,6 +53,22 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...] | None, all
     if not np.isfinite(array).all():
         raise InvalidValueError(name, value, allowed)
     return array
+
+
+def sized_array(
+    name: str, value: ArrayLike, shape: tuple[int, ...] | None, allowed: str, *, largest: float = LARGEST
+) -> Array:
+    """Copy what a command asks for: as `finite_array`, within ±`largest`, and a subnormal number counts as 0.
+
+    Raises:
+        InvalidValueError: If it holds anything else.
+    """
+    array = finite_array(name, value, shape, allowed)
+    size = np.abs(array)
+    if (size > largest).any():
+        raise InvalidValueError(name, value, f"{allowed}, within ±{largest:g}")
+    subnormal = (size > 0.0) & (size < SMALLEST)
+    return frozen_array(np.where(subnormal, 0.0, array)) if subnormal.any() else array
 
 
 def number_in(name: str, value: object, low: float, high: float, what: str = "a number", unit: str = "") -> float:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import finite, finite_array
+from vrs.checks import LARGEST, finite, finite_array, number_in, sized_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -22,6 +22,10 @@ __all__ = [
     "MotionCommand", "ParameterChange", "PlanEdit", "PoseTarget", "Position", "PositionQuery", "Profile", "Resume",
     "Retime", "ScaleTime", "SteerCommand", "Stop", "Target", "finite", "finite_array",
 ]  # fmt: skip
+
+
+_FARTHEST = 1e6
+"""Largest distance in a command [m]."""
 
 
 class Motion(enum.StrEnum):
@@ -80,7 +84,7 @@ class JointTarget:
     """Joint values [rad], shape (n,)."""
 
     def __init__(self, q: ArrayLike) -> None:
-        array = finite_array("target q", q, None, "finite joint values [rad], shape (n,)")
+        array = sized_array("target q", q, None, "finite joint values [rad], shape (n,)")
         if array.ndim != 1:
             raise InvalidValueError("target q", q, "finite joint values [rad], shape (n,)")
         object.__setattr__(self, "q", array)
@@ -214,7 +218,7 @@ class DriveCommand:
 
     def __post_init__(self) -> None:
         for name in ("v", "w", "duration"):
-            object.__setattr__(self, name, finite(name, getattr(self, name)))
+            object.__setattr__(self, name, number_in(name, getattr(self, name), -LARGEST, LARGEST))
         if self.duration <= 0:
             raise InvalidValueError("duration", self.duration, "positive seconds")
         _check_stamps(self)
@@ -239,12 +243,12 @@ class SteerCommand:
         if (self.rates is None) == (self.twist is None):
             raise InvalidValueError("steering", (self.rates, self.twist), "either rates or a twist")
         if self.rates is not None:
-            rates = finite_array("rates", self.rates, None, "finite joint rates [rad/s], shape (n,)")
+            rates = sized_array("rates", self.rates, None, "finite joint rates [rad/s], shape (n,)")
             if rates.ndim != 1:
                 raise InvalidValueError("rates", self.rates, "finite joint rates [rad/s], shape (n,)")
             object.__setattr__(self, "rates", rates)
         if self.twist is not None:
-            object.__setattr__(self, "twist", finite_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
+            object.__setattr__(self, "twist", sized_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
         object.__setattr__(self, "frame", _word("frame", self.frame, Frame))
         _check_stamps(self)
 
@@ -260,7 +264,7 @@ class Retime:
 
     def __post_init__(self) -> None:
         _check_id(self.command_id)
-        finite("execute_at", self.execute_at, "finite seconds")
+        object.__setattr__(self, "execute_at", finite("execute_at", self.execute_at, "finite seconds"))
         _check_stamps(self)
 
 
@@ -309,10 +313,7 @@ class ScaleTime:
     """When it begins [s]; None means as soon as possible (offline: the start of the timeline)."""
 
     def __post_init__(self) -> None:
-        factor = finite("factor", self.factor, "a number from 0.001 to 1000")
-        if not 1e-3 <= factor <= 1e3:
-            raise InvalidValueError("factor", self.factor, "a number from 0.001 to 1000")
-        object.__setattr__(self, "factor", factor)
+        object.__setattr__(self, "factor", number_in("factor", self.factor, 1e-3, 1e3))
         _check_stamps(self)
 
 
@@ -352,15 +353,12 @@ def _check_id(command_id: object) -> None:
 def _deviation(value: object, *, endless: bool = False) -> float:
     if endless and isinstance(value, float) and value == inf:
         return inf
-    deviation = finite("deviation", value, "metres ≥ 0")
-    if deviation < 0:
-        raise InvalidValueError("deviation", value, "metres ≥ 0")
-    return deviation
+    return number_in("deviation", value, 0.0, _FARTHEST, unit=" m")
 
 
 def _transform(name: str, value: ArrayLike) -> Array:
     allowed = "a homogeneous transform of shape (4, 4) with a rotation matrix orthonormal to 1e-6"
-    array = finite_array(name, value, (4, 4), allowed)
+    array = sized_array(name, value, (4, 4), allowed, largest=_FARTHEST)
     R = array[:3, :3]
     proper = np.abs(R @ R.T - np.eye(3)).max() <= 1e-6 and np.linalg.det(R) > 0
     if not proper or not np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
@@ -380,7 +378,7 @@ def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdi
         value = getattr(command, name)
         if value is not None:
             stamp = finite(name, value, "None or finite seconds")
-            if abs(stamp) > 1e9:
+            if abs(stamp) > LARGEST:
                 raise InvalidValueError(name, value, "within ±1e9 s: times count from the session's origin")
             object.__setattr__(command, name, stamp)
 

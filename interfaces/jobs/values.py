@@ -82,7 +82,8 @@ class Wait:
 
     def __post_init__(self) -> None:
         if self.seconds is not None:
-            number_in("seconds", self.seconds, 0.0, LONGEST_WAIT, unit=" s")
+            seconds = number_in("seconds", self.seconds, 0.0, LONGEST_WAIT, unit=" s")
+            object.__setattr__(self, "seconds", seconds)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from interfaces.stream.wire import control as controls
 from interfaces.stream.wire import driving, replies, requests, sites
 from interfaces.stream.wire import network as networks
 from interfaces.stream.wire import tasks as works
+from interfaces.stream.wire.fields import check_normal
 from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
@@ -90,6 +91,11 @@ WIRES: dict[type, type[Wire]] = {
     DriveReport: driving.DriveReportWire,
 }
 """The wire form of each message."""
+ASKED = frozenset(
+    WIRES[kind]
+    for kind in (*get_args(Request), *get_args(Question), tasks.TaskOrder, control.Pong, Orders, DriveOrders)
+)
+"""What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}
 """Messages by the type that stands in them."""
 
@@ -154,6 +160,8 @@ def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARG
         raise ProtocolError(ProblemCode.TOO_LARGE, f"{len(data)} bytes; at most {largest} are read")
     try:
         wire = _reader(encoding, allowed)(data)
+        if type(wire) in ASKED:
+            check_normal(wire, str(wire.__struct_config__.tag))
         return wire.read()
     except msgspec.ValidationError as error:
         raise _invalid(data, encoding, allowed, str(error)) from None

@@ -46,9 +46,9 @@ class Goal:
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
-            number_in(name, getattr(self, name), -1000.0, 1000.0, unit=" m")
+            object.__setattr__(self, name, number_in(name, getattr(self, name), -1000.0, 1000.0, unit=" m"))
         if self.heading is not None:
-            number_in("heading", self.heading, -1000.0, 1000.0, unit=" rad")
+            object.__setattr__(self, "heading", number_in("heading", self.heading, -1000.0, 1000.0, unit=" rad"))
 
 
 class JourneyState(enum.StrEnum):

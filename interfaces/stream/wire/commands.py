@@ -10,15 +10,14 @@ from msgspec import Meta
 
 from interfaces.stream.wire.fields import (
     MOST_NAMES,
-    CommandId,
     Count,
-    Finite,
     Joints,
     Message,
     Names,
     Number,
     Text,
     Time,
+    Value,
     Wire,
     Word,
     array,
@@ -33,6 +32,7 @@ from vrs.receipt import Receipt, Status
 _Row = Annotated[list[Annotated[float, Meta(ge=-1e6, le=1e6)]], Meta(min_length=4, max_length=4)]
 """Of a pose: whether it's one can be found out without an overflow."""
 _Pose = Annotated[list[_Row], Meta(min_length=4, max_length=4)]
+_Whole = Annotated[int, Meta(ge=-(10**9), le=10**9)]
 _Distance = Annotated[float, Meta(ge=0, le=1e6)]
 _Share = Annotated[float, Meta(ge=1e-3, le=1)]
 _PLAIN = frozenset(("pace", "acceleration"))
@@ -117,7 +117,7 @@ class SteerWire(Message, frozen=True, omit_defaults=True, gc=False, tag="steer")
     """`SteerCommand`."""
 
     rates: Joints | None = None
-    twist: Annotated[list[Finite], Meta(min_length=6, max_length=6)] | None = None
+    twist: Annotated[list[Value], Meta(min_length=6, max_length=6)] | None = None
     frame: Frame = Frame.BASE
     issued_at: Time | None = None
     execute_at: Time | None = None
@@ -131,8 +131,8 @@ class SteerWire(Message, frozen=True, omit_defaults=True, gc=False, tag="steer")
 class DriveWire(Message, frozen=True, omit_defaults=True, gc=False, tag="drive"):
     """`DriveCommand`."""
 
-    v: Finite
-    w: Finite
+    v: Value
+    w: Value
     duration: Annotated[float, Meta(gt=0, le=1e9)]
     issued_at: Time | None = None
     execute_at: Time | None = None
@@ -229,7 +229,7 @@ class ParameterWire(Message, frozen=True, omit_defaults=True, gc=False, tag="par
     """`ParameterChange`."""
 
     name: Word
-    value: bool | CommandId | Finite | Word | Joints | None = None
+    value: bool | _Whole | Value | Word | Joints | None = None
 
     def read(self) -> commands.ParameterChange:
         """The command."""
@@ -256,7 +256,7 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
     q: Joints | None = None
     reason: Text = ""
     version: Count = 0
-    shift: Finite = 0.0
+    shift: Value = 0.0
     superseded_by: Count | None = None
     """0 for a correction: no command did it."""
     undone: bool = False

@@ -11,7 +11,6 @@ from interfaces.stream.control import ProblemCode, Role
 from interfaces.stream.wire.fields import (
     Count,
     Epoch,
-    Finite,
     Joints,
     Message,
     Name,
@@ -19,6 +18,7 @@ from interfaces.stream.wire.fields import (
     Stamp,
     Text,
     Time,
+    Value,
     Wire,
     Word,
     array,
@@ -301,15 +301,15 @@ class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state")
     t: Time
     q: Joints
     play: Time
-    pace: Finite
+    pace: Value
     D: Time
-    following_error: Finite
+    following_error: Value
     epoch: Epoch | None = None
     connected: bool = True
     halted: Text = ""
     corrections: Count = 0
     reference: Joints | None = None
-    round_trip: Finite | None = None
+    round_trip: Value | None = None
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
 
     @classmethod

@@ -12,17 +12,18 @@ from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
 from interfaces.stream.wire.fields import (
     Count,
     Epoch,
-    Finite,
     Message,
     Number,
     Seconds,
     Stamp,
     Text,
     Time,
+    Value,
     Wire,
     Word,
     digits,
     epoch,
+    normal,
     text,
 )
 from interfaces.stream.wire.tasks import ErrandForm, SightForm, TaskReportForm
@@ -124,7 +125,7 @@ class PosturesWire(Message, frozen=True, omit_defaults=True, gc=False, tag="post
     connected: bool = True
     halted: Text = ""
     drives: Count = 0
-    round_trip: Finite | None = None
+    round_trip: Value | None = None
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
 
     @classmethod
@@ -167,7 +168,8 @@ class DriveOrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
         runs = tuple((first, _rows(arcs)) for first, arcs in packet.runs)
         errands = tuple(ErrandForm.of(errand) for errand in value.errands)
         stamps = str(value.epoch), value.number, value.sent_at, value.began
-        return cls(*stamps, packet.complete_until, value.start, runs, _rows(packet.tail), errands)
+        start = None if value.start is None else Posture(*map(normal, value.start))
+        return cls(*stamps, packet.complete_until, start, runs, _rows(packet.tail), errands)
 
     def read(self) -> DriveOrders:
         """The orders."""
@@ -252,7 +254,9 @@ class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
 
 
 def _rows(arcs: tuple[ArcSegment, ...]) -> tuple[ArcRow, ...]:
-    return tuple((arc.start, *arc.posture, arc.v, arc.w, arc.duration) for arc in arcs)
+    rows = ((arc.start, *arc.posture, arc.v, arc.w, arc.duration) for arc in arcs)
+    # What is computed of ordinary numbers may be subnormal, which a robot refuses.
+    return tuple(tuple(map(normal, row)) for row in rows)  # type: ignore[misc]
 
 
 def _arcs(rows: tuple[ArcRow, ...]) -> tuple[ArcSegment, ...]:

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
+from vrs.checks import LARGEST, SMALLEST
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
 
@@ -18,12 +19,14 @@ MOST_NAMES = 1000
 """Commands that a receipt names, at most."""
 LONGEST_TEXT = 2000
 """Text for people is cut off after so many characters."""
-_LARGEST = sys.float_info.max
 
 Number = Annotated[int, Meta(ge=1, le=2**63 - 1)]
 Count = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 CommandId = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
-Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
+Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+"""A coefficient: a short segment's may be of any size."""
+Value = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
+"""A joint value, a speed, a parameter; in its own unit."""
 Time = Annotated[float, Meta(ge=-1e9, le=1e9)]
 """Seconds of the session."""
 Seconds = Annotated[float, Meta(gt=0, le=1e9)]
@@ -35,7 +38,7 @@ Epoch = Annotated[str, Meta(pattern=r"\A[1-9][0-9]{0,19}\Z")]
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Word = Annotated[str, Meta(max_length=200)]
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
-Joints = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS)]
+Joints = Annotated[list[Value], Meta(min_length=1, max_length=MOST_JOINTS)]
 Names = Annotated[tuple[Number, ...], Meta(max_length=MOST_NAMES)]
 
 
@@ -64,6 +67,35 @@ class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type")
             InvalidValueError: If there's none.
         """
         raise NotImplementedError
+
+
+def check_normal(value: object, name: str) -> None:
+    """Look for a subnormal number in a message or a part of it: what is divided by one overflows.
+
+    Args:
+        value: The message, as it crossed.
+        name: What it's called.
+
+    Raises:
+        InvalidValueError: If one of its numbers is nearer to 0 than `SMALLEST`, and isn't 0.
+    """
+    if isinstance(value, float):
+        if 0.0 < abs(value) < SMALLEST:
+            raise InvalidValueError(name, value, f"0, or at least {SMALLEST:.3g} in size")
+    elif isinstance(value, msgspec.Struct):
+        for field in value.__struct_fields__:
+            check_normal(getattr(value, field), f"{name}.{field}")
+    elif isinstance(value, (list, tuple)):
+        for i, item in enumerate(value):
+            check_normal(item, f"{name}[{i}]")
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            check_normal(item, f"{name}[{key!r}]")
+
+
+def normal(value: float) -> float:
+    """A number as a site may send it: 0 where it's subnormal."""
+    return 0.0 if 0.0 < abs(value) < SMALLEST else value
 
 
 def numbers(q: Array) -> list[float]:

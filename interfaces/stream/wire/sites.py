@@ -10,13 +10,13 @@ from interfaces.stream.wire.commands import CommandWire, ReceiptWire, command_wi
 from interfaces.stream.wire.fields import (
     Count,
     Epoch,
-    Finite,
     Joints,
     Message,
     Number,
     Stamp,
     Text,
     Time,
+    Value,
     Wire,
     array,
     epoch,
@@ -103,7 +103,7 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
     sent_at: Stamp
     executed: Count
     play: Time
-    pace: Finite
+    pace: Value
     q: Joints
     measured_at: Stamp
     q_at: Time

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from hypothesis import strategies as st
@@ -42,13 +43,15 @@ from vrs.model import Limits
 from vrs.receipt import Receipt, Status
 from vrs.segment import ArcSegment, PolynomialSegment
 
+floats = partial(st.floats, allow_subnormal=False)
 numbers = st.integers(1, 2**63 - 1)
 counts = st.integers(0, 2**63 - 1)
 epochs = st.integers(1, 2**64 - 1)
 ids = st.none() | st.integers(-(2**63), 2**63 - 1)
-times = st.floats(-1e9, 1e9)
+times = floats(-1e9, 1e9)
 stamps = st.none() | times
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = floats(-1e9, 1e9)
+coefficients = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text(max_size=40)
 names = st.text(min_size=1, max_size=40)
 small = st.integers(1, 8)
@@ -74,8 +77,8 @@ def runs(draw):
     n, found, start = draw(small), [], draw(times)
     for _ in range(draw(st.integers(0, 4))):
         rows = draw(st.integers(1, 6))
-        a = frozen(draw(st.lists(finite, min_size=n * rows, max_size=n * rows))).reshape(rows, n)
-        duration = draw(st.floats(1e-12, 1e3))
+        a = frozen(draw(st.lists(coefficients, min_size=n * rows, max_size=n * rows))).reshape(rows, n)
+        duration = draw(floats(1e-12, 1e3))
         found.append(PolynomialSegment(start, duration, a, draw(ids)))
         start = found[-1].end if draw(st.booleans()) else draw(times)
     return tuple(found)
@@ -87,31 +90,31 @@ def poses(draw):
     X = np.eye(4)
     X[:3, :3] = np.linalg.qr(np.random.default_rng(draw(st.integers(0, 999))).normal(size=(3, 3)))[0]
     X[:3, :3] *= np.sign(np.linalg.det(X[:3, :3]))
-    X[:3, 3] = draw(st.lists(st.floats(-10, 10), min_size=3, max_size=3))
+    X[:3, 3] = draw(st.lists(floats(-10, 10), min_size=3, max_size=3))
     return v.PoseTarget(X, draw(st.none() | words))
 
 
 targets = arrays.map(v.JointTarget) | poses()
-deviations = st.floats(0, 1e6)
-shares = st.floats(1e-3, 1)
+deviations = floats(0, 1e6)
+shares = floats(1e-3, 1)
 one = st.integers(1, 2**63 - 1)
 commands = st.one_of(
     st.builds(
         v.MotionCommand, targets, stamps, stamps, shares, st.sampled_from(v.Motion), st.sampled_from(v.Profile),
-        st.sampled_from(v.Insertion), deviations | st.just(math.inf), shares, st.floats(1e-2, 1),
+        st.sampled_from(v.Insertion), deviations | st.just(math.inf), shares, floats(1e-2, 1),
         st.none() | poses().map(lambda pose: pose.X),
     ),
     st.builds(v.SteerCommand, arrays, st.none(), st.sampled_from(v.Frame), stamps, stamps),
     st.builds(v.SteerCommand, st.none(), array_of(6), st.sampled_from(v.Frame), stamps, stamps),
-    st.builds(v.DriveCommand, finite, finite, st.floats(1e-6, 1e9), stamps, stamps),
+    st.builds(v.DriveCommand, finite, finite, floats(1e-6, 1e9), stamps, stamps),
     st.builds(v.Retime, one, times, stamps),
     st.builds(v.Cancel, one, stamps, stamps),
     st.builds(v.InsertVia, one, targets, deviations, stamps, stamps),
-    st.builds(v.ScaleTime, st.floats(1e-3, 1e3), stamps, stamps),
+    st.builds(v.ScaleTime, floats(1e-3, 1e3), stamps, stamps),
     st.builds(v.Stop, stamps, stamps),
     st.builds(v.Resume, stamps, stamps),
     st.builds(v.PositionQuery, stamps),
-    st.builds(v.ParameterChange, words, st.none() | st.booleans() | one | finite | words),
+    st.builds(v.ParameterChange, words, st.none() | st.booleans() | st.integers(1, 10**9) | finite | words),
 )  # fmt: skip
 several = st.lists(one, max_size=5).map(tuple)
 receipts = st.builds(
@@ -132,31 +135,31 @@ leases = st.builds(
 def welcomes(draw):
     """What a server has, of one width."""
     n = draw(small)
-    low = draw(st.floats(-10, 0))
+    low = draw(floats(-10, 0))
     limits = Limits(*[np.full(n, x) for x in (low, low + 1, 2.0, 3.0, 4.0)])
     named = draw(st.dictionaries(names, array_of(n), max_size=3))
-    role, rates = draw(st.sampled_from(c.Role)), draw(st.lists(st.floats(0.1, 1e3), max_size=3))
+    role, rates = draw(st.sampled_from(c.Role)), draw(st.lists(floats(0.1, 1e3), max_size=3))
     known = draw(times), draw(leases), tuple(rates), draw(st.booleans()), draw(words), draw(words)
-    return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(st.floats(0.1, 60)))
+    return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(floats(0.1, 60)))
 
 
 ways = st.builds(n.Way, words, words, words)
-spans = st.none() | st.floats(0, 1e9)
-measured = st.builds(Measured, counts, st.none() | st.floats(0, 1), spans, spans)
+spans = st.none() | floats(0, 1e9)
+measured = st.builds(Measured, counts, st.none() | floats(0, 1), spans, spans)
 plans = st.builds(PlanPart, counts, times, arrays, runs())
 entries = st.builds(Entry, numbers, times, st.none() | commands, counts)
 echoes = st.none() | st.tuples(numbers, times, times)
 postures = st.builds(Posture, times, times, times)
-drives = st.builds(Drive, st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
-positive = st.floats(1e-3, 1e6)
+drives = st.builds(Drive, floats(-1e6, 1e6), floats(-1e6, 1e6))
+positive = floats(1e-3, 1e6)
 arcs = st.lists(
     st.builds(
         ArcSegment,
         times,
-        st.floats(1e-6, 1e3),
+        floats(1e-6, 1e3),
         st.tuples(times, times, times),
-        st.floats(-1e6, 1e6),
-        st.floats(-9, 9),
+        floats(-1e6, 1e6),
+        floats(-9, 9),
     ),
     max_size=3,
 ).map(tuple)
@@ -165,16 +168,16 @@ cells = st.lists(st.builds(CellChange, st.tuples(counts, counts), times, st.bool
 followed = st.builds(Followed, numbers, counts, postures, counts, st.none() | st.builds(CellChanges, times, cells))
 
 
-metres = st.floats(-1e6, 1e6)
+metres = floats(-1e6, 1e6)
 points = st.tuples(metres, metres)
 rows = st.lists(points, max_size=4).map(tuple)
 doubts = st.tuples(metres, metres, metres)
-near = st.floats(-1000, 1000)
+near = floats(-1000, 1000)
 goals = st.builds(Goal, near, near, st.none() | near)
 texts = words.filter(str.strip)
 jobs = st.one_of(
     st.builds(Move, goals), st.builds(Voice, texts), st.builds(Message, texts),
-    st.builds(Wait, st.none() | st.floats(0, 1e4)),
+    st.builds(Wait, st.none() | floats(0, 1e4)),
 )  # fmt: skip
 job_lists = st.builds(lambda some, goal: JobList.of(*some, places={"A": goal}), st.lists(jobs, max_size=4), goals)
 job_numbers = st.integers(1, 2**31 - 1)
@@ -182,7 +185,7 @@ stages = st.sampled_from(Stage)
 progress = st.builds(
     Progress, stages,
     st.lists(
-        st.builds(JobProgress, job_numbers, stages, words, st.none() | st.floats(0, 1e4)), max_size=3
+        st.builds(JobProgress, job_numbers, stages, words, st.none() | floats(0, 1e4)), max_size=3
     ).map(tuple),
     words,
 )  # fmt: skip
@@ -207,7 +210,7 @@ task_reports = st.builds(
 messages = {
     m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
     m.Ask: st.builds(m.Ask, numbers, stamps),
-    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.Form), st.none() | st.floats(0.1, 1e3)),
+    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.Form), st.none() | floats(0.1, 1e3)),
     m.Want: st.builds(m.Want, counts, st.none() | counts),
     m.Outcome: st.builds(m.Outcome, numbers, st.none() | receipts, words, counts, times),
     m.Answer: st.builds(m.Answer, frames, times),
@@ -219,8 +222,8 @@ messages = {
     c.Hello: st.builds(c.Hello, st.sampled_from(c.Role), names, st.none() | words, st.none() | words, numbers),
     c.Welcome: welcomes(),
     c.Attached: st.builds(
-        c.Attached, words, arrays, words, st.floats(0.1, 60), stamps, words, words, numbers,
-        st.none() | st.floats(0.01, 2), words, words,
+        c.Attached, words, arrays, words, floats(0.1, 60), stamps, words, words, numbers,
+        st.none() | floats(0.01, 2), words, words,
     ),
     c.Ping: st.builds(c.Ping, numbers, times),
     c.Pong: st.builds(c.Pong, numbers, times, times, times),
@@ -243,11 +246,11 @@ messages = {
     Report: st.builds(
         Report, epochs, numbers, times, echoes, counts, times, finite, arrays, times, times, words,
         st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans, st.none() | arrays,
-        st.none() | st.floats(0, 1e3),
+        st.none() | floats(0, 1e3),
     ),
     b.MobileWelcome: st.builds(
         b.MobileWelcome, words, st.sampled_from(c.Role), words, st.builds(DriveLimits, *[positive] * 4), positive,
-        positive, times, leases, st.booleans(), words, words, st.floats(0.1, 60), words, numbers,
+        positive, times, leases, st.booleans(), words, words, floats(0.1, 60), words, numbers,
     ),
     b.Postures: st.builds(
         b.Postures, numbers, times, postures, drives, postures, stamps, st.none() | postures, st.none() | drives,
