@@ -120,7 +120,7 @@ def serve(
             min=0,
             max=65535,
             metavar="N",
-            help="VAL-II's monitor on plain TCP, on loopback only; 0 for any port that's free.",
+            help="VAL-II's monitor on plain TCP, on loopback only, by a token; 0 for any port that's free.",
         ),
     ] = None,
     val_files: Annotated[
@@ -299,6 +299,8 @@ async def _serve(
         from interfaces.station.page import Station
         from interfaces.station.record import RecordingFacts, Recordings
         from interfaces.station.shelf import Shelf
+        from interfaces.stream.access import Access, make_token
+        from interfaces.stream.control import Role
         from interfaces.stream.server import application
         from interfaces.val2.pages import PageDoor
         from interfaces.val2.served import HOST, ServedVal
@@ -328,8 +330,12 @@ async def _serve(
         typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")
         if val_listening is not None:
-            await stack.enter_async_context(val.listening(val_listening))
+            val_token = None if access.needs_tokens else make_token()
+            val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
+            await stack.enter_async_context(val.listening(val_listening, val_access))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
+            if val_token is not None:
+                typer.echo(f"vrs: VAL-II asks each terminal for a token, the first line to send: {val_token}")
         sys.stdout.flush()
         if doors.until_eof:
             end_with_input(ended)

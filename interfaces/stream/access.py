@@ -120,6 +120,15 @@ def read_tokens(path: Path) -> dict[Role, str]:
     return tokens
 
 
+def make_token(random_bytes: Callable[[int], bytes] = secrets.token_bytes) -> str:
+    """Make a token of 32 random bytes.
+
+    Args:
+        random_bytes: So many bytes that nobody can guess.
+    """
+    return base64.urlsafe_b64encode(random_bytes(TOKEN_BYTES)).rstrip(b"=").decode("ascii")
+
+
 def make_tokens(path: Path, random_bytes: Callable[[int], bytes] = secrets.token_bytes) -> dict[Role, str]:
     """Make a token file with a token of 32 random bytes for each role.
 
@@ -130,9 +139,7 @@ def make_tokens(path: Path, random_bytes: Callable[[int], bytes] = secrets.token
     Raises:
         FormatError: If it can't be made.
     """
-    tokens = {
-        role: base64.urlsafe_b64encode(random_bytes(TOKEN_BYTES)).rstrip(b"=").decode("ascii") for role in Role
-    }
+    tokens = {role: make_token(random_bytes) for role in Role}
     try:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     except OSError as error:

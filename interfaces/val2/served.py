@@ -38,7 +38,7 @@ class ServedVal:
         Args:
             url: Of the server, `ws://HOST:PORT/ws`.
             token: By which this is an operator there.
-            access: What a terminal's token opens; without any tokens, whoever comes is an operator.
+            access: What the token of a page's terminal opens; without any tokens, whoever comes is an operator.
             directory: Of LOAD and STORE.
             version: Name and version of the program.
         """
@@ -78,7 +78,7 @@ class ServedVal:
         self._connection = connection
         controller = Controller(arm, parameters=arm.parameters, now=connection.now())
         board = Switchboard(controller, LeaseControl(connection))
-        return TerminalRoom(board, connection, partial(self._terminal, board))
+        return TerminalRoom(board, connection, partial(self._terminal, board, self._access))
 
     def _connect(self) -> tuple[Connection, Arm]:
         from interfaces import connect
@@ -92,28 +92,30 @@ class ServedVal:
             raise
 
     @contextlib.asynccontextmanager
-    async def listening(self, listening: socket.socket) -> AsyncIterator[ServedVal]:
+    async def listening(self, listening: socket.socket, access: Access) -> AsyncIterator[ServedVal]:
         """Serve terminals over TCP meanwhile; within `running`.
 
         Args:
             listening: On this machine's loopback address; it's closed in the end.
+            access: What a terminal's token opens; there's no terminal without one.
 
         Raises:
             VrsError: If the server can't be reached.
         """
         room = await self.enter()
-        locked = self._access.needs_tokens
 
-        def terminal(token: str) -> Monitor | None:
-            return room.terminal(token if locked else None, None)
+        def terminal(shown: str) -> Monitor | None:
+            return self._terminal(room.board, access, shown, None)
 
-        async with ValDoor(room.board, room.clock, terminal, locked=locked).listening(listening):
+        async with ValDoor(room.board, room.clock, terminal).listening(listening):
             yield self
 
-    def _terminal(self, board: Switchboard, token: str | None, person: Person | None) -> Monitor | None:
+    def _terminal(
+        self, board: Switchboard, access: Access, token: str | None, person: Person | None
+    ) -> Monitor | None:
         """The monitor for whoever shows a token; None for a wrong one."""
-        barred = "this token only looks" if self._access.refusal(Role.OPERATOR, token) else ""
-        if barred and self._access.refusal(Role.VIEWER, token):
+        barred = "this token only looks" if access.refusal(Role.OPERATOR, token) else ""
+        if barred and access.refusal(Role.VIEWER, token):
             return None
         return Monitor(board, self._files, f"{self._version}, VAL-II", barred=barred, person=person)
 

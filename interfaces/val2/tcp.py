@@ -1,27 +1,43 @@
-"""VAL's monitor on plain TCP: one controller, a terminal a connection, one of them in control."""
+"""VAL's monitor on plain TCP: one controller, a terminal a connection, one of them in control.
+
+Any web page can send lines to a port of this machine. So each terminal shows a token before anything else, and
+what looks like HTTP or TLS is hung up on before a line of it counts.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import math
+import re
 import socket
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import Final
 
+from interfaces.stream.strangers import Strangers
 from interfaces.timer import Turning
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import OVERLONG, Monitor
 from interfaces.val2.monitor.switchboard import Switchboard
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from vrs.clock import Clock
 
 MOST: Final = 16
-"""Connections at a time."""
+"""Terminals at a time, those that have shown a token."""
+STRANGERS: Final = 256
+"""Connections at a time that haven't shown one; the oldest gives way to a new one."""
+PATIENCE: Final = 60.0
+"""Time for the token [s]."""
 UNREAD: Final = 262_144
 """Bytes that may wait for a reader; what is said beyond them is lost to it."""
 TRIES: Final = 3
 """Tokens that may be tried."""
+BEFORE: Final = 4096
+"""Characters that may come before the right token."""
+SLICE: Final = 8
+"""Lines of a terminal that are taken in one turn: others have theirs in between."""
+UNTAKEN: Final = 64
+"""Lines that may wait to be taken; more isn't read meanwhile."""
 ALIVE: Final = 1.0
 """How often a client that sends no more is looked after while its program runs [s]."""
 _READ: Final = 4096
@@ -29,56 +45,66 @@ _NEWLINE: Final = "\r\n"
 _TOKEN: Final = "Token: "  # noqa: S105 - what is asked
 _NUL: Final = b"\0"
 """Nothing, to a terminal; a client that's gone answers it with a reset."""
+_OTHER_PROTOCOL: Final = re.compile(
+    r"\x16"  # TLS: a handshake record
+    r"|[!-~]+[ \t]+(?:[/*]|[a-z][a-z0-9+.-]*://|\S+[ \t]+[a-z]+/[0-9])"  # a request line of any method
+    r"|[!#$%&'*+.^_`|~0-9a-z-]+:[ \t]",  # a header line
+    re.IGNORECASE,
+)
+_HEADER: Final = re.compile(r"[!#$%&'*+.^_`|~0-9a-z-]+:", re.IGNORECASE)
 
 
 class TcpTerminal:
     """The terminal of a connection: bytes to lines, what is said to bytes."""
 
     def __init__(
-        self,
-        writer: asyncio.StreamWriter,
-        terminal: Callable[[str], Monitor | None],
-        *,
-        locked: bool,
+        self, writer: asyncio.StreamWriter, terminal: Callable[[str], Monitor | None], full: Callable[[], bool]
     ) -> None:
-        """Begin.
+        """Ask for a token.
 
         Args:
             writer: Where to.
             terminal: Makes the monitor for a token; None for a wrong one.
-            locked: Whether a token is asked for.
+            full: Whether there are as many terminals as there may be.
         """
-        self._writer, self._terminal = writer, terminal
+        self._writer, self._terminal, self._full = writer, terminal, full
         self._input, self._output = Input(), Output(_NEWLINE)
         self._lines: deque[str] = deque()
         self.monitor: Monitor | None = None
-        self._tries = TRIES if locked else 0
-        self._locked = locked
+        """None before a token was accepted: nothing is carried out."""
+        self._tries, self._before = TRIES, 0
         self._ended = self._told = self._lost = False
         self._looked = 0.0
         self.over = asyncio.Event()
         """Set when it's to be closed."""
-        if locked:
-            self._send(_TOKEN)
+        self.room = asyncio.Event()
+        """Set while more may be read."""
+        self.room.set()
+        self._send(_TOKEN)
 
     def feed(self, data: bytes) -> None:
         """Take bytes; none at the end of the input."""
         self._lines.extend(self._input.feed(data) if data else self._input.end())
         self._ended = self._ended or not data
+        if len(self._lines) > UNTAKEN:
+            self.room.clear()
 
     def advance(self, *, now: float) -> None:
         """Do what is due, and what was typed."""
         if self._writer.transport.is_closing():
             self.leave(now=now)
             return
-        if self.monitor is None and not self._unlock(now):
+        if self.over.is_set() or (self.monitor is None and not self._unlock(now)):
             return
         monitor = self.monitor
         assert monitor is not None
         monitor.advance(now=now)
         self._give()
-        while self._lines and not monitor.done:
-            self._type(monitor, self._lines.popleft(), now)
+        for _ in range(min(SLICE, len(self._lines))):
+            if not monitor.done:
+                self._type(monitor, self._lines.popleft(), now)
+        if len(self._lines) <= UNTAKEN:
+            self.room.set()
         if self._ended and not self._lines:
             if not self._told:
                 self._told, self._looked = True, now
@@ -89,21 +115,30 @@ class TcpTerminal:
             self.over.set()
 
     def _unlock(self, now: float) -> bool:
-        """Make the monitor, where a token is asked for once one is right; whether there's one."""
-        while self._locked and self._lines and self._tries:
-            self._tries -= 1
-            self.monitor = self._terminal(self._lines.popleft().strip())
-            if self.monitor is not None:
-                break
-            self._send(f"*Invalid token*{_NEWLINE}{_TOKEN if self._tries else ''}")
-        if not self._locked:
-            self.monitor = self._terminal("")
-        if self.monitor is None:
-            if self._ended or not self._tries:
+        """Make the monitor, once a token is right; whether there's one."""
+        while self._lines and not self.over.is_set():
+            text = self._lines.popleft().strip()
+            self._before += len(text) + 1
+            monitor = self._terminal(text) if text else None
+            if monitor is not None and self._full():
+                self._send(f"*Too many terminals* {MOST} at most{_NEWLINE}")
                 self.over.set()
-            return False
-        self.monitor.start(now=now)
-        return True
+            elif monitor is not None:
+                self.monitor = monitor
+                monitor.start(now=now)
+                return True
+            elif text == OVERLONG or self._before > BEFORE or _OTHER_PROTOCOL.match(text) or _HEADER.match(text):
+                self.over.set()
+            elif text:
+                self._tries -= 1
+                self._send(f"*Invalid token*{_NEWLINE}{_TOKEN if self._tries else ''}")
+                if not self._tries:
+                    self.over.set()
+        begun = self._input.begun.lstrip()
+        if self._ended or len(begun) > BEFORE or _OTHER_PROTOCOL.match(begun):
+            self.over.set()
+        self.room.set()
+        return False
 
     def _type(self, monitor: Monitor, text: str, now: float) -> None:
         self._output.took()
@@ -136,6 +171,11 @@ class TcpTerminal:
             data = f"{_NEWLINE}*Output lost* it wasn't read{_NEWLINE}".encode() + data
         self._writer.write(data)
 
+    def cut_off(self) -> None:
+        """End it at once."""
+        self._writer.transport.abort()
+        self.over.set()
+
     def leave(self, *, now: float) -> None:
         """The connection is gone: what it ran is stopped."""
         if self.monitor is not None:
@@ -144,8 +184,10 @@ class TcpTerminal:
 
     def next_deadline(self) -> float:
         """When something is due [s]."""
-        if self.monitor is None:
+        if self.monitor is None or self.over.is_set():
             return math.inf
+        if self._lines:
+            return -math.inf
         looked = self._looked + ALIVE if self._told else math.inf
         return min(self.monitor.next_deadline(), looked)
 
@@ -153,24 +195,17 @@ class TcpTerminal:
 class ValDoor:
     """Terminals at one controller, over TCP."""
 
-    def __init__(
-        self,
-        board: Switchboard,
-        clock: Clock,
-        terminal: Callable[[str], Monitor | None],
-        *,
-        locked: bool = False,
-    ) -> None:
+    def __init__(self, board: Switchboard, clock: Clock, terminal: Callable[[str], Monitor | None]) -> None:
         """Begin with `listening`.
 
         Args:
             board: What all terminals are at.
             clock: Session time.
             terminal: Makes a connection's monitor for a token; None for a wrong one.
-            locked: Whether a token is asked for.
         """
-        self._board, self._clock, self._terminal, self._locked = board, clock, terminal, locked
+        self._board, self._clock, self._terminal = board, clock, terminal
         self._connections: set[TcpTerminal] = set()
+        self._strangers: Strangers[TcpTerminal] = Strangers(STRANGERS)
         self._turning = Turning(clock, self._turn)
         self.port = 0
         """Where it listens."""
@@ -199,18 +234,25 @@ class ValDoor:
 
     def _turn(self, now: float) -> float:
         self._board.advance(now=now)
+        for connection in self._strangers.overdue(now):
+            connection.cut_off()
         for connection in tuple(self._connections):
             connection.advance(now=now)
+            if connection.monitor is not None:
+                self._strangers.know(connection)
         deadlines = [connection.next_deadline() for connection in self._connections]
-        return min([self._board.next_deadline(), *deadlines])
+        return min([self._board.next_deadline(), self._strangers.next_deadline(), *deadlines])
+
+    def _full(self) -> bool:
+        return sum(connection.monitor is not None for connection in self._connections) >= MOST
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._connections) >= MOST:
-            writer.write(f"*Too many terminals* {MOST} at most{_NEWLINE}".encode())
-            await _close(writer)
-            return
-        connection = TcpTerminal(writer, self._terminal, locked=self._locked)
+        connection = TcpTerminal(writer, self._terminal, self._full)
         self._connections.add(connection)
+        address = str(writer.get_extra_info("peername", ("",))[0])
+        oldest = self._strangers.add(connection, address, until=self._clock.now() + PATIENCE)
+        if oldest is not None:
+            oldest.cut_off()
         self._turning.soon()
         reading = asyncio.create_task(self._read(connection, reader))
         try:
@@ -219,6 +261,7 @@ class ValDoor:
             reading.cancel()
             connection.leave(now=self._clock.now())
             self._connections.discard(connection)
+            self._strangers.discard(connection)
             await _close(writer)
 
     async def _read(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> None:
@@ -231,6 +274,9 @@ class ValDoor:
                 return
             connection.feed(data)
             self._turning.soon()
+            await connection.room.wait()
+            # Others have their turn, too, where there's always something to read.
+            await asyncio.sleep(0)
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:

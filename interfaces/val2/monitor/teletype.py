@@ -48,6 +48,11 @@ class Input:
                 self._take(byte, lines)
         return lines
 
+    @property
+    def begun(self) -> str:
+        """The line that hasn't ended yet, as far as it has come."""
+        return self._line.decode("utf-8", errors="replace")
+
     def end(self) -> list[str]:
         """No more bytes come: the line without an end."""
         return [self._taken()] if self._line or self._overlong else []

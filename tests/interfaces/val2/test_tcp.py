@@ -97,9 +97,11 @@ class Client:
         self.heard = ""
 
     @classmethod
-    async def at(cls, door, until="\\.$", **options):
+    async def at(cls, door, until="\\.$", token="secret", **options):
         client = cls(*await asyncio.open_connection("127.0.0.1", door.port, **options))
         CLIENTS.append(client)
+        if token:
+            client.writer.write(f"{token}\r\n".encode())
         if until:
             await client.until(until)
         return client
@@ -120,21 +122,19 @@ class Client:
 
 
 @contextlib.asynccontextmanager
-async def door_here(tmp_path, *, secret=""):
+async def door_here(tmp_path):
     engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
     arm, clock = arm_for(engine), WallClock()
     controller = Controller(arm, parameters=arm.parameters)
     board = Switchboard(controller, Free())
 
     def terminal(token):
-        rights = {"": "", secret: "", "look": "this token only looks"} if secret else {"": ""}
-        if secret and token not in {secret, "look"}:
-            return None
-        return Monitor(board, Files(tmp_path), "a test", barred=rights[token])
+        rights = {"secret": "", "look": "this token only looks"}
+        return Monitor(board, Files(tmp_path), "a test", barred=rights[token]) if token in rights else None
 
-    door = ValDoor(board, clock, terminal, locked=bool(secret))
+    door = ValDoor(board, clock, terminal)
     async with door.listening(sockets.bind("127.0.0.1", 0)):
-        door.controller = controller
+        door.controller, door.engine = controller, engine
         yield door
 
 
@@ -256,20 +256,101 @@ def test_too_long_a_line_too_many_lines_and_too_many_terminals_are_errors(tmp_pa
 
 def test_tokens_open_what_they_open(tmp_path):
     async def scenario():
-        async with door_here(tmp_path, secret="secret") as door:
-            client = await Client.at(door, "Token: $")
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door, "Token: $", "")
             assert "*Invalid token*" in await client.say("where\n", "Token: $")
             await client.say("secret\n")
             assert "*" not in await client.say("do drive 1,5,100\n")
-            looker = await Client.at(door, "Token: $")
+            looker = await Client.at(door, "Token: $", "")
             assert "only looks" in await looker.say("look\n")
             client.writer.close()
             assert "*No control*" in await looker.say("do ready\n")
-            wrong = await Client.at(door, "Token: $")
+            wrong = await Client.at(door, "Token: $", "")
             wrong.writer.write(b"guess\n" * TRIES)
             async with asyncio.timeout(WAIT):
                 heard = (await wrong.reader.read()).decode()
             assert heard.count("*Invalid token*") == TRIES
+
+    live(scenario())
+
+
+GET = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+POST = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 28\r\n\r\n"
+FOREIGN = {
+    "get": GET,
+    "post": POST,
+    "any method": b"BREW coffee HTCPCP/1.0\r\n",
+    "lower case": b"propfind /x http/1.1\r\n",
+    "a whole url": b"GET http://127.0.0.1/ HTTP/1.1\r\n",
+    "connect": b"CONNECT 127.0.0.1:80 HTTP/1.1\r\n",
+    "http 2": b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+    "old": b"GET /\r\n",
+    "after empty lines": b"\r\n\n\r\n" + GET,
+    "spaces first": b"  " + GET,
+    "a header": b"Host: 127.0.0.1\r\n",
+    "a header without a space": b"X-Requested-With:x\r\n",
+    "after a wrong token": b"guess\r\n" + POST,
+    "no end of line": b"GET / HTTP/1.1",
+    "tls": b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
+}
+
+
+@pytest.mark.parametrize("size", [1, 1000])
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_what_is_http_or_tls_is_hung_up_on_and_moves_nothing(tmp_path, kind, size):
+    """Whatever it says next: the lines of its body, even the right token."""
+
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            before = door.engine.timeline
+            client = await Client.at(door, "Token: $", "")
+            for k in range(0, len(FOREIGN[kind]), size):
+                client.writer.write(FOREIGN[kind][k : k + size])
+                await asyncio.sleep(0)
+            with contextlib.suppress(OSError):
+                async with asyncio.timeout(WAIT):
+                    assert b"." not in await client.reader.read()
+            late = await Client.at(door, "Token: $", "")
+            late.writer.write(FOREIGN[kind] + b"\r\nsecret\r\nSPEED 50\r\nDO DRIVE 1, 60, 100\r\n")
+            with contextlib.suppress(OSError):
+                async with asyncio.timeout(WAIT):
+                    await late.reader.read()
+            await (await Client.at(door)).say("where\n")
+            assert door.engine.timeline is before
+
+    live(scenario())
+
+
+def test_a_program_may_send_its_token_and_all_that_it_wants_at_once(tmp_path):
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            client = await Client.at(door, "", "")
+            client.writer.write(b"\r\nsecret\r\nedit a\r\ntype /c1, 7\r\ne\r\nexecute a\r\ndo x = 3\r\nlistr")
+            client.writer.write_eof()
+            async with asyncio.timeout(WAIT):
+                heard = (await client.reader.read()).decode()
+            assert "x = 3" in heard
+            assert " 7\r\n" in heard
+
+    live(scenario())
+
+
+def test_idle_connections_keep_nobody_out_and_end(tmp_path, monkeypatch):
+    from interfaces.val2 import tcp
+
+    monkeypatch.setattr(tcp, "PATIENCE", 0.5)
+    monkeypatch.setattr(tcp, "STRANGERS", 20)
+
+    async def scenario():
+        async with door_here(tmp_path) as door:
+            idle = [await Client.at(door, "Token: $", "") for _ in range(30)]
+            assert "919.85" in await (await Client.at(door)).say("where\n")
+            async with asyncio.timeout(WAIT):
+                for client in idle:
+                    with contextlib.suppress(OSError):
+                        client.writer.write(b"\r\n")
+                        assert await client.reader.read() == b""
+            assert len(door._connections) == 1
 
     live(scenario())
 
@@ -298,9 +379,10 @@ def test_a_server_with_a_port_for_val(tmp_path):
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
     try:
-        said = [process.stdout.readline() for _ in range(3)]
+        said = [process.stdout.readline() for _ in range(4)]
         found = re.search(r"VAL-II on 127\.0\.0\.1 port (\d+)", said[2])
         assert found, said
+        token = said[3].split()[-1]
         with socket.create_connection(("127.0.0.1", int(found[1])), timeout=WAIT) as client:
             client.settimeout(WAIT)
 
@@ -313,7 +395,8 @@ def test_a_server_with_a_port_for_val(tmp_path):
                     heard += data.decode()
                 return heard
 
-            say("")
+            assert client.recv(64) == b"Token: "
+            assert "VAL-II" in say(f"{token}\r\n")
             assert "*" not in say("do ready\r\n")
             heard = say("where\r\n")
             for text in ("-20.30", "150.05", "919.85", "90.000", "-90.000"):
