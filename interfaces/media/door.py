@@ -33,9 +33,11 @@ from interfaces.stream.meshcat.viewers import (
     POLICY_VIOLATION,
     TRY_AGAIN_LATER,
     UNAUTHORISED,
-    first_token,
+    first_text,
     same_origin,
+    token_in,
 )
+from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError, VrsError
 
 if TYPE_CHECKING:
@@ -93,11 +95,13 @@ class MediaDoor:
             return
         try:
             await websocket.accept()
-            if self._access.refusal(Role.VIEWER, await first_token(websocket)):
+            said = await first_text(websocket)
+            if self._access.refusal(Role.VIEWER, token_in(said)):
                 await websocket.close(UNAUTHORISED, "a token that is valid here, please")
             elif len(self._pages) >= MOST_PAGES:
                 await websocket.close(TRY_AGAIN_LATER, "too many pages")
             else:
+                let_stay(websocket.scope, known=bool(said))
                 await self._attend(_Page(websocket, self._media))
         except WebSocketDisconnect:
             return

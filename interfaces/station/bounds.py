@@ -14,6 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from interfaces.station.files import HEADERS, POLICY
 from interfaces.stream.limits import Bucket
+from interfaces.stream.sockets import let_stay
 from vrs.checks import number_in
 
 SOCKET: Final = "/_nicegui_ws/"
@@ -80,6 +81,7 @@ class Bounds:
             return
         self._sockets += 1
         try:
+            let_stay(scope, known=False)
             ends = _Ends(scope, receive, send, self._config)
             await self._app(scope, ends.receive, ends.send)
         finally:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
@@ -166,6 +166,8 @@ class Recordings:
             if not self._asked[role].take(self._operator.clock.now()):
                 return _said(429, "too many requests: try again in a moment")
             return JSONResponse(await self._do(ask), 200, HEADERS)
+        except ClientDisconnect:
+            return _said(408, "the request didn't come to its end in time")
         except msgspec.MsgspecError:
             return _said(400, "this isn't a request that is known here")
         except VrsError as error:

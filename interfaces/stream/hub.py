@@ -29,6 +29,10 @@ CHANGES = 5.0
 """The way to the robot may change so many times a second, for long; twice as often for a moment."""
 KEY_BYTES = 16
 """Random bytes of a session's name."""
+_OPEN = 4
+"""So many times as many connections may be open as there may be clients: some haven't said who they are."""
+_KEPT = 16
+"""One in so many places of clients is kept for those that may command."""
 _SERVED = frozenset({Role.VIEWER, Role.OPERATOR, Role.ADMIN})
 
 
@@ -186,8 +190,8 @@ class Hub:
             now: Session time [s].
         """
         session = Session(self, encoding, now=now)
-        if len(self._sessions) >= self.limits.clients:
-            session.close(TRY_AGAIN, ProblemCode.FULL, f"there are {self.limits.clients} clients already")
+        if len(self._sessions) >= _OPEN * self.limits.clients:
+            session.close(TRY_AGAIN, ProblemCode.FULL, f"there are {len(self._sessions)} connections already")
         else:
             self._sessions[session] = None
         return session
@@ -279,12 +283,21 @@ class Hub:
         seat = self._seats.get(hello.session or "")
         resumed = seat is not None and seat.role is hello.role
         if seat is None or not resumed:
+            if full := self._full(hello.role):
+                return Problem(ProblemCode.FULL, full)
             seat = self._seat(hello)
         elif seat.session is not None:
             seat.session.close(POLICY, ProblemCode.REFUSED, "the session is continued by another connection")
             seat.session.seat = None
         seat.session = session
         return seat, self._welcome(seat, resumed, now)
+
+    def _full(self, role: Role) -> str:
+        """Why there's no place for one more; empty if there is. Who goes on with a session has its place."""
+        most = self.limits.clients - (self.limits.clients // _KEPT if role is Role.VIEWER else 0)
+        if sum(seat.session is not None for seat in self._seats.values()) < most:
+            return ""
+        return f"there are {most} clients already"
 
     def _seat(self, hello: control.Hello) -> Seat:
         key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")

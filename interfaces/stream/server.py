@@ -27,8 +27,6 @@ BLOCKED = 2.0
 """A client is cut off when a message has waited so long to be sent [s]."""
 _LOOK = 0.25
 """Time between two looks at who is blocked [s]."""
-_FAREWELL = 2.0
-"""Time for a closing handshake before a connection is cut off [s]."""
 _DONE = 1000, 1001
 """Close codes of a client that is done."""
 
@@ -107,18 +105,20 @@ class HubServer:
         client = self._clients[session] = _Client(session, scope["state"]["socket"])
         writer = asyncio.create_task(self._write(client, send))
         client.wake.set()
-        done = False
+        done = known = False
         try:
             while (message := await receive())["type"] != "websocket.disconnect":
                 data = message.get("bytes")
                 session.receive(message["text"] if data is None else data, now=self.clock.now())
+                if not known and session.seat is not None:
+                    known = True
+                    client.socket.let_stay(known=True)
                 self.kick()
             done = message.get("code") in _DONE and session.closing is None
         finally:
             writer.cancel()
             del self._clients[session]
             self.hub.leave(session, done=done, now=self.clock.now())
-            asyncio.get_running_loop().call_later(_FAREWELL, client.socket.abort)
             await asyncio.wait([writer])
 
     async def _write(self, client: _Client, send: Send) -> None:

@@ -210,7 +210,7 @@ class Session:
     def _greet(self, hello: control.Hello, now: float) -> None:
         found = self._desk.greet(self, hello, now)
         if isinstance(found, Problem):
-            self.close(POLICY, found.code, found.text)
+            self.close(TRY_AGAIN if found.code is ProblemCode.FULL else POLICY, found.code, found.text)
             return
         self.seat, welcome = found
         self._lease = self._desk.lease_version

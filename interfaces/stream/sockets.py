@@ -4,62 +4,244 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import resource
 import socket
 from asyncio.transports import BaseTransport, Transport
 from collections.abc import AsyncIterator, Iterable, Iterator
-from typing import cast
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any, cast
 
 import uvicorn
+from starlette.types import Scope
+from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from uvicorn.server import ServerState
 from websockets.frames import Opcode
 from websockets.http11 import Request
 
+from interfaces.stream.strangers import Strangers
+from vrs.checks import number_in
 from vrs.errors import FormatError
 
 LARGEST_MESSAGE = 65536
-"""Largest message that is received [bytes]."""
+"""Largest message that is received [bytes], and always of who hasn't shown who it is."""
 KERNEL_BUFFER = 16384
 """Size of a socket's buffers [bytes]; Linux takes twice that."""
 HIGH, LOW = 16384, 4096
 """Bytes waiting in the process beyond which a sender waits, and down to which it does."""
-MOST_CONNECTIONS = 2048
-"""Connections that are open at once, of any kind."""
-FIRST_REQUEST = 5.0
-"""Time for the first request of a connection [s]."""
+FILES = 16384
+"""Open files that a server asks the system for; it does with fewer."""
+_FILES = resource.RLIMIT_NOFILE
+FAREWELL = 2.0
+"""Time for a closing handshake, and for what waits to be sent [s]."""
+_LOOK = 0.1
+"""Time between two looks at deadlines [s]."""
 _GRACE = 1.0
 """Time for handlers to end when a server stops [s]."""
 
 
-class BoundedHttp(H11Protocol):
-    """HTTP on a connection that must ask for something soon."""
+@dataclass(frozen=True, slots=True)
+class SocketLimits:
+    """Deadlines of every phase of a connection, and how many there may be that haven't shown who they are."""
+
+    strangers: int = 1024
+    """Most unauthenticated connections, 1 to 100,000; the oldest gives way to a new one. They never take more than
+    a quarter of the files that may be open."""
+    request: float = 5.0
+    """Time for a request's header, from the connection's beginning or the answer before [s], 0.01 to 60."""
+    body: float = 5.0
+    """Time for a request's body [s], 0.01 to 60."""
+    hello: float = 5.0
+    """Time for a WebSocket to show who it is, from its upgrade [s], 0.01 to 60."""
+    blocked: float = 10.0
+    """A connection is cut off when it hasn't taken HIGH − LOW bytes for so long [s], 0.01 to 60."""
+
+    def __post_init__(self) -> None:
+        number_in("strangers", self.strangers, 1, 100_000)
+        for name in ("request", "body", "hello", "blocked"):
+            number_in(name, getattr(self, name), 0.01, 60, unit=" s")
+
+
+class _Phase(Enum):
+    """What a connection with HTTP is at."""
+
+    HEADER = auto()
+    """A request's header is to come."""
+    BODY = auto()
+    """Its body is."""
+    ANSWER = auto()
+    """It's answered."""
+
+
+class _State(ServerState):
+    """What the connections of a server share."""
+
+    def __init__(self, limits: SocketLimits) -> None:
+        super().__init__()
+        self.limits = limits
+        self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, _files() // 4)))
+
+
+class _Bounded(asyncio.Protocol):
+    """A connection with deadlines: of the phase that it's in, and of what waits to be sent."""
+
+    loop: asyncio.AbstractEventLoop
+    client: tuple[str, int] | None
+    transport: asyncio.Transport
+
+    def _share(self, state: ServerState) -> None:
+        self._state = cast("_State", state)
+        self._phase_until = self._sent_until = float("inf")
+
+    def _enter(self, seconds: float) -> None:
+        """Come in as a stranger, with a first phase that may take so long [s]; another may be cut off for it."""
+        self._phase_until = self.loop.time() + seconds
+        address = "" if self.client is None else self.client[0]
+        oldest = self._state.strangers.add(self, address, until=self._phase_until)
+        if oldest is not None:
+            oldest.transport.abort()
+
+    def _begin_phase(self, seconds: float = float("inf")) -> None:
+        """Begin a phase that may take so long [s]."""
+        self._phase_until = self.loop.time() + seconds
+        self._expect()
+
+    def _expect(self) -> None:
+        self._state.strangers.expect(self, until=min(self._phase_until, self._sent_until))
+
+    def pause_writing(self) -> None:
+        """Wait for the reader, but not for ever."""
+        super().pause_writing()
+        self._sent_until = self.loop.time() + self._state.limits.blocked
+        self._expect()
+
+    def resume_writing(self) -> None:
+        """Go on: it reads."""
+        super().resume_writing()
+        self._sent_until = float("inf")
+        self._state.strangers.renew(self)
+        self._expect()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let it go."""
+        super().connection_lost(exc)
+        self._state.strangers.discard(self)
+
+
+class BoundedHttp(_Bounded, H11Protocol):
+    """HTTP on a connection, each phase of which has a deadline."""
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        H11Protocol.__init__(self, config, server_state, app_state, _loop)
+        self._share(server_state)
+        self._phase = _Phase.HEADER
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
-        """Take a connection, unless there are too many."""
+        """Take a connection."""
         super().connection_made(transport)
-        if len(self.connections) > MOST_CONNECTIONS:
-            transport.abort()
-            return
-        self.loop.call_later(FIRST_REQUEST, self._check)
+        transport.set_write_buffer_limits(HIGH, LOW)
+        self._enter(self._state.limits.request)
 
-    def _check(self) -> None:
-        if self.transport.get_protocol() is self and self.cycle is None:
-            self.transport.abort()
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let it go, and leave no timer that would keep it."""
+        super().connection_lost(exc)
+        self._unset_keepalive_if_required()
+
+    def handle_events(self) -> None:
+        """Take what has come."""
+        before = self.cycle
+        super().handle_events()
+        if self.cycle is not before:
+            self._state.strangers.renew(self)
+            self._phase = _Phase.ANSWER
+            self._begin_phase()
+        self._look()
+
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        """Give the connection to a WebSocket."""
+        self._state.strangers.discard(self)
+        super().handle_websocket_upgrade(event)
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request."""
+        super().on_response_complete()
+        self._look()
+
+    def _look(self) -> None:
+        """Begin the next phase, if it's another one: what drips doesn't make one longer."""
+        limits, seconds = self._state.limits, float("inf")
+        if self.cycle is None or self.cycle.response_complete:
+            phase, seconds = _Phase.HEADER, limits.request
+        elif self.cycle.more_body:
+            phase, seconds = _Phase.BODY, limits.body
+        else:
+            phase = _Phase.ANSWER
+        if phase is not self._phase:
+            self._phase = phase
+            self._begin_phase(seconds)
 
 
-class BoundedWebSocket(WebSocketsSansIOProtocol):
-    """A WebSocket whose sender waits early, and which the application is given: `scope["state"]["socket"]`."""
+class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
+    """A WebSocket whose sender waits early, and which the application is given: `scope["state"]["socket"]`.
+
+    The application says `let_stay` when the other side has shown who it is.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        WebSocketsSansIOProtocol.__init__(self, config, server_state, app_state, _loop)
+        self._share(server_state)
+        self.conn.max_message_size = min(config.ws_max_size, LARGEST_MESSAGE)
 
     def connection_made(self, transport: BaseTransport) -> None:
         """Take over a connection."""
         super().connection_made(transport)
         cast("Transport", transport).set_write_buffer_limits(HIGH, LOW)
+        self._enter(self._state.limits.hello)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let it go."""
+        super().connection_lost(exc)
+        # The parser is a generator that holds what holds it.
+        self.conn.parser.close()
 
     def handle_connect(self, event: Request) -> None:
         """Take the handshake."""
         super().handle_connect(event)
         if self.response.status_code == 101:
             self.scope["state"]["socket"] = self
+
+    def on_task_complete(self, task: asyncio.Task[None]) -> None:
+        """The application is done: what is left ends soon."""
+        super().on_task_complete(task)
+        del self.scope["state"]["socket"]
+        self._begin_phase(FAREWELL)
+
+    def let_stay(self, *, known: bool) -> None:
+        """See `let_stay`."""
+        if known:
+            self.conn.max_message_size = self.config.ws_max_size
+            self._state.strangers.know(self)
+        self._begin_phase()
+
+    async def send(self, message: ASGISendEvent) -> None:
+        """Send a message of the application; a farewell has its time."""
+        await super().send(message)
+        if message["type"] == "websocket.close":
+            self._begin_phase(FAREWELL)
 
     async def put(self, data: bytes, opcode: Opcode) -> None:
         """Send a whole message as one frame; that takes a third of the time that `send` does.
@@ -91,6 +273,18 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
     def waiting(self) -> int:
         """Bytes that wait in this process to be sent."""
         return self.transport.get_write_buffer_size()
+
+
+def let_stay(scope: Scope, *, known: bool) -> None:
+    """Let whoever is at the other side of an application's WebSocket stay.
+
+    Args:
+        scope: The application's. Nothing happens where another server than `serve` has it.
+        known: Whether it has shown who it is; else it stays as long as nobody else needs its place.
+    """
+    connection = scope.get("state", {}).get("socket")
+    if isinstance(connection, BoundedWebSocket):
+        connection.let_stay(known=known)
 
 
 class _Server(uvicorn.Server):
@@ -132,13 +326,20 @@ def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
 
 
 @contextlib.asynccontextmanager
-async def serve(app: object, listening: socket.socket, *, largest: int = LARGEST_MESSAGE) -> AsyncIterator[None]:
+async def serve(
+    app: object,
+    listening: socket.socket,
+    *,
+    largest: int = LARGEST_MESSAGE,
+    limits: SocketLimits | None = None,
+) -> AsyncIterator[None]:
     """Serve an ASGI application on a socket, which is closed in the end, with all its connections.
 
     Args:
         app: The application.
         listening: From `bind`.
         largest: Largest message that is received [bytes].
+        limits: Of connections.
     """
     config = uvicorn.Config(
         app,  # type: ignore[arg-type]
@@ -154,17 +355,36 @@ async def serve(app: object, listening: socket.socket, *, largest: int = LARGEST
         timeout_graceful_shutdown=1,
     )
     server = _Server(config)
+    server.server_state = state = _State(SocketLimits() if limits is None else limits)
+    looking = asyncio.create_task(_cut_off_overdue(state))
     task = asyncio.create_task(server.serve(sockets=[listening]))
     try:
         while not server.started and not task.done():
             await asyncio.sleep(0.002)
         yield
     finally:
+        looking.cancel()
         server.should_exit = True
         connections = server.server_state.connections
         asyncio.get_running_loop().call_later(_GRACE, _abort_all, connections)
         await task
         _abort_all(connections)
+
+
+async def _cut_off_overdue(state: _State) -> None:
+    clock = asyncio.get_running_loop().time
+    while True:
+        await asyncio.sleep(_LOOK)
+        for connection in state.strangers.overdue(clock()):
+            connection.transport.abort()
+
+
+def _files() -> int:
+    """How many files this process may open, each connection being one; it may open more if the system lets it."""
+    soft, hard = (FILES if most == resource.RLIM_INFINITY else most for most in resource.getrlimit(_FILES))
+    if soft < min(FILES, hard):
+        resource.setrlimit(_FILES, (min(FILES, hard), resource.getrlimit(_FILES)[1]))
+    return max(soft, min(FILES, hard))
 
 
 def _abort_all(connections: Iterable[object]) -> None:

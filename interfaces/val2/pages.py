@@ -18,6 +18,7 @@ from starlette.types import Receive, Scope, Send
 from websockets.frames import Opcode
 
 from interfaces.stream.limits import Bucket
+from interfaces.stream.sockets import let_stay
 from interfaces.timer import Turning
 from interfaces.val2.monitor.completion import suggestions
 from interfaces.val2.monitor.desk import Said, Style
@@ -287,11 +288,9 @@ class PageDoor:
         await send({"type": "websocket.accept"})
         client = _Client(PageTerminal())
         terminal = client.terminal
-        if len(self._clients) >= MOST:
-            terminal.close(_TRY_AGAIN, f"there are {MOST} terminals already: close one elsewhere")
         self._clients.add(client)
         writing = asyncio.create_task(self._write(client, scope["state"]["socket"], send))
-        greeting = asyncio.create_task(self._greet(client))
+        greeting = asyncio.create_task(self._greet(client, scope))
         client.wake.set()
         clock = asyncio.get_running_loop().time
         allowed = Bucket(RATE, BURST, clock())
@@ -314,7 +313,7 @@ class PageDoor:
             writing.cancel()
             await asyncio.wait([writing, greeting])
 
-    async def _greet(self, client: _Client) -> None:
+    async def _greet(self, client: _Client, scope: Scope) -> None:
         """Give a page its monitor, once it has said who it is."""
         terminal = client.terminal
         with contextlib.suppress(TimeoutError):
@@ -338,7 +337,10 @@ class PageDoor:
         monitor = room.terminal(terminal.token, terminal)
         if monitor is None:
             terminal.close(_POLICY, "this token opens no terminal")
+        elif sum(other.terminal.monitor is not None for other in self._clients) >= MOST:
+            terminal.close(_TRY_AGAIN, f"there are {MOST} terminals already: close one elsewhere")
         else:
+            let_stay(scope, known=True)
             terminal.begin(monitor, now=room.clock.now())
         client.wake.set()
 
@@ -369,7 +371,6 @@ class PageDoor:
                     code, reason = terminal.closing
                     async with asyncio.timeout(BLOCKED):
                         await send({"type": "websocket.close", "code": code, "reason": _short(reason)})
-                    asyncio.get_running_loop().call_later(BLOCKED, socket.abort)
                     return
         except (TimeoutError, OSError):
             socket.abort()

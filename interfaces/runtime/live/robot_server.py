@@ -16,6 +16,7 @@ from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.control import PROTOCOL, Attached, Hello, Pong, Problem, ProblemCode, Role
 from interfaces.stream.errors import ProtocolError
 from interfaces.stream.server import Endpoint
+from interfaces.stream.sockets import let_stay
 from interfaces.teleop import Orders
 from interfaces.teleop.hosting import Host
 from vrs.clock import Clock
@@ -104,7 +105,7 @@ class RobotServer:
         if self._connection is not None:
             self._connection.end(_GONE, "the robot's site stops")
 
-    async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002
+    async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a connection that was accepted, until it ends."""
         connection = _Connection(encoding)
         writer = asyncio.create_task(self._write(connection, send))
@@ -114,7 +115,9 @@ class RobotServer:
                     refusal = self._greet(connection, await receive())
             except TimeoutError:
                 refusal = Problem(ProblemCode.HELLO_LATE, f"no hello within {HELLO:g} s", fatal=True)
-            if refusal is not None:
+            if refusal is None:
+                let_stay(scope, known=True)
+            else:
                 connection.send(refusal)
                 connection.end(_POLICY if refusal.code is not ProblemCode.FULL else _NO_ROOM, refusal.text)
             while connection.close is None and (message := await receive())["type"] != "websocket.disconnect":

@@ -13,6 +13,7 @@ from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.stream.meshcat.newest import Slot
+from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError
 
 BATCHES: Final = "vrs.meshcat.1"
@@ -84,9 +85,13 @@ class Viewers:
         batches = BATCHES in websocket.scope["subprotocols"]
         try:
             await websocket.accept(subprotocol=BATCHES if batches else None)
-            if self._authorize is not None and not self._authorize(await first_token(websocket)):
-                await websocket.close(UNAUTHORISED, "a token that is valid here, please")
-                return
+            said = ""
+            if self._authorize is not None:
+                said = await first_text(websocket)
+                if not self._authorize(token_in(said)):
+                    await websocket.close(UNAUTHORISED, "a token that is valid here, please")
+                    return
+            let_stay(websocket.scope, known=bool(said))
             try:
                 viewer = _Viewer(websocket, self._source, batches, self._hear, self._most_heard)
             except InvalidValueError:
@@ -210,12 +215,20 @@ def _framed(commands: tuple[bytes, ...]) -> bytes:
     return b"".join(part for data in commands for part in (len(data).to_bytes(4, "little"), data))
 
 
-async def first_token(websocket: WebSocket) -> str | None:
-    """The token of the viewer's first message, `{"token": "…"}`; None if there's none in time."""
+async def first_text(websocket: WebSocket) -> str:
+    """The viewer's first message; empty if there's none in time."""
     try:
         async with asyncio.timeout(PATIENCE):
-            value = json.loads(await websocket.receive_text())
-    except (TimeoutError, KeyError, ValueError, RecursionError):
+            return await websocket.receive_text()
+    except (TimeoutError, KeyError):
+        return ""
+
+
+def token_in(text: str) -> str | None:
+    """The token of a message, `{"token": "…"}`; None if there's none."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
         return None
     token = value.get("token") if isinstance(value, dict) else None
     return token if isinstance(token, str) else None

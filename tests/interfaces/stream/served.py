@@ -68,12 +68,12 @@ class ServingHub(Serving):
 
 
 @contextlib.asynccontextmanager
-async def _serving(**options):
+async def _serving(sockets=None, **options):
     clock, listening = WallClock(0.0), bind()
     server = HubServer(make_hub(now=clock.now(), **options), clock)
     serving = ServingHub(listening.getsockname()[1], server)
     app = application(server.routes, hosts(["127.0.0.1", "localhost"], serving.port))
-    async with serve(app, listening), server.running():
+    async with serve(app, listening, limits=sockets), server.running():
         yield serving
 
 

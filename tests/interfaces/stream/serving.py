@@ -73,7 +73,9 @@ def beside(context: AbstractAsyncContextManager[S]) -> Iterator[S]:
 
 
 @asynccontextmanager
-async def _serving(routes: Sequence[BaseRoute], port: int) -> AsyncIterator[Serving]:
+async def _serving(
+    routes: Sequence[BaseRoute], port: int, limits: sockets.SocketLimits | None
+) -> AsyncIterator[Serving]:
     listening = sockets.bind(port=port)
     inner, server = Starlette(routes=list(routes)), Serving(listening.getsockname()[1])
 
@@ -82,10 +84,12 @@ async def _serving(routes: Sequence[BaseRoute], port: int) -> AsyncIterator[Serv
             server.connections = scope["state"]["socket"].connections
         await inner(scope, receive, send)
 
-    async with sockets.serve(noting, listening):
+    async with sockets.serve(noting, listening, limits=limits):
         yield server
 
 
-def served(routes: Sequence[BaseRoute], port: int = 0) -> AbstractContextManager[Serving]:
+def served(
+    routes: Sequence[BaseRoute], port: int = 0, limits: sockets.SocketLimits | None = None
+) -> AbstractContextManager[Serving]:
     """Serve routes on loopback."""
-    return beside(_serving(routes, port))
+    return beside(_serving(routes, port, limits))

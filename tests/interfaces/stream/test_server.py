@@ -199,14 +199,6 @@ def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
         assert after[1] <= before[1] + 2
 
 
-def test_an_idle_connection_is_cut_off(monkeypatch):
-    from interfaces.stream import sockets
-
-    monkeypatch.setattr(sockets, "FIRST_REQUEST", 0.2)
-    with served() as serving, socket.create_connection(("127.0.0.1", serving.port), timeout=5) as connection:
-        assert connection.recv(1) == b""
-
-
 def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
     from vrs.errors import VrsError
 

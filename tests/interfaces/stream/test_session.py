@@ -100,13 +100,40 @@ def test_an_admin_shows_a_token():
     assert Peer(make_hub(), role=Role.ADMIN, token=ADMIN).welcome.role is Role.ADMIN
 
 
+def full(peer):
+    assert (peer.first[-1].code, peer.session.closing[0]) == (ProblemCode.FULL, 1013)
+    peer.hub.leave(peer.session, done=True, now=0.0)
+
+
 def test_too_many_clients():
     hub = make_hub(limits=ClientLimits(clients=2))
     peers = [Peer(hub) for _ in range(2)]
-    third = Peer(hub, greet=False)
-    closed(third, 1013, ProblemCode.FULL, now=0.0)
+    full(Peer(hub))
     hub.leave(peers[0].session, done=True, now=0.1)
     assert Peer(hub).welcome.kind == "welcome"
+
+
+def test_connections_without_a_hello_take_nobodys_place():
+    hub = make_hub(limits=ClientLimits(clients=4))
+    silent = [Peer(hub, greet=False) for _ in range(8)]
+    assert all(peer.session.closing is None for peer in silent)
+    assert Peer(hub).welcome.kind == "welcome"
+    silent += [Peer(hub, greet=False) for _ in range(10)]
+    closed(silent[-1], 1013, ProblemCode.FULL, now=0.0)
+
+
+def test_who_had_control_has_a_place_when_all_are_taken():
+    hub = make_hub(limits=ClientLimits(clients=32))
+    operator = Peer(hub)
+    operator.tell(control.Acquire(1), now=0.0)
+    hub.leave(operator.session, done=False, now=0.1)
+    for _ in range(30):
+        assert Peer(hub, role=Role.VIEWER).welcome.kind == "welcome"
+    full(Peer(hub, role=Role.VIEWER))
+    assert [Peer(hub).welcome.kind for _ in range(2)] == ["welcome"] * 2
+    full(Peer(hub))
+    back = Peer(hub, session=operator.welcome.session, now=0.5).welcome
+    assert (back.resumed, back.lease.yours) == (True, True)
 
 
 @BOTH
