@@ -1,0 +1,62 @@
+"""A mobile robot's page: each panel's style sheet dresses its own panels, and what is refused is said at the control."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.interfaces.live_rig import Child, child
+from tests.interfaces.station.opened import Page, paged, station
+
+SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--port", "0")
+OWNERS = {
+    "camera.css": ["camera"],
+    "driving.css": ["drive", "deviation", "floor"],
+    "tasks.css": ["map", "jobs"],
+    "plots.css": ["deviation"],
+}
+"""The panels that each style sheet is for, beside the page's own."""
+LEAKS = """(owners) => [...document.styleSheets].flatMap((sheet) => {
+    const name = (sheet.href ?? "").split("/").at(-1);
+    if (!(name in owners)) return [];
+    const flat = (rules) => [...rules].flatMap((rule) => rule.selectorText ? [rule] : flat(rule.cssRules ?? []));
+    return flat(sheet.cssRules).flatMap(({ selectorText }) => {
+        const plain = selectorText.replace(/:not\\(:[a-z]+\\)/g, "").replace(/::?(before|after|hover|active|focus[a-z-]*|disabled|empty)/g, "");
+        return [...document.querySelectorAll(plain)].flatMap((one) => {
+            const panel = one.closest(".panel")?.id.replace("panel-", "") ?? null;
+            return panel === null || owners[name].includes(panel) ? [] : [`${name}: ${selectorText} in ${panel}`];
+        });
+    });
+})"""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Child]:
+    with child(*SERVE, "--jobs", str(tmp_path_factory.mktemp("jobs") / "jobs.json")) as running:
+        yield running
+
+
+@pytest.fixture
+def page(browser: Any, server: Child) -> Iterator[Page]:
+    with paged(browser, station(server)) as opened:
+        opened.open()
+        opened.wait("Boolean(station.session.state.real && station.session.plan && station.session.tasks.loss)")
+        yield opened
+
+
+def test_a_panels_style_sheet_dresses_no_other_panel(page: Page) -> None:
+    page.take_control()
+    jobs = "[1, 2].map((number) => ({ do: 'wait', number, seconds: 1 }))"
+    page.get(f"station.session.wish('task', {{ task: {{ jobs: {{ jobs: {jobs}, places: {{}} }} }} }})")
+    page.page.click("#tab-jobs")
+    page.wait("document.querySelectorAll('#jobs li').length === 2")
+    page.shoot("jobs-planned")
+    icon = page.page.locator("#jobs li:first-child .stage")
+    dressed = icon.evaluate("(one) => { const { backgroundColor, cursor } = getComputedStyle(one); return"
+                            " [backgroundColor, cursor]; }")  # fmt: skip
+    assert dressed == ["rgba(0, 0, 0, 0)", "auto"]
+    box = icon.bounding_box()
+    assert box["height"] < 22
+    assert sorted(set(page.page.evaluate(LEAKS, OWNERS))) == []
