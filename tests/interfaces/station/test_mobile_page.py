@@ -1,4 +1,4 @@
-"""A mobile robot's page: each panel's style sheet dresses its own panels, and what is refused is said at the control."""
+"""A mobile robot's page: each panel's style sheet dresses its own, and a refusal is said at the control."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ LEAKS = """(owners) => [...document.styleSheets].flatMap((sheet) => {
     if (!(name in owners)) return [];
     const flat = (rules) => [...rules].flatMap((rule) => rule.selectorText ? [rule] : flat(rule.cssRules ?? []));
     return flat(sheet.cssRules).flatMap(({ selectorText }) => {
-        const plain = selectorText.replace(/:not\\(:[a-z]+\\)/g, "").replace(/::?(before|after|hover|active|focus[a-z-]*|disabled|empty)/g, "");
+        const plain = selectorText.replace(/:not\\(:[a-z]+\\)/g, "")
+            .replace(/::?(before|after|hover|active|focus[a-z-]*|disabled|empty)/g, "");
         return [...document.querySelectorAll(plain)].flatMap((one) => {
             const panel = one.closest(".panel")?.id.replace("panel-", "") ?? null;
             return panel === null || owners[name].includes(panel) ? [] : [`${name}: ${selectorText} in ${panel}`];
