@@ -7,6 +7,8 @@ const SERVICES = [["datagram", "as they come"], ["in-order", "in order"]];
 /** Time between two looks [ms], and between two questions to the server [s]. */
 const LOOK = 500;
 const ASK = 1;
+/** Of fewer packets the share that was lost says little: they are counted instead. */
+const ENOUGH = 100;
 const WAYS = ["forward", "backward"];
 const NAMES = { forward: "to the robot", backward: "back" };
 
@@ -42,7 +44,8 @@ export function mount(station, box) {
   const cells = {};
   const cell = (name) => (cells[name] = h("td", { id: "net-" + name }, "–"));
   const measured = h("table.measured", {},
-    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "last 30 s"), ...WAYS.map((way) => h("th", { scope: "col" }, NAMES[way])))),
+    h("thead", {}, h("tr", {}, h("td"), ...WAYS.map((way) =>
+      h("th", { scope: "col" }, NAMES[way], cells["span-" + way] = h("span.span", { id: "net-span-" + way }))))),
     h("tbody", {}, ...[["median", "Delay, median"], ["p95", "Delay, 95 %"], ["lost", "Lost"]].map(([name, label]) =>
       h("tr", {}, h("th", { scope: "row" }, label), ...WAYS.map((way) => cell(name + "-" + way))))));
   const facts = h("dl.facts");
@@ -159,7 +162,8 @@ export function mount(station, box) {
     mark(box, "data-old", old ? "" : null);
     for (const [way, found] of [["forward", network.there], ["backward", network.back]]) {
       for (const name of ["median", "p95"]) write(cells[`${name}-${way}`], time(found[name]));
-      write(cells["lost-" + way], found.lost == null ? "–" : `${(100 * found.lost).toFixed(1)} % of ${found.packets}`);
+      write(cells["lost-" + way], losses(found));
+      write(cells["span-" + way], found.span == null ? "" : `in the last ${Math.max(1, Math.round(found.span))} s`);
     }
     const trip = network.round_trip;
     write(cells.trip, trip.median == null ? "–" : `${time(trip.median)}, 95 % in ${time(trip.p95)}`);
@@ -192,6 +196,12 @@ function policy({ link_loss: loss, timeout, max_age: age }) {
   if (loss !== "halt") return loss === "hold" ? "hold: the robot waits, and goes on by itself" : loss;
   const after = timeout == null ? "" : ` after ${time(timeout)}`;
   return `halt: the robot stops${after}` + (age == null ? "" : `; older than ${time(age)} doesn't count`);
+}
+
+/** How many of the packets were lost: their share, once there are enough of them. */
+function losses({ packets = 0, lost }) {
+  if (lost == null) return "–";
+  return packets < ENOUGH ? `${Math.round(lost * packets)} of ${packets}` : `${(100 * lost).toFixed(1)} % of ${packets}`;
 }
 
 /** Seconds as people read them. */

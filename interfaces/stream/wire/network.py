@@ -68,15 +68,16 @@ class MeasuredWire(Wire, frozen=True, omit_defaults=True, gc=False):
     lost: Share | None = None
     median: Span | None = None
     p95: Span | None = None
+    span: Span | None = None
 
     @classmethod
     def of(cls, value: Measured) -> MeasuredWire:
         """The wire form."""
-        return cls(value.packets, value.lost, value.median, value.p95)
+        return cls(value.packets, value.lost, value.median, value.p95, value.span)
 
     def read(self) -> Measured:
         """What was measured."""
-        return Measured(self.packets, self.lost, self.median, self.p95)
+        return Measured(self.packets, self.lost, self.median, self.p95, self.span)
 
 
 class NetworkWire(Message, frozen=True, omit_defaults=True, gc=False, tag="network"):

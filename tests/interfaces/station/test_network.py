@@ -93,3 +93,27 @@ def test_a_hidden_panel_asks_nothing(page: Page) -> None:
     page.wait(f"station.session.now > {heard} + 2.5")
     # One that was asked before may come.
     assert page.get("told") <= 1
+
+
+def test_losses_are_counted_before_their_share_is_shown(page: Page) -> None:
+    page.take_control()
+    page.page.evaluate(
+        """window.told = []; station.on("network", ({ there }) => setTimeout(() =>
+        told.push([document.getElementById("net-lost-forward").textContent, there.packets ?? 0])))"""
+    )
+    wish = "station.session.wish('impair', { forward: { delay: 'constant:1.2', loss: '0.2' } })"
+    assert page.get(wish)
+    page.wait("station.session.network.forward.loss === '0.2'")
+    page.get("told.length = 0")
+    assert page.get(wish.replace("0.2", "0.21"))
+    page.wait("told.length >= 2 && told.at(-1)[0].includes('%')")
+    told = page.get("told")
+    assert {"%" in cell for cell, packets in told if packets < 100} == {False}
+    share, _, count = told[-1][0].partition(" % of ")
+    assert 0.08 < float(share) / 100 < 0.4
+    assert int(count) >= 100
+    assert any("%" not in cell and " of " in cell for cell, _ in told)
+    assert text(page, "span-forward").startswith("in the last ")
+    page.shoot("link")
+    assert page.get("station.session.wish('impair', { forward: { delay: 'constant:0.02' } })")
+    page.wait("station.session.network.forward.delay === 'constant:0.02'")

@@ -143,3 +143,26 @@ def test_the_way_is_measured_since_it_changed():
         line.advance(now=0.01 * k)
     found = mine.tell(Survey(3), now=2.2)[-1]
     assert (found.back.median, found.back.lost) == (pytest.approx(0.02), 0.0)
+
+
+def test_packets_under_way_are_not_lost():
+    hub, line, _ = emulated()
+    mine, epoch = holder(hub)
+    mine.tell(Impair(2, epoch, None, Way("constant:1.5", "0.2")), now=0.0)
+    found, shown = {}, []
+    for k in range(1200):
+        now = 0.02 * k
+        line.link.backward.send(control.Ping(k + 1, 0.0), now)
+        line.advance(now=now)
+        measured = line.back.measured(now=now)
+        assert measured.packets <= k + 1
+        if measured.packets >= 100:
+            shown.append(measured.lost)
+        found[k] = measured
+    assert found[60].median is None, "nothing has arrived yet"
+    assert found[60].lost < 0.5
+    # Three standard deviations of a hundred.
+    assert all(abs(lost - 0.2) < 0.12 for lost in shown)
+    assert (found[600].packets, found[600].span) == (pytest.approx(601, abs=30), pytest.approx(12.0))
+    late = line.back.measured(now=40.0)
+    assert (late.span, late.packets) == (30.0, pytest.approx(700, abs=30))
