@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     import asyncio
     from contextlib import AsyncExitStack
 
+    from interfaces.link import LinkConditions
     from interfaces.stream.access import Access
-    from interfaces.stream.control import Role
+    from interfaces.stream.control import Attached, Role
+    from robots.onboard import LossPolicy
 
 
 TokenFile: TypeAlias = Annotated[
@@ -162,3 +164,22 @@ async def abandon(task: asyncio.Task[str]) -> None:
 
     task.cancel()
     await asyncio.wait([task])
+
+
+def say_robot(url: str, conditions: LinkConditions, link_loss: LossPolicy | None) -> None:
+    """Say on standard error where the robot is, what is emulated on the way there, and what it's asked to do."""
+    asked = "" if link_loss is None else f", link loss: {link_loss}"
+    typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}{asked}", err=True)
+
+
+def saying_policy() -> Callable[[Attached], None]:
+    """What says on standard error what a robot does when the link is lost, for each operator where that's news."""
+    said = ""
+
+    def say(attached: Attached) -> None:
+        nonlocal said
+        if attached.link_loss != said:
+            said = attached.link_loss
+            typer.echo(f"vrs: operator's site connected, link loss: {said}", err=True)
+
+    return say

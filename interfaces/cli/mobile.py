@@ -17,6 +17,8 @@ from interfaces.cli.doors import (
     end_on_signal,
     end_with_input,
     keep_quiet,
+    say_robot,
+    saying_policy,
     start_robot,
 )
 from interfaces.software import software
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from interfaces.runtime.live.mobile_robot import LiveMobileRobot
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
+    from robots.onboard import LossPolicy
 
 ROBOTS = ("puma560", "ipr")
 """Robots that can be served."""
@@ -123,7 +126,8 @@ class MobileServing:
     room: str
     architecture: str
     conditions: LinkConditions
-    link_loss: str
+    link_loss: LossPolicy | None
+    """None leaves it to the robot."""
     max_age: float
     seed: int
     robot_at: str | None
@@ -141,8 +145,7 @@ class MobileServing:
         """Of the robot that is started."""
         return (
             "--robot", "ipr", "--room", self.room, "--architecture", self.architecture,
-            "--link-loss", self.link_loss, "--max-age", f"{self.max_age:g}",
-            "--operator-loss", self.operator_loss,
+            "--max-age", f"{self.max_age:g}", "--operator-loss", self.operator_loss,
         )  # fmt: skip
 
 
@@ -177,7 +180,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         config = LiveMobileOperatorConfig(
             model, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
             None if serving.jobs is None else JobFile(serving.jobs),
-            camera=CameraConfig(serving.camera) if serving.camera else None,
+            camera=CameraConfig(serving.camera) if serving.camera else None, link_loss=serving.link_loss,
         )  # fmt: skip
         operator = LiveMobileOperator(config, access)
         panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
@@ -197,8 +200,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         await asyncio.wait([robot, ending], return_when=asyncio.FIRST_COMPLETED)
         if robot.done():
             operator.robot.url = robot.result()
-            delay = serving.conditions.forward.delay.name
-            typer.echo(f"vrs: robot at {robot.result()}, emulated delay {delay}", err=True)
+            say_robot(robot.result(), serving.conditions, serving.link_loss)
         await ending
 
 
@@ -227,7 +229,7 @@ def run_mobile(
         listen: Where, HOST:PORT.
         architecture: What it does with the operator's path, by name.
         room: Where it drives, see `room_of`.
-        link_loss: `halt` or `hold`.
+        link_loss: `halt` or `hold`, unless the operator's site says otherwise.
         watchdog: T_loss, and how old a message may be [s].
         reports: How often it says where it is [1/s].
         token_file: Its tokens.
@@ -255,7 +257,9 @@ def run_mobile(
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
     driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
     jobs = RunnerConfig(loss=OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss)))
-    config = LiveMobileConfig(room_of(room), architecture, driven, jobs, Hands(speaker=Aloud()), server=software())
+    config = LiveMobileConfig(
+        room_of(room), architecture, driven, jobs, Hands(speaker=Aloud()), halting=dog, server=software()
+    )
     access, allowed = access_for(address.host, token_file, free={Role.SITE}), asked_for(address.host, reached_as)
 
     async def main() -> None:
@@ -275,6 +279,7 @@ async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, unti
     from interfaces.stream.server import application
 
     end_on_signal(robot.ended)
+    robot.met = saying_policy()
     listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
     app = application(robot.routes, allowed(port))

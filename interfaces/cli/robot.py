@@ -17,6 +17,7 @@ from interfaces.cli.doors import (
     end_on_signal,
     end_with_input,
     keep_quiet,
+    saying_policy,
 )
 from interfaces.cli.mobile import (
     ARCHITECTURE,
@@ -75,7 +76,8 @@ def robot(
         typer.Option(
             "--link-loss",
             metavar="POLICY",
-            help="halt: stop when nothing comes for --timeout, and wait for a resume; hold: wait and go on.",
+            help="Unless the operator's site says otherwise. halt: stop when nothing fresh comes for "
+            "--timeout, and wait for a resume; hold: wait and go on.",
         ),
     ] = "halt",
     operator_loss: OperatorLossName = OPERATOR_LOSS,
@@ -162,7 +164,9 @@ def robot(
     site = RobotSiteConfig(
         fixed_offset=_offset(offset), beat=beat, watchdog=watchdog if policy is LossPolicy.HALT else None
     )
-    config = LiveRobotConfig(model, q, RobotHostConfig(site=site, lead=lead), kind, friction, software())
+    config = LiveRobotConfig(
+        model, q, RobotHostConfig(site=site, lead=lead, halting=watchdog), kind, friction, software()
+    )
     access = access_for(address.host, token_file, free={Role.SITE})
     allowed = asked_for(address.host, reached_as or ())
 
@@ -195,6 +199,7 @@ async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eo
     from interfaces.stream.server import application
 
     end_on_signal(robot.ended)
+    robot.met = saying_policy()
     listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
     app = application(robot.routes, allowed(port))

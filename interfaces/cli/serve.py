@@ -19,6 +19,7 @@ from interfaces.cli.doors import (
     end_on_signal,
     end_with_input,
     keep_quiet,
+    say_robot,
     start_robot,
 )
 from interfaces.cli.mobile import (
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from interfaces.link import LinkConditions
     from interfaces.recording.live import LiveRecording
     from interfaces.stream.access import Access
+    from robots.onboard import LossPolicy
 
 RECORDINGS = Path("recordings")
 """Where the station records to, unless told otherwise."""
@@ -86,9 +88,15 @@ def serve(
         ),
     ] = "adaptive",
     link_loss: Annotated[
-        str,
-        typer.Option("--link-loss", metavar="POLICY", help="Of the robot that this starts: halt or hold."),
-    ] = "halt",
+        str | None,
+        typer.Option(
+            "--link-loss",
+            metavar="POLICY",
+            help="What the robot does when nothing fresh comes: halt (it stops, and waits for a resume) or hold "
+            "(it waits, and goes on). Unless given, hold where --delay is too slow for halt; else halt, or what "
+            "the robot at --robot-at was started with.",
+        ),
+    ] = None,
     operator_loss: OperatorLossName = OPERATOR_LOSS,
     jobs: Annotated[
         Path, typer.Option("--jobs", metavar="FILE.json", help="Of an ipr, where the list of jobs is kept.")
@@ -145,7 +153,7 @@ def serve(
     from interfaces.recording.live import RATE, LiveRecording
     from interfaces.recording.messages import OWN
     from interfaces.recording.sink import Sink
-    from interfaces.runtime.ages import late_often
+    from interfaces.runtime.ages import late_often, too_slow
     from interfaces.runtime.offset import fixed_offset, spelled
     from interfaces.runtime.physics_messages import BodyKind
     from interfaces.stream.access import OPEN, read_tokens
@@ -154,12 +162,12 @@ def serve(
     from robots.onboard import LossPolicy
 
     one_of("robot", robot, ROBOTS)
-    policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
+    policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
     one_of("body", body, BodyKind)
     if robot_at is not None:
         left_out("the robot at --robot-at has its own", {
-            "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "max-age": (max_age, 0.5),
+            "offset": (offset, "adaptive"), "max-age": (max_age, 0.5),
             "body": (body, "puma560"), "operator-loss": (operator_loss, OPERATOR_LOSS),
             "architecture": (architecture, ARCHITECTURE),
         })  # fmt: skip
@@ -168,7 +176,12 @@ def serve(
     profile = delay_profile(delay)
     way = Conditions(delay=profile, loss=loss_model(loss), service=service)  # type: ignore[arg-type]
     link = LinkConditions.symmetric(way)
-    advice = "" if robot_at is not None else late_often(link, policy, max_age)
+    if policy is not None:
+        advice = late_often(link, policy, max_age)
+    elif slow := too_slow(link, max_age):
+        policy, advice = LossPolicy.HOLD, f"--link-loss hold: {slow}"
+    else:
+        policy, advice = None if robot_at is not None else LossPolicy.HALT, ""
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
     allowed = asked_for(host, reached_as or ())
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
@@ -184,7 +197,7 @@ def serve(
         if camera:
             number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
         serving = MobileServing(
-            host, port, allowed, room, architecture, link, policy.value, max_age, seed, at, token, until_eof,
+            host, port, allowed, room, architecture, link, policy, max_age, seed, at, token, until_eof,
             one_of("operator-loss", operator_loss, OperatorLoss), jobs, camera,
         )  # fmt: skip
         _advise(advice)
@@ -195,9 +208,9 @@ def serve(
         "operator-loss": (operator_loss, OPERATOR_LOSS), "camera": (camera, CAMERA),
     })  # fmt: skip
     behind = spelled(fixed_offset(offset, profile))
-    options = ["--offset", behind, "--link-loss", policy, "--body", body, "--max-age", f"{max_age:g}"]
+    options = ["--offset", behind, "--body", body, "--max-age", f"{max_age:g}"]
     recording = None
-    told = (behind, str(policy)) if robot_at is None else (OWN, OWN)
+    told = behind if robot_at is None else OWN, OWN if policy is None else policy.value
     if recordings.exists() and not recordings.is_dir():
         raise InvalidValueError("recordings", str(recordings), "a directory, or one that can be made")
     if record is not None:
@@ -221,6 +234,7 @@ def serve(
             seed,
             at,
             token,
+            policy,
             options,
             recording,
             _Shelved(recordings, *told),
@@ -270,6 +284,7 @@ async def _serve(
     seed: int,
     robot_at: str | None,
     robot_token: str | None,
+    link_loss: LossPolicy | None,
     options: Sequence[str],
     recording: LiveRecording | None,
     shelved: _Shelved,
@@ -309,7 +324,7 @@ async def _serve(
         model = puma560.model()
         config = LiveOperatorConfig(
             model, model.poses["nominal"], "", conditions, robot_token, seed,
-            server=software(), recording=recording,
+            server=software(), recording=recording, link_loss=link_loss,
         )  # fmt: skip
         operator = LiveOperator(config, access)
         station = Station(described(model, operator.scene.tool))
@@ -343,7 +358,7 @@ async def _serve(
         await asyncio.wait([robot, ending], return_when=asyncio.FIRST_COMPLETED)
         if robot.done():
             operator.robot.url = robot.result()
-            typer.echo(f"vrs: robot at {robot.result()}, emulated delay {conditions.forward.delay.name}", err=True)
+            say_robot(robot.result(), conditions, link_loss)
         await ending
 
 

@@ -80,6 +80,9 @@ class Hello:
     session: str | None = field(default=None, repr=False)
     """An earlier session of this client, to go on with."""
     protocol: int = PROTOCOL
+    link_loss: str | None = None
+    """Of an operator's site: what the robot is to do when nothing is heard, `halt` or `hold`; None leaves it to the
+    robot."""
 
 
 @dataclass(frozen=True, slots=True)

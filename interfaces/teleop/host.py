@@ -53,8 +53,10 @@ class RobotHost(Host[RobotSite, Orders, Report]):
         self._q = np.array(q, float)
 
     def _make(self, t: float) -> RobotSite:
+        site = replace(self.config.site, watchdog=self.watchdog(self.config.site.watchdog))
+        config = replace(self.config, site=site).decided()
         reported = max(0, math.floor(1000.0 * t))
-        return RobotSite(self._model, self._q, now=t, config=self.config.decided(), reported=reported)
+        return RobotSite(self._model, self._q, now=t, config=config, reported=reported)
 
     def _left(self, site: RobotSite, now: float) -> None:  # noqa: ARG002 - it's this site's
         self._q = self.reference(np.array([now])).q[0]

@@ -15,6 +15,7 @@ from typing import Generic, Protocol, TypeVar
 from interfaces.link.clock_sync import ClockSync
 from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
 from interfaces.stream.control import Ping, Pong
+from robots.onboard import LossPolicy, Verdict, WatchdogConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
@@ -22,6 +23,8 @@ MET = "the robot's site has just met this operator's"
 """Why a robot halts that is met."""
 OTHER = "another operator's site came"
 """Why a robot halts whose operator hasn't been heard while another came."""
+LOST = "nothing fresh came from the operator: link loss"
+"""Why a robot halts that has lost its operator."""
 _LIMIT = 16
 """Messages that wait for the clocks to be compared."""
 
@@ -79,6 +82,8 @@ class HostConfig:
     """After so long [s] from the first round trip fewer are enough, in [0, 60]."""
     silence: float = 2.0
     """An operator who hasn't been heard for so long [s] makes room for another, in [0.1, 60]."""
+    halting: WatchdogConfig = field(default_factory=lambda: WatchdogConfig(max_uncertainty=1.0))
+    """The watchdog for an operator who asks for `halt`, where the robot would hold by itself."""
 
     def __post_init__(self) -> None:
         ranges = {"lead": (0.0, 1.0), "compared": (1, 1000), "patience": (0.0, 60.0), "silence": (0.1, 60.0)}
@@ -110,6 +115,8 @@ class Host(ABC, Generic[S, O, R]):
         self.offset = 0.0
         """The site's time less the robot's clock [s], the lead aside."""
         self._next = ""
+        self._loss: LossPolicy | None = None
+        self._next_loss: LossPolicy | None = None
         self._heard = -math.inf
         self._sync = ClockSync()
         self._trips: RoundTripEstimator | None = None
@@ -126,12 +133,28 @@ class Host(ABC, Generic[S, O, R]):
     def _left(self, site: S, now: float) -> None:
         """The operator is left, with the robot at rest."""
 
-    def hello(self, session: str, *, now: float) -> str:
+    def watchdog(self, own: WatchdogConfig | None) -> WatchdogConfig | None:
+        """What watches over the link to the operator: the operator decides between `halt` and `hold`.
+
+        Args:
+            own: What the robot has for operators who leave that to it; None holds.
+
+        Returns:
+            The watchdog under `halt`; None under `hold`.
+        """
+        loss = self._next_loss if self._next else self._loss
+        if loss is None:
+            return own
+        return (own or self._hosting.halting) if loss is LossPolicy.HALT else None
+
+    def hello(self, session: str, *, now: float, link_loss: LossPolicy | None = None) -> str:
         """Let an operator's site in.
 
         Args:
             session: Random text that names its life.
             now: By the robot's clock [s].
+            link_loss: What the robot is to do when the link is lost, as long as this session is followed; None
+                leaves it to the robot.
 
         Returns:
             Why it can't be; empty if it's followed from now on.
@@ -147,7 +170,7 @@ class Host(ABC, Generic[S, O, R]):
         if session == self.session:
             self._next = ""
         else:
-            self._next = session
+            self._next, self._next_loss = session, link_loss
             self.halt(OTHER, now=now)
         self._catch_up(now)
         return ""
@@ -160,7 +183,7 @@ class Host(ABC, Generic[S, O, R]):
         """Turn to the next operator: nothing of the one before counts any more."""
         if self.site is not None:
             self._left(self.site, now)
-        self.session, self._next, self.site = self._next, "", None
+        self.session, self._loss, self._next, self.site = self._next, self._next_loss, "", None
         self._sync = ClockSync()
         self._seed = (self._seed + 1) % 2**32
         self._trips = RoundTripEstimator(self._seed, self._hosting.probes, start=now)
@@ -259,3 +282,18 @@ class Host(ABC, Generic[S, O, R]):
         """Bound on the error of what is taken for the operator's clock [s]; infinite if nothing is known."""
         estimate = self._sync.estimate(self._now)
         return math.inf if estimate is None else estimate.uncertainty
+
+
+def lost(watchdog: WatchdogConfig, verdict: Verdict) -> str:
+    """Why a robot halts that has lost its operator, and what mends it.
+
+    Args:
+        watchdog: By which it has.
+        verdict: What became of the newest message.
+    """
+    mend = "on a link this slow start vrs serve with --link-loss hold"
+    if verdict.counts:
+        return f"{LOST} ({mend})"
+    if verdict is Verdict.TOO_OLD:
+        mend = f"{watchdog.max_age:g} s are allowed: {mend}, or vrs robot with a larger --max-age"
+    return f"{LOST} (the newest message was refused: {verdict}; {mend})"

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from interfaces.site import engine_time
+from interfaces.teleop.hosting import lost
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.received import ReceivedLog
@@ -211,8 +212,7 @@ class RobotSite:
             return
         for action in self._watchdog.advance(now=now):
             if isinstance(action, BeginStop):
-                last = "" if self._verdict.counts else f" (the last message was refused: {self._verdict})"
-                self.halt(f"nothing fresh came from the operator: {action.reason.value}{last}", now=now)
+                self.halt(lost(self._watchdog.config, self._verdict), now=now)
         if self.halted and self.rests(now=now):
             self._watchdog.stopped(self._watchdog.number, now=now)
 

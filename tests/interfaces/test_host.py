@@ -10,7 +10,7 @@ import pytest
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.teleop import OperatorSite, Orders, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
 from robots import puma560
-from robots.onboard import WatchdogConfig
+from robots.onboard import LossPolicy, WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
 from vrs.model import Array
 
@@ -42,12 +42,12 @@ class Ends:
         """What the robot's clock reads."""
         return self.ahead + self.rate * self.t
 
-    def new_operator(self, session: str) -> None:
+    def new_operator(self, session: str, link_loss: LossPolicy | None = None) -> None:
         self.began, self.session = self.t, session
         self.operator = OperatorSite(MODEL, NOMINAL, now=0.0, halted="no robot has come yet")
         self.line = RobotLine(self.operator, self.conditions, np.random.default_rng(3))
         self.line.connected = True
-        self.refused = self.host.hello(session, now=self.robots())
+        self.refused = self.host.hello(session, now=self.robots(), link_loss=link_loss)
 
     @property
     def now(self) -> float:

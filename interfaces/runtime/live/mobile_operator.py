@@ -37,6 +37,7 @@ from interfaces.teleop.tasks import Doing
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import chassis
+from robots.onboard import LossPolicy
 from robots.onboard.driving import Posture
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
 from vrs.clock import WallClock, seconds_since_1970
@@ -67,6 +68,8 @@ class LiveMobileOperatorConfig:
     """Where the list of jobs is kept; nowhere unless given."""
     camera: CameraConfig | None = None
     """The robot's camera; None for none, nor voice and screen."""
+    link_loss: LossPolicy | None = None
+    """What the robot is to do when the link is lost; None leaves it to the robot."""
 
 
 class LiveMobileOperator:
@@ -87,7 +90,7 @@ class LiveMobileOperator:
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
             self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, reports=DriveReport,
-            unfit=self._unfit,
+            unfit=self._unfit, link_loss=config.link_loss,
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -33,6 +33,7 @@ from robots.bullet.rooms import Room
 from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
+from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
 from robots.onboard.laser import LaserModel
 from vrs.checks import one_of
@@ -61,6 +62,8 @@ class LiveMobileConfig:
     position: str = ""
     """What tells it where it is: a name of `interfaces.teleop.architectures.equipment.POSITIONS`. Unless given, its
     laser where the map has walls or other blocks for it to see, else the camera."""
+    halting: WatchdogConfig = field(default_factory=lambda: HostConfig().halting)
+    """The watchdog for an operator who asks for `halt`."""
     constants: Constants = field(default_factory=Constants)
     """Of all architectures."""
     seed: int = 0
@@ -98,15 +101,20 @@ class LiveMobileRobot:
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
         self.host = DrivenHost(
-            self._site, HostConfig(lead=0.0), now=self.clock.now(), seed=secrets.randbelow(2**32)
+            self._site,
+            HostConfig(lead=0.0, halting=config.halting),
+            now=self.clock.now(),
+            seed=secrets.randbelow(2**32),
         )
         self._turning = Turning(self.clock, self._turn)
         soon = self._turning.soon
         self._server = RobotServer(
-            self.host, self.clock, access, attached=self._attached, met=soon, heard=soon, orders=DriveOrders
+            self.host, self.clock, access, attached=self._attached, met=self._follow, heard=soon, orders=DriveOrders
         )
         self.ended = asyncio.Event()
         """Set when it's to end."""
+        self.met: Callable[[Attached], None] = lambda _: None
+        """Is given what an operator's site is told that is let in."""
         self.ticks = self.skipped = 0
         """Control periods that were run, and left out as the process stood still."""
         self.worst = 0.0
@@ -176,11 +184,11 @@ class LiveMobileRobot:
 
     def _site(self, t: float) -> DrivenRobot:
         """What follows an operator from the time t of its clock on [s]."""
-        body, driven = self.body, self.config.driven
-        if driven.watchdog is not None:
+        body, watchdog = self.body, self.host.watchdog(self.config.driven.watchdog)
+        if watchdog is not None:
             # What is decided takes effect with the next control period.
-            timeout = max(driven.watchdog.timeout - CONTROL, 0.1)
-            driven = replace(driven, watchdog=replace(driven.watchdog, timeout=timeout))
+            watchdog = replace(watchdog, timeout=max(watchdog.timeout - CONTROL, 0.1))
+        driven = replace(self.config.driven, watchdog=watchdog)
         return DrivenRobot(
             self._architecture,
             self._position,
@@ -205,8 +213,12 @@ class LiveMobileRobot:
         self._server.send(self.host.advance(now=now))
         return self.host.next_deadline()
 
+    def _follow(self, attached: Attached) -> None:
+        self._turning.soon()
+        self.met(attached)
+
     def _attached(self) -> Attached:
-        config, dog = self.config, self.config.driven.watchdog
+        config, dog = self.config, self.host.watchdog(self.config.driven.watchdog)
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         posture = np.array(self._position.posture())
         return Attached(
@@ -228,6 +240,7 @@ class LiveMobileRobot:
             "operator": self._server.connected,
             "epoch": 0 if site is None else site.epoch,
             "halted": "" if site is None else site.halted,
+            "link_loss": self._attached().link_loss,
             "posture": list(self._position.posture()),
             "truth": list(body.truth),
             "motion": list(body.motion),

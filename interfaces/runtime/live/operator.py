@@ -30,6 +30,7 @@ from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, Report, RobotLine
 from interfaces.timer import Turning
+from robots.onboard import LossPolicy
 from robots.onboard.lease import Ended, Grant, Lease
 from vrs.clock import WallClock, seconds_since_1970
 from vrs.commands import Stop
@@ -69,6 +70,8 @@ class LiveOperatorConfig:
     """Name and version of the program."""
     recording: LiveRecording | None = None
     """What is recorded; None for nothing."""
+    link_loss: LossPolicy | None = None
+    """What the robot is to do when the link is lost; None leaves it to the robot."""
 
 
 class LiveOperator:
@@ -99,8 +102,9 @@ class LiveOperator:
             self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
-            self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, unfit=self._unfit
-        )
+            self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, unfit=self._unfit,
+            link_loss=config.link_loss,
+        )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
         hub = HubConfig(rates=config.rates, server=config.server, instance=secrets.token_urlsafe(9))

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import math
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -72,7 +72,7 @@ class LiveRobot:
         self.host = RobotHost(config.model, config.q, now=self.clock.now(), config=config.host, seed=seed)
         self._turning = Turning(self.clock, self._turn)
         self._server = RobotServer(
-            self.host, self.clock, access, attached=self._attached, met=self._decide, heard=self._decide
+            self.host, self.clock, access, attached=self._attached, met=self._follow, heard=self._decide
         )
         self._physics: PhysicsProcess | None = None
         self._feeder: Feeder | None = None
@@ -81,6 +81,8 @@ class LiveRobot:
         """Set when the robot can't go on; anybody may set it to end it."""
         self.problem = ""
         """Why it can't; empty while it can."""
+        self.met: Callable[[Attached], None] = lambda _: None
+        """Is given what an operator's site is told that is let in."""
         self.faults = 0
         """How often the body came to rest by itself."""
 
@@ -161,9 +163,13 @@ class LiveRobot:
             self._feeder.decided()
         self._turning.soon()
 
+    def _follow(self, attached: Attached) -> None:
+        self._decide()
+        self.met(attached)
+
     def _attached(self) -> Attached:
         site = self.config.host.site
-        dog = site.watchdog
+        dog = self.host.watchdog(site.watchdog)
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         q = np.array(self._measured.q) if self._measured is not None else self.config.q
         name = self.config.model.name
@@ -184,6 +190,7 @@ class LiveRobot:
             "operator": self._server.connected,
             "epoch": 0 if site is None else site.epoch,
             "halted": "" if site is None else site.halted,
+            "link_loss": self._attached().link_loss,
             "uncertainty": _finite(self.host.uncertainty),
             "measured_at": None if measured is None else measured.followed * TICK,
             "q": None if measured is None else list(measured.q),

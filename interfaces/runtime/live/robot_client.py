@@ -18,6 +18,7 @@ from interfaces.stream.dialling import dial
 from interfaces.stream.errors import ProtocolError
 from interfaces.teleop import Report
 from interfaces.teleop.line import SiteLine
+from robots.onboard import LossPolicy
 from vrs.clock import Clock
 from vrs.errors import VrsError
 
@@ -62,6 +63,7 @@ class RobotClient:
         token: str | None = None,
         reports: type = Report,
         unfit: Callable[[Attached], str] = lambda _: "",
+        link_loss: LossPolicy | None = None,
     ) -> None:
         """Say where the robot is; `run` connects.
 
@@ -73,9 +75,10 @@ class RobotClient:
             token: Of the role `site`.
             reports: What its robots send.
             unfit: Says why a robot isn't one for this operator; empty if it is.
+            link_loss: What the robot is to do when the link is lost; None leaves it to the robot.
         """
         self._coming: Any = reports | Ping | Problem
-        self._unfit = unfit
+        self._unfit, self._link_loss = unfit, link_loss
         self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
         self._session = secrets.token_urlsafe(12)
         self._waiting: deque[Value] = deque(maxlen=_WAITING)
@@ -115,7 +118,7 @@ class RobotClient:
 
     async def _once(self) -> None:
         async with dial(self.url, Encoding.MSGPACK, largest=LARGEST, opening=OPENING, closing=0.5) as socket:
-            hello = Hello(Role.SITE, "vrs serve", self._token, self._session)
+            hello = Hello(Role.SITE, "vrs serve", self._token, self._session, link_loss=self._link_loss)
             await socket.send(encode(hello, Encoding.MSGPACK))
             async with asyncio.timeout(OPENING):
                 answer = decode(_bytes(await socket.recv()), Encoding.MSGPACK, allowed=Attached | Problem)

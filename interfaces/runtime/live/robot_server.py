@@ -19,6 +19,8 @@ from interfaces.stream.server import Endpoint
 from interfaces.stream.sockets import let_stay
 from interfaces.teleop import Orders
 from interfaces.teleop.hosting import Host
+from robots.onboard import LossPolicy
+from vrs.checks import one_of
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError
 
@@ -64,7 +66,7 @@ class RobotServer:
         access: Access,
         *,
         attached: Callable[[], Attached],
-        met: Callable[[], None],
+        met: Callable[[Attached], None],
         heard: Callable[[], None],
         orders: type = Orders,
     ) -> None:
@@ -75,7 +77,7 @@ class RobotServer:
             clock: The robot's.
             access: Who may come in as `Role.SITE`.
             attached: What a site is told that is let in.
-            met: Called when one has been.
+            met: Is given that when one has been.
             heard: Called when a message comes that the host is given.
             orders: What its operators send.
         """
@@ -138,7 +140,9 @@ class RobotServer:
             if hello.role is not Role.SITE or refused:
                 text = refused or "only an operator's site comes here"
                 return Problem(ProblemCode.REFUSED, text, fatal=True)
-            busy = self._host.hello(hello.session or "", now=self._clock.now())
+            asked = hello.link_loss
+            loss = None if asked is None else LossPolicy(one_of("link_loss", asked, LossPolicy))
+            busy = self._host.hello(hello.session or "", now=self._clock.now(), link_loss=loss)
         except ProtocolError as error:
             return Problem(error.code, str(error), fatal=True)
         except InvalidValueError as error:
@@ -148,8 +152,9 @@ class RobotServer:
         if self._connection is not None:
             self._connection.end(_POLICY, "the same site has connected again")
         self._connection = connection
-        connection.send(self._attached())
-        self._met()
+        attached = self._attached()
+        connection.send(attached)
+        self._met(attached)
         return None
 
     def _hear(self, connection: _Connection, data: bytes) -> None:

@@ -32,7 +32,7 @@ export function mount(station, box) {
   const body = station.config.robot.mobile ? "smart_toy" : "precision_manufacturing";
   const link = pill("link-pill", "Connection of this page to the server");
   const robot = pill("robot-pill", "The real robot, as the server last heard of it");
-  const resume = h("button.small", { type: "button", id: "resume", hidden: true }, "Let it go on");
+  const resume = h("button.small", { type: "button", id: "resume", hidden: true }, "Resume");
   resume.addEventListener("click", () => session.wish("resume"));
   box.append(link.element, robot.element, resume);
   askForTokens(station);

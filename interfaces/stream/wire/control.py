@@ -44,10 +44,11 @@ class HelloWire(Message, frozen=True, omit_defaults=True, gc=False, tag="hello")
     name: Name
     token: Word | None = None
     session: Word | None = None
+    link_loss: Word | None = None
 
     def read(self) -> control.Hello:
         """Who it is."""
-        return control.Hello(self.role, self.name, self.token, self.session, self.protocol)
+        return control.Hello(self.role, self.name, self.token, self.session, self.protocol, self.link_loss)
 
 
 class LeaseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="lease"):

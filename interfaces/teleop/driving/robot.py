@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from interfaces.teleop.architectures import Player, Position, RobotSite
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
 from interfaces.teleop.driving.autonomy import Autonomy
+from interfaces.teleop.hosting import LOST, lost
 from interfaces.teleop.tasks import Doing, Errand, Sight, TaskReport, stops
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, kept
@@ -18,8 +19,6 @@ from vrs.mobile.limiting import braking
 
 TOO_FAR = "the drive is to begin too far from where the robot is"
 """Why a new epoch isn't followed."""
-LOST = "nothing fresh came from the operator: link loss"
-"""Why it stops by itself."""
 TOLD = 0.5
 """So often at least it's told how far the robot is with what it does by itself [s]."""
 
@@ -92,6 +91,7 @@ class DrivenRobot:
         self._posture = position.posture()
         self._newest: tuple[int, float, float] | None = None
         self._refused, self._uncertainty = "", math.inf
+        self._verdict = Verdict.FRESH
         self._reports = max(0, math.floor(1000.0 * now))
 
     def join(self, epoch: int, reason: str, *, now: float) -> None:
@@ -180,6 +180,7 @@ class DrivenRobot:
         if verdict is Verdict.HALTED and self._carries_on:
             return True
         if verdict not in (Verdict.HALTED, Verdict.STALE_EPOCH, Verdict.UNKNOWN_EPOCH):
+            self._verdict = verdict
             self._refused = "" if verdict.counts else f"the newest message was refused: {verdict.value}"
         return verdict.counts
 
@@ -196,8 +197,7 @@ class DrivenRobot:
         if any(isinstance(action, BeginStop) for action in self._watchdog.advance(now=now)):
             self._lose(now)
             if not self._carries_on:
-                last = f" ({self._refused})" if self._refused else ""
-                self._halt(LOST + last, now)
+                self._halt(lost(self._watchdog.config, self._verdict), now)
         if self._carries_on and not self.doing:
             self._carries_on = False
             self._halt(f"{LOST}, and it has carried on to the end", now)
