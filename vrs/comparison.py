@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vrs.model import Array, RobotModel
-from vrs.path_matching import PathMatch, histories, match_paths, resample
+from vrs.path_matching import PathMatch, histories, match_paths, measured_rows, resample
 
 _STILL = 1e-6
 """Values that change by no more are at rest [rad, or their unit]."""
@@ -100,29 +100,30 @@ def shifted(t: Array, values: Array, offset: float) -> Array:
 
 
 def best_lag(t: ArrayLike, q_leader: ArrayLike, q_follower: ArrayLike, longest: float = 10.0) -> float | None:
-    """Constant lag L that brings q_follower(t + L) nearest to q_leader(t), in the joints' squared error.
+    """Constant lag L that brings q_follower(t + L) nearest to q_leader(t), in the joints' mean squared error.
 
     Args:
         t: Evenly spaced times [s], (k,).
         q_leader: Joint values [rad], (k, n).
-        q_follower: Joint values [rad], (k, n).
+        q_follower: Joint values [rad], (k, n); rows of NaN where it wasn't measured.
         longest: Largest lag looked at, either way [s]; at most half of the record.
 
     Returns:
         L [s], positive where the follower is late, refined below a step by a parabola; None where either of
-        them stays in its place, which fits every lag.
+        them stays in its place, which fits every lag, or nothing was measured.
 
     Raises:
         InvalidValueError: If the shapes differ or a value isn't finite.
     """
-    a, b = histories(q_leader, q_follower)
-    if min(float(np.ptp(q, axis=0).max()) for q in (a, b)) <= _STILL:
+    a, b = histories(q_leader, q_follower, gaps=True)
+    seen = measured_rows(b)
+    if not seen.any() or min(float(np.ptp(q, axis=0).max()) for q in (a, b[seen])) <= _STILL:
         return None
     times = np.asarray(t, dtype=np.float64)
     step = float(times[-1] - times[0]) / (len(times) - 1)
     reach = min(round(longest / step), len(times) // 2)
     lags = np.arange(-reach, reach + 1)
-    cost = np.array([_lag_cost(a, b, int(lag)) for lag in lags])
+    cost = np.array([_lag_cost(a, b, int(lag), None if seen.all() else seen) for lag in lags])
     # Of equal costs the smallest lag is meant.
     i = int(np.lexsort((np.abs(lags), cost))[0])
     offset = 0.0
@@ -133,9 +134,15 @@ def best_lag(t: ArrayLike, q_leader: ArrayLike, q_follower: ArrayLike, longest: 
     return (float(lags[i]) + offset) * step
 
 
-def _lag_cost(a: Array, b: Array, lag: int) -> float:
+def _lag_cost(a: Array, b: Array, lag: int, seen: NDArray[np.bool_] | None) -> float:
+    """Mean squared error at a lag of so many steps; infinite where nothing was measured. `seen`: None for all."""
     leader = a[: len(a) - lag] if lag >= 0 else a[-lag:]
     follower = b[lag:] if lag >= 0 else b[: len(b) + lag]
+    if seen is not None:
+        kept = seen[lag:] if lag >= 0 else seen[: len(seen) + lag]
+        if not kept.any():
+            return np.inf
+        leader, follower = leader[kept], follower[kept]
     return float(np.mean((leader - follower) ** 2))
 
 
@@ -154,7 +161,7 @@ def compare_paths(
     Args:
         t: Ascending times [s], (k,), k ≥ 2.
         p_leader: Points of the leader [m], (k, d).
-        p_follower: Points of the follower [m], (k, d).
+        p_follower: Points of the follower [m], (k, d); rows of NaN where it wasn't measured, which count nowhere.
         v_max: Largest speed of the leader [m/s], > 0.
         cell: Length of a cell of path [m], > 0.
         dt: Step of the match [s], > 0.
@@ -170,8 +177,8 @@ def compare_paths(
 
 
 def summed_up(match: PathMatch) -> PathComparison:
-    """The figures of a match."""
-    mean, p95, largest = _spread(match.distance)
+    """The figures of a match, of what was measured alone."""
+    mean, p95, largest = _spread(match.distance[np.isfinite(match.distance)])
     cells, reached = len(match.s), len(match.t_follower)
     if cells < 3:
         return PathComparison(mean, p95, largest, None, None, None, None, None, None)
@@ -193,9 +200,11 @@ def summed_up(match: PathMatch) -> PathComparison:
 
 def _speed_error(t_leader: Array, t_follower: Array, window: int, cell: float) -> float | None:
     edges = np.arange(0, len(t_leader), window)
-    if len(edges) < 2:
-        return None
     spans = [np.maximum(np.diff(times[edges]), 1e-9) for times in (t_leader, t_follower)]
+    known = np.isfinite(spans[1])
+    if not known.any():
+        return None
+    spans = [span[known] for span in spans]
     speeds = [window * cell / span for span in spans]
     return float(np.mean(np.abs(speeds[1] - speeds[0])))
 

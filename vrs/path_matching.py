@@ -24,20 +24,21 @@ class PathMatch:
     t: Array
     """Times of the match [s], (k,)."""
     distance: Array
-    """Distance of the follower to the leader's path at those times [m], (k,)."""
+    """Distance of the follower to the leader's path at those times [m], (k,); NaN where it wasn't measured."""
     s: Array
     """Cells along the leader's path [m], (n,)."""
     t_leader: Array
     """When the leader first reached each cell [s], (n,)."""
     t_follower: Array
-    """When the follower first reached each cell that it reached [s], (m,), m ≤ n."""
+    """When the follower first reached each cell that it reached [s], (m,), m ≤ n; NaN where it came there
+    unmeasured."""
     moving: NDArray[np.bool_]
     """Whether the leader moves at each cell, so that a delay there means something, (n,)."""
 
     @property
     def time_difference(self) -> tuple[Array, Array]:
         """Cells [m] and how much later the follower reached them [s], where the leader moves."""
-        counted = self.moving[: len(self.t_follower)]
+        counted = self.moving[: len(self.t_follower)] & np.isfinite(self.t_follower)
         late = self.t_follower - self.t_leader[: len(counted)]
         return self.s[: len(counted)][counted], np.asarray(late[counted], dtype=np.float64)
 
@@ -56,12 +57,13 @@ def match_paths(
 
     The match j(t) is a non-decreasing cell along the leader's path, reached by the leader no later than t,
     that advances by at most 2 v_max dt a step and has the smallest sum of squared distances. It is exact:
-    dynamic programming over the whole record, ties going to the smaller advance.
+    dynamic programming over the whole record, ties going to the smaller advance. Where the follower wasn't measured
+    it costs nothing, wherever it is.
 
     Args:
         t: Ascending times [s], (k,), k ≥ 2.
         p_leader: Points of the leader [m], (k, d).
-        p_follower: Points of the follower [m], (k, d).
+        p_follower: Points of the follower [m], (k, d); rows of NaN where it wasn't measured.
         v_max: Largest speed of the leader [m/s], > 0.
         cell: Length of a cell of path [m], > 0.
         dt: Step of the match [s], > 0.
@@ -71,9 +73,10 @@ def match_paths(
         The match; of a leader that moves less than two cells, the distances alone.
 
     Raises:
-        InvalidValueError: If shapes differ, or a value isn't finite or positive where it must be.
+        InvalidValueError: If shapes differ, nothing was measured, or a value isn't finite or positive where it must
+            be.
     """
-    leader, follower = histories(p_leader, p_follower)
+    leader, follower = histories(p_leader, p_follower, gaps=True)
     times = np.asarray(t, dtype=np.float64)
     if times.shape != (len(leader),) or len(times) < 2 or not (np.diff(times) > 0).all():
         raise InvalidValueError("t", times.shape, f"ascending times, shape ({len(leader)},), two or more")
@@ -82,6 +85,9 @@ def match_paths(
             raise InvalidValueError(name, value, "positive and finite")
     grid = times[0] + dt * np.arange(int(np.floor((times[-1] - times[0]) / dt + 1e-9)) + 1)
     follower = resample(times, follower, grid)
+    seen = measured_rows(follower)
+    if not seen.any():
+        raise InvalidValueError("p_follower", "gaps alone", f"measured for {dt} s on end at least once")
 
     s_of_t = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(leader, axis=0), axis=1))))
     cells = int(np.floor(s_of_t[-1] / cell + 1e-9)) + 1
@@ -98,8 +104,20 @@ def match_paths(
     s_all = np.append(s, s_of_t[-1])
     distance, s_follower = _project(follower, np.vstack((path, leader[-1])), s_all, match)
     window = (-dt, dt + 0.5 * cell / v_min)
-    t_follower = _arrivals(grid, match, s_follower, s[: match[-1] + 1], window)
+    if seen.all():
+        t_follower = _arrivals(grid, match, s_follower, s[: match[-1] + 1], window)
+    else:
+        s_follower = np.interp(grid, grid[seen], s_follower[seen])
+        t_follower = _arrivals(grid, match, s_follower, s[: match[-1] + 1], window)
+        step = np.clip(np.searchsorted(grid, t_follower), 1, len(grid) - 1)
+        first = np.searchsorted(match, np.arange(len(t_follower)), side="left")
+        t_follower[~(seen[step - 1] & seen[step] & seen[first])] = np.nan
     return PathMatch(grid, distance, s, t_leader, t_follower, moving)
+
+
+def measured_rows(values: Array) -> NDArray[np.bool_]:
+    """Which rows (k, d) are measured, and not NaN, (k,)."""
+    return np.asarray(np.isfinite(values).all(axis=1))
 
 
 def resample(t: Array, values: Array, t_new: Array) -> Array:
@@ -116,7 +134,7 @@ def _match(t: Array, follower: Array, t_leader: Array, path: Array, advance: int
     """
     known = np.searchsorted(t_leader, t + 1e-9, side="right")
     rest = _least_to_come(follower, path)
-    least = float(rest[0]) + float(np.sum((path[0] - follower[0]) ** 2))
+    least = float(rest[0]) + float(_squares(path[:1], follower[0])[0])
     total = _greedy(follower, path, known, advance)
     if total > least + _BEAM:
         # A better bound is worth its search.
@@ -129,10 +147,9 @@ def _match(t: Array, follower: Array, t_leader: Array, path: Array, advance: int
 
 def _greedy(follower: Array, path: Array, known: NDArray[np.intp], advance: int) -> float:
     """Cost of the match that goes to the nearest cell within reach at each time."""
-    j, total = 0, float(np.sum((path[0] - follower[0]) ** 2))
+    j, total = 0, float(_squares(path[:1], follower[0])[0])
     for k in range(1, len(follower)):
-        apart = path[j : min(j + advance + 1, int(known[k]))] - follower[k]
-        squares = np.einsum("ij,ij->i", apart, apart)
+        squares = _squares(path[j : min(j + advance + 1, int(known[k]))], follower[k])
         step = int(squares.argmin())
         j, total = j + step, total + float(squares[step])
     return total
@@ -142,22 +159,29 @@ def _least_to_come(follower: Array, path: Array) -> Array:
     """Sum of the squared distances to the nearest cell after each time, (k,)."""
     from scipy.spatial import KDTree
 
-    nearest = np.asarray(KDTree(path).query(follower)[0], dtype=np.float64)
-    squares = nearest**2
+    seen = measured_rows(follower)
+    squares = np.zeros(len(follower))
+    squares[seen] = KDTree(path).query(follower[seen])[0] ** 2
     return np.asarray(np.append(np.cumsum(squares[:0:-1])[::-1], 0.0), dtype=np.float64)
+
+
+def _squares(path: Array, point: Array) -> Array:
+    """Squared distances of cells, (m, d), to a point of the follower, (d,), (m,); 0 where it wasn't measured."""
+    apart = path - point
+    squares: Array = np.einsum("ij,ij->i", apart, apart)
+    return squares if np.isfinite(point[0]) else np.zeros(len(path))
 
 
 def _search(
     follower: Array, path: Array, known: NDArray[np.intp], advance: int, bound: Callable[[int, Array], float]
 ) -> tuple[NDArray[np.intp], float]:
     """The best match among cells whose cost at time k is within `bound(k, costs)`, and its cost."""
-    low, cost = 0, np.sum((path[:1] - follower[0]) ** 2, axis=1)
+    low, cost = 0, _squares(path[:1], follower[0])
     costs = [(low, cost)]
     for k in range(1, len(follower)):
         high = min(low + len(cost) + advance, int(known[k]))
         best = _least_of_window(cost, advance)[: high - low]
-        apart = path[low:high] - follower[k]
-        cost = best + np.einsum("ij,ij->i", apart, apart)
+        cost = best + _squares(path[low:high], follower[k])
         costs.append((low, cost))
         if k % _PRUNED == 0:
             alive = np.flatnonzero(cost <= bound(k, cost))
@@ -190,6 +214,7 @@ def _least_of_window(cost: Array, advance: int) -> Array:
 def _project(follower: Array, path: Array, s_path: Array, match: NDArray[np.intp]) -> tuple[Array, Array]:
     """Distance to the polyline beside each matched cell, and the path length of the nearest point."""
     distance, s = np.full(len(follower), np.inf), np.zeros(len(follower))
+    distance[~measured_rows(follower)] = np.nan
     for start in (match - 1, match):
         low = np.clip(start, 0, len(path) - 2)
         along = path[low + 1] - path[low]
@@ -223,8 +248,8 @@ def _first_arrival(t: Array, s_of_t: Array, s: Array) -> Array:
     return np.asarray(t[low] + np.clip(share, 0.0, 1.0) * (t[i] - t[low]), dtype=np.float64)
 
 
-def histories(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
-    """Two histories as arrays of one shape (k, n), k ≥ 1.
+def histories(a: ArrayLike, b: ArrayLike, *, gaps: bool = False) -> tuple[Array, Array]:
+    """Two histories as arrays of one shape (k, n), k ≥ 1; with `gaps` the second may have rows of NaN.
 
     Raises:
         InvalidValueError: If the shapes differ or a value isn't finite.
@@ -232,6 +257,7 @@ def histories(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
     first, second = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     if first.ndim != 2 or first.shape != second.shape or not len(first):
         raise InvalidValueError("histories", (first.shape, second.shape), "of one shape (k, n), k ≥ 1")
-    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+    unknown = np.isnan(second).all(axis=1) if gaps else np.zeros(len(second), dtype=bool)
+    if not (np.isfinite(first).all() and np.isfinite(second[~unknown]).all()):
         raise InvalidValueError("histories", "NaN or infinity", "finite")
     return first, second

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 ARM_ROWS = (
     ("duration_s", "duration", 1.0, "s"),
+    ("gap_s", "not measured", 1.0, "s"),
     ("behind.mean_s", "behind, mean", 1.0, "s"),
     ("behind.max_s", "behind, at most", 1.0, "s"),
     ("messages.delay_mean_s", "message delay, mean", 1.0, "s"),
@@ -36,7 +37,7 @@ ARM_ROWS = (
     ("path.progress", "progress", 1e2, "%"),
 )
 """Path in a summary, name, factor and unit (none: a count) of what two recordings are compared by."""
-MOBILE_ROWS = (("duration_s", "duration", 1.0, "s"), *FIGURES)
+MOBILE_ROWS = (("duration_s", "duration", 1.0, "s"), ("gap_s", "not measured", 1.0, "s"), *FIGURES)
 """The same of a mobile robot's."""
 ROWS = {"arm": ARM_ROWS, "mobile": MOBILE_ROWS}
 """By the kind of robot."""

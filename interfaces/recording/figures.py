@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from interfaces.recording.history import arm_timeline
 from interfaces.recording.messages import OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, rerun
 from interfaces.recording.runs import extras_of
-from interfaces.recording.track import APART, REAL, Track
+from interfaces.recording.track import GAP, REAL, Track, gap_lengths, not_measured
 from interfaces.report.summary import Json, summarize
 from interfaces.runtime.attribution import Attribution, OffsetOutcome
 from interfaces.runtime.happenings import waits
@@ -24,6 +25,7 @@ from interfaces.teleop import Correction
 from robots.onboard.playout import PlayoutConfig
 from vrs.errors import FormatError
 from vrs.model import Array, frozen_array
+from vrs.path_matching import measured_rows
 from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
@@ -105,6 +107,7 @@ class _Reading:
         track = recording.track(REAL)
         t = self._grid(track)
         play, q_real, q_reference = self._real(track, t)
+        measured = measured_rows(q_real)
         again = rerun(recording)
         shown = self._shown(again)
         corrections = self._corrections()
@@ -138,7 +141,8 @@ class _Reading:
             packets=self._packets(answers, messages),
             messages=messages,
             corrections=corrections,
-            events=self._events(t, play, q_reference),
+            events=self._events(t, play, q_reference, measured),
+            gap_s=float(gap_lengths(track, t).sum()),
         )
 
     def _grid(self, track: Track) -> Array:
@@ -162,20 +166,12 @@ class _Reading:
         rows = len(t)
         if np.array_equal(track.t[:rows], t):
             return track.play[:rows], track.q[:rows], track.reference[:rows]
-        if not self._live:
-            self.missing.append("samples of the real robot: it's on lines between those that are there")
-        gaps = np.flatnonzero(np.diff(track.t) > APART)
-        if self._live and len(gaps):
-            longest = float(np.diff(track.t).max())
-            self.missing.append(
-                f"samples of the real robot, for up to {longest:.1f} s: it's on lines between the others"
-            )
-        play = np.maximum.accumulate(np.interp(t, track.t, track.play))
-        q, reference = (
-            np.stack([np.interp(t, track.t, column) for column in table.T], axis=1)
-            for table in (track.q, track.reference)
-        )
-        return play, q, reference
+        self.missing += not_measured(track, t)
+        play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
+        q[track.unmeasured(t)] = np.nan
+        if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
+            raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
+        return np.maximum.accumulate(play), q, reference
 
     def _shown(self, again: Rerun) -> Timeline:
         """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
@@ -233,12 +229,13 @@ class _Reading:
             )
         return tuple(found)
 
-    def _events(self, t: Array, play: Array, q_reference: Array) -> tuple[Event, ...]:
+    def _events(self, t: Array, play: Array, q_reference: Array, measured: NDArray[np.bool_]) -> tuple[Event, ...]:
         events = list(self.recording.events)
         # A whole recording of the laboratory has them.
         whole = self.end is not None and not self._live
         if not whole and self.begin.offset in {ADAPTIVE, OWN}:
-            events += waits(t, play, q_reference, slowest=1.0 - PlayoutConfig().slew)
+            found = waits(t, play, q_reference, slowest=1.0 - PlayoutConfig().slew)
+            events += [one for one in found if measured[np.searchsorted(t, one.t - 1e-9)]]
         return tuple(sorted(event for event in events if event.t <= t[-1]))
 
 

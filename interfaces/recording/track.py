@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from interfaces.recording.driving import messages as d
 from interfaces.recording.log import DECODING, unreadable
@@ -16,8 +17,10 @@ from interfaces.recording.scan import NUMBERS, Blocks
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
-APART = 0.2
-"""Neighbours that are further apart [s] say nothing of what was between them."""
+GAP = 0.1
+"""Between neighbours that are further apart [s] nothing was measured: no line is drawn, and nothing is compared."""
+APART = GAP + 1e-6
+"""The same, with what rounding makes of it."""
 AROUND = 1.5
 """Samples from so long before and after one moment are kept for the next [s]."""
 VIRTUAL, REAL = "/virtual/joints", "/real/joints"
@@ -50,6 +53,31 @@ class Track:
     """Number of the virtual robot's newest edit, (m,); 0 of the real one."""
     block: Array
     """Which block of the file a sample stands in, (m,)."""
+
+    @property
+    def gaps(self) -> Array:
+        """From when to when nothing was measured between two samples [s], (k, 2)."""
+        after = np.flatnonzero(np.diff(self.t) > APART)
+        return np.stack((self.t[after], self.t[after + 1]), axis=1)
+
+    def on(self, t: Array, column: str) -> Array:
+        """Values at times, linear between neighbours, across gaps too, and held outside; see `unmeasured`.
+
+        Args:
+            t: [s], (k,).
+            column: `q`, `play` or `reference`.
+        """
+        values: Array = getattr(self, column)
+        flat = values.reshape(len(values), -1)
+        found = np.stack([np.interp(t, self.t, one) for one in flat.T], axis=1)
+        return found.reshape(len(t), *values.shape[1:])
+
+    def unmeasured(self, t: Array) -> NDArray[np.bool_]:
+        """Whether times [s], (k,), lie in gaps, or outside of the samples."""
+        gaps = self.gaps
+        left = np.searchsorted(gaps[:, 0], t, side="left") - 1
+        inside = (left >= 0) & (t < gaps[np.maximum(left, 0), 1]) if len(gaps) else np.zeros(len(t), dtype=bool)
+        return np.asarray(inside | (t < self.t[0] - 1e-9) | (t > self.t[-1] + 1e-9))
 
 
 class Tracks:
@@ -150,10 +178,26 @@ class Tracks:
         low, high = track.t[right - 1], track.t[right]
         share = (t[inside] - low) / (high - low)
         breaks = self._blocks.breaks(NUMBERS[topic])
-        before, after = track.block[right - 1], track.block[right]
+        # What came late stands in a later block than what was measured after it.
+        before, after = np.sort(np.stack((track.block[right - 1], track.block[right])), axis=0)
         whole = np.searchsorted(breaks, before, "right") == np.searchsorted(breaks, after, "left")
         known = (high - low <= APART) & whole
         if values.ndim > 1:
             share, known = share[:, None], known[:, None]
         found[inside] = np.where(known, values[right - 1] + share * (values[right] - values[right - 1]), np.nan)
         return found
+
+
+def gap_lengths(track: Track, t: Array) -> Array:
+    """How long each span was in which nothing was measured [s], within times [s], (k,)."""
+    outside = np.array([track.t[0] - t[0], t[-1] - track.t[-1]])
+    return np.concatenate((track.gaps[:, 1] - track.gaps[:, 0], outside[outside > 1e-6]))
+
+
+def not_measured(track: Track, t: Array) -> list[str]:
+    """Says for how long nothing was measured within times [s], (k,), if there's such a time."""
+    lengths = gap_lengths(track, t)
+    if not len(lengths):
+        return []
+    what = f"samples of the real robot for {lengths.sum():.1f} s, {lengths.max():.1f} s on end at most"
+    return [f"{what}: nothing is compared there"]

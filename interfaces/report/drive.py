@@ -31,12 +31,15 @@ def render(drive: DriveRun, summary: Mapping[str, Any], events: Sequence[Event])
     case = drive.case
     rows = [(name, shown(summary[key], scale, unit), unit) for key, name, scale, unit in FIGURES]
     facts = "".join(f"<li><span>{name}</span>{escape(str(summary[name]))}</li>" for name in FACTS)
+    facts += f"<li><span>duration</span>{summary['duration_s']:.1f} s</li>"
+    if summary["gap_s"] > 0:
+        facts += f"<li><span>not measured</span>{summary['gap_s']:.1f} s</li>"
     drawn = of_drives({f"{case.architecture}, {case.transport}": drive}, f"{case.robot}, {case.operator}")
     happened = [(f"{event.t:.2f} s", event.kind, event.text) for event in events]
     return Template(_asset("drive.html")).substitute(
         title=escape(str(summary["title"])),
         css=_asset("report.css"),
-        facts=f"{facts}<li><span>duration</span>{summary['duration_s']:.1f} s</li>",
+        facts=facts,
         figures=card("By the definitions of docs/lab.md", table(("", "value", "unit"), rows)),
         pictures="".join(_picture(figure) for figure in drawn),
         events="<h2>Events</h2>" + card("By time", table(("time", "kind", "what"), happened)) if happened else "",

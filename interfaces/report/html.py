@@ -66,6 +66,7 @@ def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:
         "corrections": str(len(run.corrections)),
         "seed": str(run.seed),
         "duration": f"{run.t[-1] - run.t[0]:.1f} s",
+        "not measured": f"{run.gap_s:.1f} s" if run.gap_s > 0 else "",
         "commands": str(len(run.receipts_virtual)),
         "counterfactuals off": order,
     }

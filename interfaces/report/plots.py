@@ -99,8 +99,9 @@ def plots(run: TwinRun) -> tuple[Plot, ...]:
 
 def _tool_error(ax: Axes, run: TwinRun) -> None:
     p_virtual = np.asarray(run.model.forward(run.q_matched))[:, :3, 3]
-    p_real = np.asarray(run.model.forward(run.q_real))[:, :3, 3]
-    distance = 1e3 * np.linalg.norm(p_real - p_virtual, axis=1)
+    distance = np.full(len(run.t), np.nan)
+    p_real = np.asarray(run.model.forward(run.q_real[run.measured]))[:, :3, 3]
+    distance[run.measured] = 1e3 * np.linalg.norm(p_real - p_virtual[run.measured], axis=1)
     ax.plot(*_thin(run.t, distance), color=REAL, linewidth=1.4)
     ax.set_ylim(bottom=0.0)
 
@@ -115,9 +116,9 @@ def _behind(ax: Axes, run: TwinRun) -> None:
     sent, arrived = run.messages.T
     there = np.isfinite(arrived) & (arrived <= run.t[-1])
     delay = arrived[there] - sent[there]
-    behind = -run.D
+    behind = np.where(run.measured, -run.D, np.nan)
     # The delays of a bad network span decades; above what matters here they are drawn at the edge.
-    top = 1.25 * max(float(behind.max()), float(np.quantile(delay, 0.9)) if len(delay) else 0.0, 1e-3)
+    top = 1.25 * max(float(np.nanmax(behind)), float(np.quantile(delay, 0.9)) if len(delay) else 0.0, 1e-3)
     at, height = _thin(arrived[there], np.minimum(delay, top))
     ax.plot(at, height, ".", color=VIRTUAL, markersize=2.2, alpha=0.55, label="message", clip_on=False)
     lost = sent[~np.isfinite(arrived)]
@@ -149,14 +150,18 @@ def _legend(ax: Axes, columns: int) -> None:
 
 
 def _thin(t: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
-    """Keep at most MAX_POINTS samples: of every bucket its extremes, so that no peak is lost."""
+    """Keep at most MAX_POINTS samples: of every bucket its extremes, so that no peak is lost, nor a gap of NaN."""
     x, y = np.asarray(t, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if len(x) <= MAX_POINTS:
         return x, y
     edges = np.linspace(0, len(x), MAX_POINTS // 2 + 1).astype(int)
     picks = {0, len(x) - 1}
+    unknown = np.isnan(y)
+    filled = np.where(unknown, y[~unknown].mean() if not unknown.all() else 0.0, y) if unknown.any() else y
     for low, high in pairwise(edges):
-        picks.update((low + int(np.argmin(y[low:high])), low + int(np.argmax(y[low:high]))))
+        picks.update((low + int(np.argmin(filled[low:high])), low + int(np.argmax(filled[low:high]))))
+        if unknown[low:high].any():
+            picks.add(low + int(np.argmax(unknown[low:high])))
     order = np.array(sorted(picks))
     return x[order], y[order]
 

@@ -234,6 +234,8 @@
       show(t, tReal) {
         for (const [twin, at] of [["virtual", t], ["real", tReal]]) {
           const poses = links(joints(twin, at));
+          // Where nothing was measured, there's no robot.
+          twins[twin].visible = poses[n].every(Number.isFinite);
           twins[twin].children.forEach((link, i) => {
             link.matrix.fromArray(poses[i]);
             link.matrixWorldNeedsUpdate = true;

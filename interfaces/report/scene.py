@@ -28,7 +28,8 @@ def scene(run: TwinRun) -> Json:
 
     Returns:
         A JSON value: `links` (meshes in link frames), `base` and `chain` (constant transforms, column-major),
-        `t`, `q_virtual`, `q_real`, `behind` (−D; base64 of little-endian float32), `floor`, `box` and `markers`.
+        `t`, `q_virtual`, `q_real` (NaN where nothing was measured), `behind` (−D; base64 of little-endian
+        float32), `floor`, `box` and `markers`.
 
     Raises:
         InvalidValueError: If the model isn't a chain of revolute joints in standard Denavit-Hartenberg frames.
@@ -98,7 +99,7 @@ def markers(run: TwinRun) -> list[Json]:
 def _box(run: TwinRun, floor: float) -> tuple[list[float], list[float]]:
     """Corners of what the camera must see: the pedestal, every link origin of both twins, some margin."""
     stride = max(1, len(run.t) // 400)
-    q = np.concatenate([run.q_shown[::stride], run.q_real[::stride]])
+    q = np.concatenate([run.q_shown[::stride], run.q_real[run.measured][::stride]])
     points = np.asarray(run.model.links(q))[:, :, :3, 3].reshape(-1, 3)
     low = np.minimum(points.min(axis=0), (-0.2, -0.2, floor)) - 0.05
     high = np.maximum(points.max(axis=0), (0.2, 0.2, 0.15)) + 0.05

@@ -40,13 +40,17 @@ def summarize(
     Returns:
         A JSON value; `docs/summary.md` describes its fields. The same run gives the same value.
     """
-    lag, D = best_lag(run.t, run.q_matched, run.q_real), float(run.D.mean())
+    seen = run.measured
+    lag, D = best_lag(run.t, run.q_matched, run.q_real), float(run.D[seen].mean())
     aligned = run.q_matched if lag is None else shifted(run.t, run.q_matched, -lag)
     errors = {
-        "timeline_time": agreement(run.model, run.q_matched, run.q_real),
-        "lag_removed": agreement(run.model, aligned, run.q_real),
-        "user_time": agreement(run.model, run.q_shown, run.q_real),
-        "servo": agreement(run.model, run.q_reference, run.q_real),
+        name: agreement(run.model, q[seen], run.q_real[seen])
+        for name, q in (
+            ("timeline_time", run.q_matched),
+            ("lag_removed", aligned),
+            ("user_time", run.q_shown),
+            ("servo", run.q_reference),
+        )
     }
     value = {
         "schema": SCHEMA,
@@ -61,6 +65,7 @@ def summarize(
         "behind": _behind(run),
         "messages": _messages(run),
         "duration_s": float(run.t[-1]),
+        "gap_s": run.gap_s,
         "commands": _commands(run),
         "errors": {name: _errors(value) for name, value in errors.items()},
         "lag_timeline_s": lag,
@@ -117,7 +122,7 @@ def _commands(run: TwinRun) -> Json:
 
 def _behind(run: TwinRun) -> Json:
     """How far the real robot played behind the operator."""
-    behind = -run.D
+    behind = -run.D[run.measured]
     kinds = [event.kind for event in run.events]
     return {
         "mean_s": float(behind.mean()),
@@ -157,7 +162,8 @@ def _errors(value: Agreement) -> Json:
 
 def _path(run: TwinRun) -> Json:
     """Tool path and time difference in user time, in the metres and seconds of `docs/summary.md`."""
-    p_virtual, p_real = (run.model.forward(q)[:, :3, 3] for q in (run.q_virtual, run.q_real))
+    p_virtual, p_real = run.model.forward(run.q_virtual)[:, :3, 3], np.full((len(run.t), 3), np.nan)
+    p_real[run.measured] = run.model.forward(run.q_real[run.measured])[:, :3, 3]
     steps = np.linalg.norm(np.diff(p_virtual, axis=0), axis=1)
     cell = max(0.01, float(steps.sum()) / MOST_CELLS)
     v_max = max(0.5, float(steps.max()) / run.dt)

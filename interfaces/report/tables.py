@@ -115,6 +115,11 @@ def time_lines(summary: Json) -> list[str]:
         f"{_counts(commands['real'])}; {commands['sent']} sent, {commands['lost']} lost, "
         f"{commands['late']} late; the virtual robot was corrected {_times(commands['corrections'])}.",
     ]
+    if summary["gap_s"] > 0:
+        lines.append(
+            f"Of the {summary['duration_s']:.1f} s, the real robot wasn't measured for {summary['gap_s']:.1f} s: "
+            "nothing then is in any figure."
+        )
     if path["progress"] is not None and path["progress"] < 0.97:
         lines.append(
             f"The real robot reached {path['progress']:.1%} of the path: the means above don't compare; "

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from interfaces.teleop import Correction
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
+from vrs.path_matching import measured_rows
 from vrs.receipt import Receipt
 
 
@@ -74,7 +76,7 @@ class TwinRun:
     q_matched: Array
     """Joints of the virtual robot, as the commands make it, at timeline time p(t) [rad], (k, n)."""
     q_real: Array
-    """Joints of the real robot as measured at user time t [rad], (k, n)."""
+    """Joints of the real robot as measured at user time t [rad], (k, n); rows of NaN where nothing was measured."""
     q_reference: Array
     """What the real robot's own timeline asked for at that moment [rad], (k, n)."""
     receipts_virtual: tuple[Receipt, ...]
@@ -90,6 +92,8 @@ class TwinRun:
     """When the virtual robot was put where the real one was going."""
     events: tuple[Event, ...]
     """Everything else that happened, by time, kind and text."""
+    gap_s: float = 0.0
+    """For how long nothing was measured of the real robot, between its first and its last sample [s]."""
 
     def __post_init__(self) -> None:
         for name in ("t", "play", "messages"):
@@ -105,6 +109,11 @@ class TwinRun:
             if value.ndim != 2 or len(value) != len(self.t):
                 raise InvalidValueError(name, value.shape, f"of shape ({len(self.t)}, n)")
             object.__setattr__(self, name, value)
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Whether the real robot was measured at user time t, (k,): figures are of those rows alone."""
+        return measured_rows(self.q_real)
 
     @property
     def dt(self) -> float:

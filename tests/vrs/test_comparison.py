@@ -68,6 +68,29 @@ def test_holds_on_the_way_do_not_count_as_delay():
     assert result.time_difference_max == pytest.approx(0.52, abs=0.06)
 
 
+@pytest.mark.parametrize("delay", [1.0, 6.0])
+@pytest.mark.parametrize("gaps", [[(5.0, 7.0)], [(0.0, 3.0), (11.3, 11.5), (20.0, 24.0)], [(16.0, 99.0)]])
+def test_what_was_not_measured_counts_nowhere(gaps, delay):
+    """A figure eight replayed later, of which parts weren't measured: what stands there is no matter."""
+    follower = figure_eight(t - delay)
+    whole = compare_paths(t, figure_eight(t), follower)
+    for since, until in gaps:
+        follower[(t > since) & (t < until)] = np.nan
+    found = compare_paths(t, figure_eight(t), follower)
+    assert found.time_difference_mean == pytest.approx(delay, abs=1e-3)
+    assert found.time_difference_max < whole.time_difference_max + 0.01
+    assert found.path_error_max <= whole.path_error_max <= 5e-4
+    assert found.speed_error < 0.02
+    assert best_lag(t, figure_eight(t), follower) == pytest.approx(delay, abs=1e-3)
+
+
+def test_nothing_measured_is_an_error():
+    unknown = np.full((len(t), 3), np.nan)
+    with pytest.raises(InvalidValueError, match="measured"):
+        compare_paths(t, figure_eight(t), unknown)
+    assert best_lag(t, figure_eight(t), unknown) is None
+
+
 def test_a_leader_at_rest_defines_no_delay():
     rest = np.zeros((len(t), 3))
     result = compare_paths(t, rest, rest + np.array([0.03, 0, 0]))

@@ -12,7 +12,7 @@ from interfaces.lab.driving.run import Case, DriveRun
 from interfaces.lab.driving.sweep import row_of
 from interfaces.recording.driving.pursuit import FARTHEST, matchable
 from interfaces.recording.rerun import rerun
-from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, Track
+from interfaces.recording.track import ESTIMATED, GAP, MEASURED, REAL_POSTURE, Track, gap_lengths, not_measured
 from interfaces.teleop.architectures import Transport
 from robots.ipr.robot import Collision
 from vrs.errors import FormatError, InvalidValueError
@@ -36,6 +36,8 @@ class Driven:
     drive: DriveRun
     missing: tuple[str, ...]
     """What isn't in the recording, and what stands for it; nothing in a whole one."""
+    gap_s: float
+    """For how long nothing was measured of the real robot, between its samples [s]."""
 
 
 def summary(recording: Recording) -> dict[str, Any]:
@@ -55,6 +57,7 @@ def figures_of(recording: Recording, found: Driven) -> dict[str, Any]:
         "schema": SCHEMA,
         "title": recording.session.title,
         "duration_s": float(found.drive.t[-1] - found.drive.t[0]),
+        "gap_s": found.gap_s,
         **facts_of(row_of(found.drive)),
     }
 
@@ -70,8 +73,12 @@ def driven(recording: Recording) -> Driven:
         missing.append(f"the recording is damaged: {recording.damage}")
     track = recording.track(REAL_POSTURE)
     t = _grid(recording, track)
+    missing += not_measured(track, t)
+    real = _on(t, track.t, track.q)
     if len(t) != len(track.t):
-        missing.append("samples of the real robot: it's on lines between those that are there")
+        real[track.unmeasured(t)] = np.nan
+        if len(track.gaps) == len(track.t) - 1:
+            raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
     packets = [entry for entry in recording.link if entry.direction == "forward"]
     case = _case(recording)
     taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
@@ -79,7 +86,7 @@ def driven(recording: Recording) -> Driven:
         case=case,
         t=t,
         virtual=_virtual(recording, t, missing),
-        real=_on(t, track.t, track.q),
+        real=real,
         measured=_sampled(recording, MEASURED, t),
         estimated=_sampled(recording, ESTIMATED, t),
         drives=_on(t, track.t, track.reference),
@@ -90,7 +97,7 @@ def driven(recording: Recording) -> Driven:
         reported_bytes=sum(entry.size for entry in recording.link if entry.direction == "backward"),
         learned=(),
     )  # fmt: skip
-    return Driven(drive, tuple(missing))
+    return Driven(drive, tuple(missing), float(gap_lengths(track, t).sum()))
 
 
 def _case(recording: Recording) -> Case:

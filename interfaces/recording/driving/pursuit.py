@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vrs.model import Array
-from vrs.path_matching import PathMatch, match_paths
+from vrs.path_matching import PathMatch, match_paths, measured_rows
 
 if TYPE_CHECKING:
     from interfaces.recording.recording import Recording
@@ -33,6 +33,8 @@ class Pursuit:
         """Take a recording."""
         self._recording = recording
         self._match: PathMatch | None = None
+        self._beside = self._reached = np.empty(0), np.empty(0)
+        """Of what was measured: times and distances; when places along the path were reached, and those."""
         self._place: Array = np.empty(0)
         self._moments: Array = np.empty(0)
         self._until = -np.inf
@@ -44,12 +46,19 @@ class Pursuit:
             return
         self._until, self._match = until, None
         track = self._recording.track(self._recording.kind.real)
-        virtual = self._recording.virtual(track.t)
-        known = np.isfinite(virtual).all(axis=1)
+        # A row without a measurement in each gap: nothing is known on either side of it.
+        moments = np.union1d(track.t, track.gaps.mean(axis=1))
+        real = track.on(moments, "q")
+        real[~np.isin(moments, track.t)] = np.nan
+        virtual = self._recording.virtual(moments)
+        known = measured_rows(virtual)
         if not 2 <= np.count_nonzero(known) <= MOST or not matchable(virtual[known]):
             return
-        t, leader = track.t[known], virtual[known, :2]
-        self._match = match_paths(t, leader, track.q[known, :2])
+        t, leader = moments[known], virtual[known, :2]
+        match = self._match = match_paths(t, leader, real[known, :2])
+        seen, there = np.isfinite(match.distance), np.isfinite(match.t_follower)
+        self._beside = match.t[seen], match.distance[seen]
+        self._reached = match.t_follower[there], match.s[: len(there)][there]
         self._moments = t
         self._place = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(leader, axis=0), axis=1))))
 
@@ -59,9 +68,9 @@ class Pursuit:
         match = self._match
         if match is None:
             return None
-        reached = len(match.t_follower)
-        whole = reached == len(match.s) and t >= match.t_follower[-1]
-        s = self._place[-1] if whole else float(np.interp(t, match.t_follower, match.s[:reached]))
+        reached, places = self._reached
+        whole = len(match.t_follower) == len(match.s) and t >= match.t_follower[-1]
+        s = self._place[-1] if whole or not len(reached) else float(np.interp(t, reached, places))
         after = int(np.searchsorted(self._place, s + 1e-9, side="right"))
         if after == len(self._place):
             return t
@@ -73,4 +82,4 @@ class Pursuit:
     def error(self, t: float, q_real: Array, play: float) -> float | None:  # noqa: ARG002 - the match knows them
         """How far the real robot is beside the virtual one's path at a time [m]."""
         self.prepare()
-        return None if self._match is None else float(np.interp(t, self._match.t, self._match.distance))
+        return None if self._match is None else float(np.interp(t, *self._beside))

@@ -174,7 +174,7 @@ def test_of_a_cut_file_the_figures_are_those_until_then_and_say_what_is_missing(
     ]
 
 
-def test_of_a_file_with_a_destroyed_block_lines_stand_for_samples_and_it_says_so(whole, tmp_path):
+def test_of_a_file_with_a_destroyed_block_what_is_left_is_compared_and_it_says_so(whole, tmp_path):
     run, path = whole
     data = bytearray(path.read_bytes())
     middle = len(data) // 2
@@ -183,10 +183,17 @@ def test_of_a_file_with_a_destroyed_block_lines_stand_for_samples_and_it_says_so
     with open_recording(tmp_path / "bad.mcap") as recording:
         found = figures(recording)
     assert any("block" in line for line in found.missing)
-    assert np.isfinite(found.run.q_real).all()
+    seen = found.run.measured
     assert len(found.run.t) == len(run.t)
-    assert np.abs(found.run.q_real - run.q_real).max() < 0.2
-    assert summarize(found.run)["duration_s"] == summarize(run)["duration_s"]
+    assert 0 < np.count_nonzero(~seen) < 20
+    assert np.array_equal(found.run.q_real[seen], run.q_real[seen])
+    value, whole_ = summarize(found.run), summarize(run)
+    assert value["duration_s"] == whole_["duration_s"]
+    assert value["gap_s"] == pytest.approx(0.02 * (np.count_nonzero(~seen) + 1), abs=1e-9)
+    for name in ("timeline_time", "user_time", "servo"):
+        errors = value["errors"][name]
+        assert errors["tool_max_m"] <= whole_["errors"][name]["tool_max_m"] + 1e-9
+    assert any(f"for {value['gap_s']:.1f} s" in line for line in found.missing)
 
 
 def test_a_file_without_samples_is_refused(tmp_path):
