@@ -30,10 +30,10 @@ from interfaces.recording.messages import (
     VirtualSample,
     segment_entries,
 )
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, virtual_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
 from interfaces.stream.wire.commands import command_wire
 from interfaces.stream.wire.fields import text
-from interfaces.teleop import Correction, Deed, OperatorSite, Report
+from interfaces.teleop import Correction, Deed, OperatorSite, Report, Sample
 from vrs.commands import Profile
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
@@ -54,10 +54,6 @@ _WAITING = 1024
 """Things that happened and weren't written yet, at most."""
 _WATCHED = 64
 """Newest commands whose receipts are looked at for changes."""
-_MOVED = 1e-6
-"""A robot whose joints differ by more [rad] has moved."""
-_STILL = 1.0
-"""How often a robot that stands is shown [s]."""
 
 
 class Put(Protocol):
@@ -73,33 +69,6 @@ class _Happened(NamedTuple):
     what: Deed | tuple[Correction, Timeline]
     before: Timeline
     after: Timeline
-
-
-class Paced:
-    """Chooses what is shown at a lower rate: not more often than that, and seldom while nothing moves."""
-
-    def __init__(self, rate: float) -> None:
-        """Show so often a second, at most."""
-        self._period = 1.0 / rate
-        self._at, self._q = -math.inf, np.empty(0)
-
-    def chosen(self, t: Array, q: Array) -> list[int]:
-        """Rows to show.
-
-        Args:
-            t: Ascending times [s], (k,).
-            q: Joints [rad], (k, n).
-        """
-        found = []
-        for row, now in enumerate(t.tolist()):
-            since = now - self._at
-            if since < self._period - 1e-9:
-                continue
-            if since < _STILL - 1e-9 and np.abs(q[row] - self._q).max() <= _MOVED:
-                continue
-            self._at, self._q = now, q[row]
-            found.append(row)
-        return found
 
 
 class Capture:
@@ -175,6 +144,9 @@ class Capture:
 
     def reported(self, report: Report, *, now: float) -> None:
         """Drivers that know the real robot by its reports alone take them."""
+
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
+        """The same of samples."""
 
     def _note(self, what: Deed | tuple[Correction, Timeline]) -> None:
         before, self._timeline = self._timeline, self.operator.engine.timeline

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from interfaces.recording.capture import Capture, Paced, late_of
+from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.messages import Begin, End, EventEntry, RealSample
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.recording.sink import Sink
 from interfaces.runtime.happenings import correction_events
 from interfaces.software import software
 from interfaces.stream.wire import fields
-from interfaces.teleop import Correction, Deed, Report, RobotLine
+from interfaces.teleop import Correction, Deed, Report, RobotLine, Sample
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
@@ -32,8 +33,8 @@ _SAME = 1e-9
 """Times nearer than this [s] are one."""
 _ASKED = 4096
 """Commands whose answers are waited for, at most."""
-_REPORTS = 256
-"""Reports that wait for the next turn, at most."""
+_SAMPLES = 8192
+"""Samples of the real robot that wait for the next turn, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +59,8 @@ class _LiveCapture(Capture):
     def __init__(self, line: RobotLine, model: RobotModel, now: float) -> None:
         super().__init__(line.operator, model, now=now, step=1.0 / RATE, every=False, apart=True)
         self._asked: OrderedDict[int, float] = OrderedDict()
-        self._reports: list[Report] = []
-        self._measured = -np.inf
+        self._since = now
+        self._samples: list[Sample] = []
         self._halted = self._followed = False
 
     def commanded(self, deed: Deed) -> None:
@@ -91,9 +92,10 @@ class _LiveCapture(Capture):
         elif not halted and (self._halted or not self._followed):
             self.tell(now, "followed", "the real robot follows the operator")
         self._halted, self._followed = halted, self._followed or not halted
-        if report.measured_at > self._measured and len(self._reports) < _REPORTS:
-            self._measured = report.measured_at
-            self._reports.append(report)
+
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:  # noqa: ARG002 - they have times of their own
+        # What was measured before the recording began is compared with nothing in it.
+        self._samples += [one for one in samples if one.t >= self._since][: _SAMPLES - len(self._samples)]
 
     def tell(self, t: float, kind: str, text: str) -> None:
         """Write down an event."""
@@ -103,10 +105,10 @@ class _LiveCapture(Capture):
         """Let the links of a robot, `virtual` or `real`, be shown; see `show`."""
         self.show(paced, t, q, self.model.links, lambda now, X: link_transforms(now, ((robot, X[1:]),)))
 
-    def reports(self) -> list[Report]:
-        """Those that came since the last time."""
-        reports, self._reports = self._reports, []
-        return reports
+    def samples(self) -> list[Sample]:
+        """Those that came since the last time, by time."""
+        samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
+        return samples
 
 
 class LiveRecorder:
@@ -205,17 +207,17 @@ class LiveRecorder:
         capture.link("forward", link.forward.log.take())
         capture.link("backward", link.backward.log.take())
         capture.show_links("virtual", capture.links, *capture.advance(now=now))
-        self._tell_reports(capture)
+        self._tell_samples(capture)
         capture.write_out()
 
-    def _tell_reports(self, capture: _LiveCapture) -> None:
-        reports = capture.reports()
-        if not reports:
+    def _tell_samples(self, capture: _LiveCapture) -> None:
+        samples = capture.samples()
+        if not samples:
             return
-        t = np.array([report.measured_at for report in reports])
-        q = np.array([report.q for report in reports])
-        for now, joints, report in zip(t.tolist(), q.tolist(), reports, strict=True):
-            capture.add(now, RealSample(now, report.q_at, joints))
+        t = np.array([sample.t for sample in samples])
+        q = np.array([sample.q for sample in samples])
+        for now, joints, sample in zip(t.tolist(), q.tolist(), samples, strict=True):
+            capture.add(now, RealSample(now, sample.play, joints))
         capture.show(self._real, t, q, capture.model.forward, real_pose)
         capture.show_links("real", self._real_links, t, q)
 

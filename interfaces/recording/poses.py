@@ -22,6 +22,12 @@ POSE_RATE = 6.0
 LINK_RATE = 6.0
 """Messages with links a second, at most; one a second when both robots stand."""
 _NANO = 10**9
+_MOVED = 1e-6
+"""A robot whose joints differ by more [rad] has moved."""
+_SHOWN = 512
+"""What was shown last is known so far back: later ones come between these, or aren't shown."""
+_STILL = 1.0
+"""How often a robot that stands is shown [s]."""
 
 
 class Timestamp(Wire, frozen=True, gc=False):
@@ -177,3 +183,39 @@ def quaternions(R: Array) -> Array:
     best /= np.sqrt((best * best).sum(1))[:, None]
     best[best[:, 3] < 0] *= -1.0
     return best
+
+
+class Paced:
+    """Chooses what is shown at a lower rate: not more often than that, and seldom while nothing moves."""
+
+    def __init__(self, rate: float) -> None:
+        """Show so often a second, at most."""
+        self._period = 1.0 / rate
+        self._shown: list[tuple[float, Array]] = []
+
+    def chosen(self, t: Array, q: Array) -> list[int]:
+        """Rows to show; what comes late is, where nothing beside it was.
+
+        Args:
+            t: Ascending times [s], (k,).
+            q: Joints [rad], (k, n).
+        """
+        found, shown = [], self._shown
+        for row, now in enumerate(t.tolist()):
+            place = len(shown)
+            while place and shown[place - 1][0] > now:
+                place -= 1
+            if place < len(shown) and shown[place][0] - now < self._period - 1e-9:
+                continue
+            if place:
+                since = now - shown[place - 1][0]
+                if since < self._period - 1e-9:
+                    continue
+                if since < _STILL - 1e-9 and np.abs(q[row] - shown[place - 1][1]).max() <= _MOVED:
+                    continue
+            elif len(shown) == _SHOWN:
+                continue
+            shown.insert(place, (now, q[row]))
+            del shown[: len(shown) - _SHOWN]
+            found.append(row)
+        return found

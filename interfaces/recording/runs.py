@@ -10,11 +10,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from interfaces.recording.capture import Capture, Paced
+from interfaces.recording.capture import Capture
 from interfaces.recording.channels import Message
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.messages import Begin, End, EventEntry, PacketEntry, RealSample
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runtime.attribution import CAUSES, Attribution, Measures, OffsetOutcome

@@ -306,6 +306,8 @@ class State:
     messages: tuple[tuple[float, float | None], ...] = ()
     """Messages to the robot of which the emulated link told since the state before: when each was sent, and when it
     arrived [s]; None for one that was lost."""
+    late: tuple[tuple[float, Array], ...] = ()
+    """Measurements that came late: session time [s], and joints [rad], (n,). Some are told twice."""
 
 
 Question: TypeAlias = (

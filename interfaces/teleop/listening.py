@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+from interfaces.teleop.measured import Sample
 from interfaces.teleop.messages import Report
 from vrs.commands import Command
 from vrs.model import Array
@@ -50,3 +52,6 @@ class Listener(Protocol):
 
     def reported(self, report: Report, *, now: float) -> None:
         """A report has come that is newer than all before."""
+
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
+        """Samples of the robot have come that weren't known: mostly the newest, some of them late."""

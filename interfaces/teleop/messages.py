@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from interfaces.teleop.measured import Ranges, Sample
 from vrs.commands import Command
 from vrs.model import Array
 from vrs.receipt import Receipt
@@ -44,6 +45,8 @@ class Orders:
     """Number of the newest report that came."""
     entries: tuple[Entry, ...] = ()
     """New ones, and older ones that may have been lost."""
+    wanted: Ranges = ()
+    """Samples that are missing; see `interfaces.teleop.measured`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,3 +97,7 @@ class Report:
     """What the robot's own timeline asked for at `measured_at` [rad], (n,); None where it doesn't say."""
     uncertainty: float | None = None
     """Bound on the error of what it takes for the operator's clock [s]; None where that isn't known."""
+    samples: tuple[Sample, ...] = ()
+    """Where it was measured since the report before, and earlier samples that are missing at the operator's."""
+    oldest: int = 0
+    """Number of the oldest sample that it keeps; 0 where it keeps none."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.teleop.listening import Correction, Deed, Listener
+from interfaces.teleop.measured import Gathering, Sample
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from vrs.checks import number_in
 from vrs.clock import ManualClock
@@ -167,6 +168,8 @@ class OperatorSite:
         self._measured_since = -np.inf
         self._patience = 2.0 * self.config.beat + 1.0
         """After how long without an answer an entry counts as lost [s]."""
+        self.gathering = Gathering()
+        """Where the robot was measured."""
         self._compared: tuple[int, ...] = ()
         """Versions of the plans, and entries under way, that were found to lead the same way."""
 
@@ -229,15 +232,20 @@ class OperatorSite:
             under_way.move_to_end(number)
         entries = tuple(under_way[n][0] for n in sorted({*chosen, *lost}) if n in under_way)
         heard = 0 if self.report is None else self.report.number
-        return (Orders(self.epoch, self._packets, now, self._entries, now, self._began, heard, entries),)
+        wanted = self.gathering.wanted(now=now, patience=patience)
+        return (Orders(self.epoch, self._packets, now, self._entries, now, self._began, heard, entries, wanted),)
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
         return self._clock.now() if self._new else self._due
 
     def receive(self, report: Report, *, now: float) -> None:
-        """Take in a report of the robot."""
+        """Take in a report of the robot; where it was measured counts whatever the epoch, and however late."""
         self._clock.set(now)
+        samples = report.samples if report.oldest else (Sample(0, report.measured_at, report.q_at, report.q),)
+        found = self.gathering.take(samples, report.oldest, now=now)
+        if found and self.listener is not None:
+            self.listener.measured(found, now=now)
         if report.epoch != self.epoch:
             return
         for number, receipt in report.receipts:

@@ -19,6 +19,7 @@ import numpy as np
 
 from interfaces.site import engine_time
 from interfaces.teleop.hosting import lost
+from interfaces.teleop.measured import SampleLog
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.received import ReceivedLog
@@ -113,7 +114,7 @@ class RobotSite:
             q: Joints [rad], (n,).
             now: By the robot's clock [s].
             config: How to behave.
-            reported: Number of the last report of an earlier life, which the operator may know.
+            reported: Number that no report or sample of an earlier life, which the operator may know, was above.
         """
         self.config = RobotSiteConfig() if config is None else config
         self._model = model
@@ -136,6 +137,7 @@ class RobotSite:
         self._reports = reported
         self._due = now
         self._measured, self._measured_at = np.array(q, float), (now, self._play_at(now))
+        self._samples = SampleLog(len(self._measured), reported)
         self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
         self._verdict = Verdict.FRESH
 
@@ -173,6 +175,7 @@ class RobotSite:
             correction: The robot's clock less the operator's, as far as it's known now [s].
             uncertainty: Of that [s].
         """
+        self._samples.ask(orders.wanted)
         self.advance_play(now=now)
         if orders.epoch > self.epoch and self.rests(now=now):
             self._begin(orders, now)
@@ -320,6 +323,7 @@ class RobotSite:
         at = now if at is None else at
         p = float(self.play_at(np.array([at])).p[0])
         self._measured, self._measured_at = np.array(q, float), (at, p)
+        self._samples.add(at, p, self._measured)
         if self.halted or self.epoch == 0:
             return False
         away = np.abs(q - self.engine.timeline.sample(p))
@@ -373,7 +377,7 @@ class RobotSite:
         return Report(
             self.epoch, self._reports, now, self._newest, self._log.executed, float(p[0]), float(pace[0]), q,
             *self._measured_at, self.halted, self._told(), plan, self.engine.timeline.sample(self._measured_at[1]),
-            self._uncertainty,
+            self._uncertainty, self._samples.take(), self._samples.oldest,
         )  # fmt: skip
 
     def _told(self) -> tuple[tuple[int, Receipt], ...]:

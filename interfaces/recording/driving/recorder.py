@@ -14,7 +14,6 @@ import numpy as np
 
 from interfaces.lab.driving.run import Case, DriveLink, DriveRun
 from interfaces.link import PacketRecord
-from interfaces.recording.capture import Paced
 from interfaces.recording.channels import Message
 from interfaces.recording.driving import messages as d
 from interfaces.recording.driving.arcs import edit_entries, whole_entries
@@ -22,7 +21,7 @@ from interfaces.recording.driving.figures import COLLISION
 from interfaces.recording.driving.rooms import grid_facts, room_entry
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.messages import Begin, CommandEntry, End, EventEntry, LinkEntry
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, frames, placed_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, placed_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
 from interfaces.software import software

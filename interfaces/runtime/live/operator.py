@@ -39,6 +39,8 @@ from vrs.model import Array, RobotModel
 
 SHOW = 1.0 / 60.0
 """Time between two frames of the view [s]."""
+TOLD_AGAIN = 0.2
+"""Clients are told of a late measurement for so long [s]: not every state reaches everyone."""
 UNHEARD = 0.75
 """A robot of which nothing has come for so long [s] isn't connected, as clients are told."""
 GONE = 2.0
@@ -211,7 +213,7 @@ class LiveOperator:
         if self._wants_resume and (not self.operator.halted or not self.operator.resume(now=now)):
             self._wants_resume = False
         self._end_lease(now)
-        self._show()
+        self._show(now)
         if self.operator.engine.timeline.version != version:
             self.server.kick()
         return self.line.next_deadline()
@@ -263,7 +265,7 @@ class LiveOperator:
         """Whether the robot's site is heard of."""
         return self.line.connected and self.clock.now() - self.robot.heard < UNHEARD
 
-    def _show(self) -> None:
+    def _show(self, now: float) -> None:
         """Tell clients where the real robot is, when that's news."""
         report = self.operator.report
         shown = report, self.connected, self.operator.halted
@@ -288,6 +290,7 @@ class LiveOperator:
                 reference=report.reference,
                 round_trip=self.operator.round_trip,
                 messages=self.line.messages(),
+                late=tuple((one.t, one.q) for one in self.operator.gathering.late(since=now - TOLD_AGAIN)),
             )
         )
         self.server.kick()

@@ -16,21 +16,32 @@ export class History {
     station.on("state", (state) => this.add(state));
   }
 
-  add({ t, q }) {
-    if (this.rows.length && t <= this.rows.at(-1).t) return;
-    this.rows.push({ t, q });
+  add({ t, q, late }) {
+    for (const [then, joints] of late ?? []) this.put(then, joints);
+    this.put(t, q);
     if (this.rows.length > KEPT + 1000) this.rows.splice(0, 1000);
   }
 
-  /** Joints that were measured last before t [s]; null where that's too long ago. */
-  at(t) {
+  /** Take a measurement to its place; what came late may come twice. */
+  put(t, q) {
+    const place = this.after(t);
+    if (this.rows[place - 1]?.t !== t) this.rows.splice(place, 0, { t, q });
+  }
+
+  /** How many measurements aren't later than t [s]. */
+  after(t) {
     let [low, high] = [0, this.rows.length];
     while (low < high) {
       const middle = (low + high) >> 1;
       if (this.rows[middle].t <= t) low = middle + 1;
       else high = middle;
     }
-    const row = this.rows[low - 1];
+    return low;
+  }
+
+  /** Joints that were measured last before t [s]; null where that's too long ago. */
+  at(t) {
+    const row = this.rows[this.after(t) - 1];
     return row && t - row.t <= LASTS ? row.q : null;
   }
 }

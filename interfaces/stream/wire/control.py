@@ -34,6 +34,8 @@ from vrs.model import Limits
 
 MOST_MESSAGES = 64
 """Messages to the robot that a state tells of, at most."""
+MOST_LATE = 128
+"""Measurements that a state tells late, at most."""
 
 
 class HelloWire(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
@@ -312,6 +314,7 @@ class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state")
     reference: Joints | None = None
     round_trip: Value | None = None
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
+    late: Annotated[tuple[tuple[Time, Joints], ...], Meta(max_length=MOST_LATE)] = ()
 
     @classmethod
     def of(cls, value: control.State, packed: bool) -> StateWire:  # noqa: ARG003 - the same in both encodings
@@ -319,7 +322,8 @@ class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state")
         where = value.play, value.pace, value.D, value.following_error
         rest = digits(value.epoch), value.connected, text(value.halted), value.corrections
         reference = None if value.reference is None else numbers(value.reference)
-        link = value.round_trip, value.messages[-MOST_MESSAGES:]
+        late = tuple((t, numbers(q)) for t, q in value.late[-MOST_LATE:])
+        link = value.round_trip, value.messages[-MOST_MESSAGES:], late
         return cls(value.number, value.t, numbers(value.q), *where, *rest, reference, *link)
 
     def read(self) -> control.State:
@@ -327,5 +331,5 @@ class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state")
         where = self.play, self.pace, self.D, self.following_error
         rest = epoch(self.epoch), self.connected, self.halted, self.corrections
         reference = None if self.reference is None else array(self.reference)
-        link = self.round_trip, self.messages
+        link = self.round_trip, self.messages, tuple((t, array(q)) for t, q in self.late)
         return control.State(self.number, self.t, array(self.q), *where, *rest, reference, *link)

@@ -24,6 +24,7 @@ from interfaces.stream.wire.fields import (
     text,
 )
 from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
+from interfaces.teleop.measured import AGAIN, NEW, RANGES, Sample
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 
 MOST_ENTRIES = 4096
@@ -59,19 +60,20 @@ class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders
     epoch_began: Time
     heard: Count = 0
     entries: Annotated[tuple[EntryWire, ...], Meta(max_length=MOST_ENTRIES)] = ()
+    wanted: Annotated[tuple[tuple[Number, Number], ...], Meta(max_length=RANGES)] = ()
 
     @classmethod
     def of(cls, value: Orders, packed: bool) -> OrdersWire:
         """See `Message.of`."""
         times = value.newest, value.complete_until, value.epoch_began
         entries = tuple(EntryWire.of(entry, packed) for entry in value.entries)
-        return cls(str(value.epoch), value.number, value.sent_at, *times, value.heard, entries)
+        return cls(str(value.epoch), value.number, value.sent_at, *times, value.heard, entries, value.wanted)
 
     def read(self) -> Orders:
         """The orders."""
         times = self.newest, self.complete_until, self.epoch_began
         entries = tuple(entry.read() for entry in self.entries)
-        return Orders(epoch(self.epoch), self.number, self.sent_at, *times, self.heard, entries)
+        return Orders(epoch(self.epoch), self.number, self.sent_at, *times, self.heard, entries, self.wanted)
 
 
 class PlanPartWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
@@ -95,6 +97,15 @@ class PlanPartWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
         return PlanPart(self.version, self.since, array(self.initial), segments)
 
 
+class SampleWire(Wire, frozen=True, array_like=True, gc=False):
+    """`Sample`, as an array."""
+
+    number: Number
+    t: Stamp
+    play: Time
+    q: Joints
+
+
 class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False, tag="report"):
     """`Report`."""
 
@@ -113,6 +124,8 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
     plan: PlanPartWire[C] | None = None
     reference: Joints | None = None
     uncertainty: Annotated[float, Meta(ge=0, le=1e12)] | None = None
+    samples: Annotated[tuple[SampleWire, ...], Meta(max_length=NEW + AGAIN)] = ()
+    oldest: Count = 0
 
     @classmethod
     def of(cls, value: Report, packed: bool) -> ReportWire[C]:
@@ -133,6 +146,8 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             None if value.plan is None else PlanPartWire.of(value.plan, packed),
             None if value.reference is None else numbers(value.reference),
             value.uncertainty,
+            tuple(SampleWire(one.number, one.t, one.play, numbers(one.q)) for one in value.samples),
+            value.oldest,
         )
 
     def read(self) -> Report:
@@ -153,4 +168,6 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             None if self.plan is None else self.plan.read(),
             None if self.reference is None else array(self.reference),
             self.uncertainty,
+            tuple(Sample(one.number, one.t, one.play, array(one.q)) for one in self.samples),
+            self.oldest,
         )

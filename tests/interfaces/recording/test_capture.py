@@ -51,6 +51,9 @@ class Heard:
     def reported(self, report, *, now):
         self.reports.append((report, now))
 
+    def measured(self, samples, *, now):
+        pass
+
 
 def test_a_site_tells_every_command_once_with_the_time_and_the_receipt():
     site = OperatorSite(MODEL, NOMINAL, now=0.0)
@@ -220,6 +223,18 @@ def test_what_moves_is_shown_at_a_rate_and_what_stands_once_a_second():
     assert times[times < 2.0] == pytest.approx(np.arange(0.0, 2.0, 0.1))
     assert np.diff(times[times > 2.05]) == pytest.approx(1.0)
     assert len(times[times > 2.05]) == 1 or np.diff(times).max() <= 1.0 + 1e-9
+
+
+def test_what_comes_late_is_shown_where_nothing_beside_it_was():
+    shown = Paced(10.0)
+    t = np.arange(0.0, 4.0, 0.02)
+    q = t[:, None] * np.ones(6)
+    late = (t > 1.0) & (t < 2.0)
+    times = t[~late][shown.chosen(t[~late], q[~late])]
+    assert not ((times > 1.05) & (times < 2.0)).any()
+    found = t[late][shown.chosen(t[late], q[late])]
+    assert found == pytest.approx(np.arange(1.1, 1.95, 0.1), abs=0.021)
+    assert shown.chosen(t[late], q[late]) == []
 
 
 def test_an_edit_of_very_many_segments_is_written_as_the_whole_timeline(tmp_path, monkeypatch):

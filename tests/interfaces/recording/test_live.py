@@ -87,7 +87,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
         assert {r.command_id for r in recording.receipts("real")} == {1, 3, 4}
         samples = recording.track(REAL)
         known = {report.measured_at: report for report in reports}
-        assert len(set(samples.t.tolist()) & known.keys()) > 20
+        assert len(set(samples.t.tolist()) & known.keys()) > 10
         for t, q, play in zip(samples.t.tolist(), samples.q, samples.play.tolist(), strict=True):
             if t in known:
                 assert (q == known[t].q).all()
@@ -178,7 +178,8 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
     said = ["never met", "never met", "", "", "no message", "no message", ""]
     for k, halted in enumerate(said):
         at = 0.3 + 0.1 * (k // 2)
-        heard.reported(Report(1, k + 1, at, None, 0, at, 1.0, q, at, at - 0.2, halted), now=0.3 + 0.1 * k)
+        # Of a robot that numbers no samples: each report has one.
+        line.operator.receive(Report(1, k + 1, at, None, 0, at, 1.0, q, at, at - 0.2, halted), now=0.3 + 0.1 * k)
     heard.answered(1, receipts[0], now=1.1)
     heard.answered(2, replace(receipts[1], execute_at=receipts[1].execute_at + 0.5), now=1.2)
     heard.answered(3, replace(receipts[2], status=Status.REJECTED, reason="too far"), now=1.3)

@@ -39,6 +39,7 @@ from interfaces.stream import network as n
 from interfaces.stream import tasks as w
 from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
 from interfaces.teleop.architectures import Report as Followed
+from interfaces.teleop.measured import Sample
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.tasks import Doing, Errand, Go, Halt, Sight, TaskReport
 from robots import puma560
@@ -210,6 +211,9 @@ def values() -> dict[str, Any]:
         "state with a reference and what the link did": c.State(
             33, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7, True, "", 0, 1.001 * Q, 0.41, ((2.0, 2.25), (2.05, None))
         ),
+        "state that tells late measurements": c.State(
+            34, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7, late=((1.25, Q), (1.31, 1.001 * Q))
+        ),
         "survey": n.Survey(7),
         "impair both ways": n.Impair(8, 7_730_941_132_801, n.Way("mon", "0.05"), n.Way("constant:0.3")),
         "impair one way": n.Impair(9, 7_730_941_132_801, n.Way("none", "burst:0.1,3", "in-order")),
@@ -245,11 +249,18 @@ def values() -> dict[str, Any]:
         "pulse offline": m.Pulse(4, 2.5, -math.inf),
         "orders": Orders(7_730_941_132_801, 5, 2.5, 1, 2.5, 1.0, 3, entries),
         "orders without entries": Orders(7_730_941_132_801, 6, 2.55, 2, 2.55, 1.0),
+        "orders that ask for samples": Orders(
+            7_730_941_132_801, 7, 2.6, 2, 2.6, 1.0, 3, wanted=((4, 9), (12, 12))
+        ),
         "report": Report(
             7_730_941_132_801, 3, 2.75, (5, 2.5, 2.7), 1, 2.0, 0.95, Q, 2.72, 2.0, "", ((1, receipt),), plan
         ),
         "report of a robot that knows the time": Report(
             7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0, uncertainty=0.015
+        ),
+        "report with samples": Report(
+            7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0,
+            samples=(Sample(4, 2.1, 1.25, Q), Sample(146, 2.92, 2.0, 1.001 * Q)), oldest=3,
         ),
         "report of a halted robot": Report(
             7_730_941_132_801, 4, 2.85, None, 1, 2.0, 0.0, Q, 2.82, 2.0, "link lost"
