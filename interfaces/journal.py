@@ -61,8 +61,8 @@ class Edit:
 class Journal:
     """The newest edits of one engine.
 
-    What goes through `execute` and `undo` is written down exactly. What others do to the engine is found when
-    somebody looks, as one edit for all that was done since.
+    What goes through `execute` is written down exactly, when somebody looks or before the next command. What others
+    do to the engine is found then, as one edit for all that was done since.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -72,7 +72,10 @@ class Journal:
         owners = self._timeline.owners(0, len(self._timeline))
         self._newest = max((*ids, *owners), default=0)
         self._edits: deque[Edit] = deque(maxlen=KEPT)
+        self._done: Receipt | None = None
+        """What `execute` did since `look`."""
         self._seen = self.past
+        """The engine's time at the newest `look` [s]: nothing changed before it since."""
         self.number = 0
         """Number of the newest edit; 0 before the first."""
 
@@ -92,37 +95,41 @@ class Journal:
         """
         self.look()
         result = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
-        receipt = result if isinstance(result, Receipt) else None
-        self._newest = max(self._newest, 0 if receipt is None else receipt.command_id)
-        if self.engine.timeline is not self._timeline:
-            self._write(None if receipt is None else receipt.command_id, ())
-        return receipt
+        # It's done: from here on nothing may raise.
+        self._done = result if isinstance(result, Receipt) else None
+        return self._done
 
     def look(self) -> int:
-        """Find out what others did to the engine; the number of the newest edit."""
-        if self.engine.timeline is not self._timeline:
-            begun = []
+        """Write down what was done to the engine, here or by others; the number of the newest edit."""
+        done, timeline = self._done, self.engine.timeline
+        if done is not None and timeline.version == done.version:
+            if timeline is not self._timeline:
+                self._write(timeline, done.command_id, ())
+            self._newest = max(self._newest, done.command_id)
+        elif timeline is not self._timeline:
+            begun, newest = [], self._newest
             while True:
                 try:
-                    receipt = self.engine.receipt(self._newest + 1)
+                    receipt = self.engine.receipt(newest + 1)
                 except UnknownCommandError:
                     break
-                self._newest += 1
+                newest += 1
                 if receipt.status is not Status.REJECTED and receipt.execute_at is not None:
                     begun.append((receipt.execute_at, receipt.command_id))
-            alone = self.engine.timeline.version == self._timeline.version + 1 and len(begun) == 1
-            self._write(begun[0][1] if alone else None, () if alone else tuple(begun))
-        self._seen = self.past
+            alone = timeline.version == self._timeline.version + 1 and len(begun) == 1
+            self._write(timeline, begun[0][1] if alone else None, () if alone else tuple(begun))
+            self._newest = newest
+        self._done, self._seen = None, self.past
         return self.number
 
-    def _write(self, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
-        before, self._timeline = self._timeline, self.engine.timeline
-        self.number += 1
-        self._edits.append(Edit(self.number, before, self._timeline, command_id, self._seen, others))
+    def _write(self, timeline: Timeline, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
+        edit = Edit(self.number + 1, self._timeline, timeline, command_id, self._seen, others)
+        self._edits.append(edit)
+        self._timeline, self.number = timeline, edit.number
 
     def since(self, number: int) -> tuple[Edit, ...]:
         """The edits after one, oldest first; where they aren't all kept, the newest alone, by nobody known."""
-        missing = self.number - number
+        missing = self.look() - number
         if missing > len(self._edits):
             return (replace(self._edits[-1], command_id=None, others=()),)
         return tuple(islice(self._edits, len(self._edits) - missing, None)) if missing > 0 else ()

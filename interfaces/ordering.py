@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import OrderedDict
 from collections.abc import Callable
 
@@ -14,6 +15,10 @@ REMEMBERED = 1024
 """Outcomes that are kept, to be sent again."""
 OVERTAKEN = "issued before a stop that came first"
 """Why an order is refused that a stop has overtaken."""
+FAILED = "the server failed at this command, and nothing has changed"
+"""How the refusal of an order begins at which something raised that nobody expected."""
+
+_LOG = logging.getLogger(__name__)
 
 
 class OrderBook:
@@ -28,7 +33,7 @@ class OrderBook:
         """Expect the first order.
 
         Args:
-            carry_out: Carries out an order whose turn it is, at a time [s].
+            carry_out: Carries out an order whose turn it is, at a time [s]; where it raises, nothing has happened.
             tell: Is given what's to be answered.
         """
         self._carry_out, self._tell = carry_out, tell
@@ -51,8 +56,14 @@ class OrderBook:
         if number - self._next <= BACKLOG:
             self._early[number] = order
         while self._next in self._early:
+            due = self._early.pop(self._next)
             self._next += 1
-            self._settle(self._carry_out(self._early.pop(self._next - 1), now))
+            try:
+                outcome = self._carry_out(due, now)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this order
+                _LOG.exception("an order failed, and changed nothing")
+                outcome = Outcome(due.number, None, f"{FAILED}: {type(error).__name__}", 0, now)
+            self._settle(outcome)
 
     def _settle(self, outcome: Outcome) -> None:
         self.outcomes[outcome.number] = outcome

@@ -5,6 +5,7 @@ Source: Doulgeri, Zikos, Delopoulos, section III.
 
 from __future__ import annotations
 
+import contextlib
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -141,12 +142,17 @@ class Servlet:
         if refusal:
             return Outcome(order.number, None, refusal, 0, now)
         try:
+            if order.command is None:
+                refusal = self.journal.engine.undo_refusal()
             receipt = self.journal.execute(order.command)
         except VrsError as error:
             return Outcome(order.number, None, str(error), 0, now)
-        if receipt is None and order.command is None:
-            refusal = self.journal.engine.undo_refusal()
-        return Outcome(order.number, None if receipt is None else portable(receipt), refusal, 0, now)
+        if receipt is None:
+            return Outcome(order.number, None, refusal, 0, now)
+        # It's done, whether the other commands that it names are found now or when it's written.
+        with contextlib.suppress(Exception):
+            receipt = portable(receipt)
+        return Outcome(order.number, receipt, "", 0, now)
 
     def _answer(self, ask: Ask, now: float) -> None:
         frame = self._answers.get(ask.number)

@@ -20,7 +20,7 @@ LOWER = {
     "link": (),
     "middleware": ("link",),
     "jobs": ("val2",),
-    "teleop": ("jobs", "link", "stream.control"),
+    "teleop": ("jobs", "link", "stream.control", "stream.wire.commands"),
     "stream": ("jobs", "link", "teleop"),
     "rsp": ("link", "stream"),
 }

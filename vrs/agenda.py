@@ -8,6 +8,8 @@ Source: Doulgeri, Zikos, Delopoulos, section II-B.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from operator import add
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -43,6 +45,17 @@ class Agenda(Generic[TrackT]):
         self.timeline = timeline
         self.ledger = ledger
         self.lateness = lateness
+
+    @contextmanager
+    def atomic(self) -> Iterator[None]:
+        """Put everything back as it was, receipts too, if what is done meanwhile raises."""
+        saved = vars(self).copy()
+        try:
+            with self.ledger.atomic():
+                yield
+        except BaseException:
+            vars(self).update(saved)
+            raise
 
     def brake(self, t: float, command_id: int) -> tuple[TrackT, str]:
         """What is scheduled, with the robot braking from t [s] on for a command; and what must be said of it."""

@@ -6,6 +6,7 @@ Source: Doulgeri, Zikos, Delopoulos, section II.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, overload
 
@@ -217,21 +218,30 @@ class Engine:
             UnknownCommandError: If it names a command that this engine gave no receipt of.
         """
         checked = check(command, self._model)
-        if isinstance(checked, MotionCommand):
-            return self._plan.move(checked, self._present())
         if isinstance(checked, PositionQuery):
             t = self.now() if checked.t is None else checked.t
             q = frozen_array(self.joints(t))
             return Position(t, q, frozen_array(self._model.forward(q)))
-        if isinstance(checked, ParameterChange):
-            self._set_parameter(checked)
-            return None
-        if isinstance(checked, SteerCommand):
-            return self._plan.steer(checked, self._present())
-        # What most programs never use loads when it's used: `import vrs` is to be quick.
-        from vrs.edits import edit
+        with self.atomic():
+            if isinstance(checked, MotionCommand):
+                return self._plan.move(checked, self._present())
+            if isinstance(checked, ParameterChange):
+                self._set_parameter(checked)
+                return None
+            if isinstance(checked, SteerCommand):
+                return self._plan.steer(checked, self._present())
+            # What most programs never use loads when it's used: `import vrs` is to be quick.
+            from vrs.edits import edit
 
-        return edit(self._plan, checked, self._present())
+            return edit(self._plan, checked, self._present())
+
+    def atomic(self) -> AbstractContextManager[None]:
+        """Put timeline, receipts and parameters back as they were, if what is done meanwhile raises.
+
+        Every command and edit is carried out so; a caller that has something to add to one, which may fail, does
+        both inside.
+        """
+        return self._plan.atomic()
 
     def _present(self) -> float | None:
         if self._clock is None:
@@ -314,7 +324,8 @@ class Engine:
         """
         from vrs.anchoring import anchor
 
-        return anchor(self._plan, truth, self.now())
+        with self.atomic():
+            return anchor(self._plan, truth, self.now())
 
     def undo(self) -> Receipt | None:
         """Take back the newest accepted command or edit, as far as it lies in the future.
@@ -326,7 +337,8 @@ class Engine:
         Returns:
             The receipt of the command that was taken back, as it is now; None where there's none.
         """
-        return self._plan.undo(self._present())
+        with self.atomic():
+            return self._plan.undo(self._present())
 
     def undo_refusal(self) -> str:
         """Why `undo` takes nothing back now; empty where it does, or where nothing was ever commanded."""

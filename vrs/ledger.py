@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections import deque
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -75,12 +77,42 @@ class Ledger(Generic[_TrackT]):
         self.newest = newest
         """Highest id given out."""
         self._entries: dict[int, Entry] = {}
+        self._restore: list[Callable[[], object]] | None = None
+        """Puts back, last first, what was written over since `atomic` began; None outside."""
         self._changes: list[Change] = []
         self._versions: list[int] = []
         self._stills: list[tuple[float, int]] = []
         self._undo: deque[Undo[_TrackT]] = deque(maxlen=UNDO_DEPTH)
         self.settled = ""
         """Why edits before the newest ones can't be taken back any more; empty where all can."""
+
+    @contextmanager
+    def atomic(self) -> Iterator[None]:
+        """Put everything back as it was, if what is done meanwhile raises."""
+        if self._restore is not None:
+            yield
+            return
+        saved = self.newest, self._stills[:], self._undo.copy(), self.settled
+        self._restore = []
+        try:
+            yield
+        except BaseException:
+            self.newest, self._stills, self._undo, self.settled = saved
+            while self._restore:
+                self._restore.pop()()
+            raise
+        finally:
+            self._restore = None
+
+    def _set(self, entry: Entry) -> Entry | None:
+        """Write an entry down; what it writes over."""
+        command_id = entry[0].command_id
+        old = self._entries.get(command_id)
+        if self._restore is not None:
+            absent = partial(self._entries.pop, command_id, None)
+            self._restore.append(absent if old is None else partial(self._entries.update, {command_id: old}))
+        self._entries[command_id] = entry
+        return old
 
     def __contains__(self, command_id: object) -> bool:
         return command_id in self._entries
@@ -171,7 +203,7 @@ class Ledger(Generic[_TrackT]):
         """Give out a receipt for a command that can't be."""
         self.newest += 1
         receipt = Receipt(self.newest, Status.REJECTED, issued, asked, reason=reason, version=version)
-        self._entries[self.newest] = receipt, None
+        self._set((receipt, None))
         return receipt
 
     def accept(
@@ -206,9 +238,8 @@ class Ledger(Generic[_TrackT]):
             elif change.moved is not None:
                 self._stills[first:] = [(change.moved(t), i) for t, i in later]
         overwritten = self._write((*others, (receipt, command)))
-        self._undo.append(
-            Undo(receipt.command_id, at, before, (len(self._changes), ()), overwritten, ((first, later),))
-        )
+        log, stills = (len(self._changes), ()), ((first, later),)
+        self._undo.append(Undo(receipt.command_id, at, before, log, overwritten, stills))
         if change is not None:
             self._write_log(len(self._changes), (change,))
         self.newest = max(self.newest, receipt.command_id)
@@ -247,14 +278,15 @@ class Ledger(Generic[_TrackT]):
         """Write entries down, and return what they write over."""
         overwritten = {}
         for entry in entries:
-            key = entry[0].command_id
-            overwritten[key] = self._entries.get(key)
-            self._entries[key] = entry
+            overwritten[entry[0].command_id] = self._set(entry)
             self._note_still(entry[0])
         return overwritten
 
     def _write_log(self, index: int, changes: tuple[Change, ...]) -> None:
         """Let the log go on with these changes from an index on."""
+        if self._restore is not None:
+            for log in (self._changes, self._versions):
+                self._restore.append(partial(log.__setitem__, slice(index, None), log[index:]))
         self._changes[index:] = changes
         self._versions[index:] = [change.version for change in changes]
 
@@ -263,7 +295,7 @@ class Ledger(Generic[_TrackT]):
         old, command = self._entries[receipt.command_id]
         if old.is_still and old.end is not None and (old.end, old.command_id) in self._stills:
             self._stills.remove((old.end, old.command_id))
-        self._entries[receipt.command_id] = receipt, command
+        self._set((receipt, command))
         self._note_still(receipt)
 
     @property
@@ -282,13 +314,13 @@ class Ledger(Generic[_TrackT]):
         self._write_log(*undo.changes)
         for first, stills in undo.stills:
             self._stills[first:] = stills
-        for command_id, entry in undo.overwritten.items():
+        for entry in undo.overwritten.values():
             if entry is not None:
-                self._entries[command_id] = entry
+                self._set(entry)
         if undo.overwritten[undo.command_id] is not None:
             return self.receipt(undo.command_id)
         mine = replace(mine, reason="undone", version=version, undone=True)
-        self._entries[undo.command_id] = mine, command
+        self._set((mine, command))
         return mine
 
     def fuse(self) -> None:
@@ -312,10 +344,8 @@ class Ledger(Generic[_TrackT]):
         for command_id, (start, end) in times.items():
             if command_id in self:
                 receipt, command = self.receipt(command_id), self.command(command_id)
-                again = replace(
-                    receipt, execute_at=start, end=end, version=change.version, superseded_by=None, undone=False
-                )
-                self._entries[command_id] = again, command
+                now = replace(receipt, execute_at=start, end=end, version=change.version)
+                self._set((replace(now, superseded_by=None, undone=False), command))
         self._write_log(len(self._changes), (change,))
         self._undo.clear()
         self.settled = (
@@ -346,7 +376,7 @@ class Ledger(Generic[_TrackT]):
             version=change.version,
             undone=True,
         )
-        self._entries[undo.command_id] = mine, self._entries[undo.command_id][1]
+        self._set((mine, self._entries[undo.command_id][1]))
         return mine
 
 

@@ -142,6 +142,12 @@ class Scheduler(Agenda[Timeline]):
         command = self.ledger.command(command_id)
         return Profile.PARABOLIC if command is None else command.profile
 
+    def note_profile(self, command_id: int, profile: Profile) -> None:
+        """Write down by which profile a command that's no motion command moves the arm."""
+        if self.profiles.get(command_id) is not profile:
+            # Another dictionary: `atomic` puts the one before back.
+            self.profiles = {**self.profiles, command_id: profile}
+
     def smooth(self, command_id: int) -> bool:
         """Whether a command moves the arm with bounded jerk throughout."""
         reason = self.ledger.receipt(command_id).reason if command_id in self.ledger else ""
@@ -179,7 +185,7 @@ class Scheduler(Agenda[Timeline]):
         if after is before:
             return self.ledger.receipt(command_id)
         target = end_position(plan) if len(plan) else state.q
-        self.profiles[command_id] = Profile.JERK_LIMITED
+        self.note_profile(command_id, Profile.JERK_LIMITED)
         self._session = _Session(command_id, after.version, start)
         receipt = Receipt(
             command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
@@ -196,7 +202,7 @@ class Scheduler(Agenda[Timeline]):
     def brake(self, t: float, command_id: int) -> tuple[Timeline, str]:
         """What is scheduled, with each joint braking from t on; and what must be said of it."""
         stop, note = self.stop_at(t)
-        self.profiles[command_id] = self.profile(owner_before(self.timeline, t))
+        self.note_profile(command_id, self.profile(owner_before(self.timeline, t)))
         return self.timeline.edited(t, [piece(stop, command_id)]), note
 
     @property

@@ -73,6 +73,6 @@ def take_up(plan: Scheduler, stand: Standing) -> None:
     for one in stand.known:
         plan.ledger.note(one.receipt, one.command)
         if one.command is None:
-            plan.profiles[one.receipt.command_id] = one.profile
+            plan.note_profile(one.receipt.command_id, one.profile)
     if stand.steered is not None and stand.steered[0] in plan.ledger:
         plan.go_on_steering(*stand.steered)

@@ -95,7 +95,7 @@ def stop(plan: Scheduler, command: Stop, now: float | None) -> Receipt:
     receipt = replace(receipt, q=frozen_array(after.sample(end)), superseded_names=names)
     change = Change(after.version, number, t, None)
     plan.timeline = after
-    plan.profiles[number] = profile
+    plan.note_profile(number, profile)
     plan.paused = Paused(after.version, timeline, t)
     return plan.ledger.accept(receipt, None, timeline, change)
 

@@ -148,6 +148,10 @@ class Capture:
     def measured(self, samples: Sequence[Sample], *, now: float) -> None:
         """The same of samples."""
 
+    def failed(self, error: Exception) -> None:
+        """Let a run in virtual time fail: what it records is all that comes of it."""
+        raise error
+
     def _note(self, what: Deed | tuple[Correction, Timeline]) -> None:
         before, self._timeline = self._timeline, self.operator.engine.timeline
         self._happened.append(_Happened(what, before, self._timeline))

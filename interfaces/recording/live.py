@@ -62,6 +62,8 @@ class _LiveCapture(Capture):
         self._since = now
         self._samples: list[Sample] = []
         self._halted = self._followed = False
+        self.failure = ""
+        """What raised while a note was taken; empty if nothing did."""
 
     def commanded(self, deed: Deed) -> None:
         super().commanded(deed)
@@ -96,6 +98,9 @@ class _LiveCapture(Capture):
     def measured(self, samples: Sequence[Sample], *, now: float) -> None:  # noqa: ARG002 - they have times of their own
         # What was measured before the recording began is compared with nothing in it.
         self._samples += [one for one in samples if one.t >= self._since][: _SAMPLES - len(self._samples)]
+
+    def failed(self, error: Exception) -> None:
+        self.failure = str(error) or type(error).__name__
 
     def tell(self, t: float, kind: str, text: str) -> None:
         """Write down an event."""
@@ -196,6 +201,8 @@ class LiveRecorder:
             connected: Whether the robot is heard of.
         """
         capture = self._capture
+        if capture.failure and not self._stopped:
+            self.stop(capture.failure)
         if capture.put is None:
             return
         self._look()

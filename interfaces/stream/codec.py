@@ -10,7 +10,6 @@ from types import UnionType
 from typing import Any, Generic, TypeAlias, TypeVar, get_args
 
 import msgspec
-import numpy as np
 
 from interfaces import messages
 from interfaces.messages import Reply, Request
@@ -22,7 +21,7 @@ from interfaces.stream.wire import control as controls
 from interfaces.stream.wire import driving, replies, requests, sites
 from interfaces.stream.wire import network as networks
 from interfaces.stream.wire import tasks as works
-from interfaces.stream.wire.fields import check_normal
+from interfaces.stream.wire.fields import check_normal, plain
 from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
@@ -119,16 +118,9 @@ _HEADS: dict[Encoding, Callable[[bytes], _Head]] = {
 }
 
 
-def _plain(value: object) -> object:
-    """NumPy's scalars as Python's."""
-    if isinstance(value, np.generic):
-        return value.item()
-    raise InvalidValueError("field", value, "what a message may hold")
-
-
 _WRITERS: dict[Encoding, Callable[[Wire], bytes]] = {
-    Encoding.MSGPACK: msgspec.msgpack.Encoder(enc_hook=_plain).encode,
-    Encoding.JSON: msgspec.json.Encoder(enc_hook=_plain).encode,
+    Encoding.MSGPACK: msgspec.msgpack.Encoder(enc_hook=plain).encode,
+    Encoding.JSON: msgspec.json.Encoder(enc_hook=plain).encode,
 }
 
 

@@ -55,3 +55,6 @@ class Listener(Protocol):
 
     def measured(self, samples: Sequence[Sample], *, now: float) -> None:
         """Samples of the robot have come that weren't known: mostly the newest, some of them late."""
+
+    def failed(self, error: Exception) -> None:
+        """Being told raised this: nothing more is told."""

@@ -47,6 +47,8 @@ class Orders:
     """New ones, and older ones that may have been lost."""
     wanted: Ranges = ()
     """Samples that are missing; see `interfaces.teleop.measured`."""
+    halted: str = ""
+    """Why the operator's site commands no more until somebody resumes: the robot is to stop and wait for that."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

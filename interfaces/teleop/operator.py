@@ -4,33 +4,20 @@ from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.link.quantiles import LARGEST, SlidingQuantiles
+from interfaces.stream.wire.commands import check_crosses
 from interfaces.teleop.listening import Correction, Deed, Listener
+from interfaces.teleop.logged_engine import LoggedEngine, resolved
 from interfaces.teleop.measured import Gathering, Sample
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from vrs.checks import number_in
 from vrs.clock import ManualClock
-from vrs.commands import (
-    Cancel,
-    Command,
-    InsertVia,
-    JointTarget,
-    Lateness,
-    Motion,
-    MotionCommand,
-    Position,
-    PositionQuery,
-    Resume,
-    Retime,
-    ScaleTime,
-    SteerCommand,
-    Stop,
-)
+from vrs.commands import Command, Lateness, Position
 from vrs.engine import Engine
 from vrs.errors import PlanningError, VrsError
 from vrs.model import Array, RobotModel
@@ -41,6 +28,14 @@ NOT_FOLLOWING = "the robot doesn't follow"
 """How refusals begin while the real robot has stopped by itself."""
 _SAME = 1e-9
 """Joints nearer than this [rad] are one."""
+STUCK = 2.0
+"""After so long at least [s] a robot counts as halted that hears what it's sent and doesn't carry it out."""
+TAKES_UP = 10.0
+"""The same of one that doesn't follow a new epoch [s]."""
+RESENDS = 8
+"""So often at least a command is sent again before that."""
+LATEST = 9e8
+"""A plan ends by then [session time, s]: what is postponed on its way still has a time that can be sent."""
 _UNDER_WAY_MOST = 4096
 """Most entries that may wait to be acknowledged."""
 
@@ -59,56 +54,6 @@ class OperatorSiteConfig:
     def __post_init__(self) -> None:
         for name, low, high in (("beat", 1e-3, 10.0), ("repeat", 0, 64), ("resent", 1, 1000)):
             number_in(name, getattr(self, name), low, high)
-
-
-class LoggedEngine(Engine):
-    """An engine that asks whether it may, and tells what it was given."""
-
-    def __init__(
-        self,
-        refusal: Callable[[], str],
-        told: Callable[[Deed, int], None],
-        model: RobotModel,
-        *,
-        q: Array,
-        clock: ManualClock,
-        lateness: Lateness,
-    ) -> None:
-        """Make an engine.
-
-        Args:
-            refusal: Says why commands are refused now; empty if they aren't.
-            told: Is told what it was given, and the newest id before that.
-            model: See `Engine`, as for the rest.
-            q: Initial joints.
-            clock: The operator's.
-            lateness: What happens to late commands.
-        """
-        super().__init__(model, q=q, clock=clock, lateness=lateness)
-        self._refusal, self._tell = refusal, told
-
-    def execute(self, command: Command) -> Any:
-        """Carry out a command; see `Engine.execute`."""
-        if isinstance(command, PositionQuery):
-            return super().execute(command)
-        reason, newest = self._refusal(), self.newest
-        answer: Receipt | None = self.refuse(command, reason) if reason else super().execute(command)  # type: ignore[arg-type]
-        self._tell(Deed(self.now(), command, answer, bool(reason)), newest)
-        return answer
-
-    def undo(self) -> Receipt | None:
-        """Take back the newest command; see `Engine.undo`."""
-        if self._refusal():
-            return None
-        newest = self.newest
-        answer = super().undo()
-        if answer is not None:
-            self._tell(Deed(self.now(), None, answer, False), newest)
-        return answer
-
-    def undo_refusal(self) -> str:
-        """Why nothing is taken back now; see `Engine.undo_refusal`."""
-        return self._refusal() or super().undo_refusal()
 
 
 class OperatorSite:
@@ -170,6 +115,8 @@ class OperatorSite:
         """After how long without an answer an entry counts as lost [s]."""
         self.gathering = Gathering()
         """Where the robot was measured."""
+        self._waits_since: float | None = None
+        """When the first report came [s] of those that say that the same entry is still to be carried out."""
         self._compared: tuple[int, ...] = ()
         """Versions of the plans, and entries under way, that were found to lead the same way."""
 
@@ -198,18 +145,37 @@ class OperatorSite:
         return ""
 
     def _told(self, deed: Deed, newest: int) -> None:
-        """Write what the engine carried out into the log, to be sent."""
-        if self.listener is not None:
-            self.listener.commanded(deed)
-        now, command, answer, _ = deed
-        if answer is not None and answer.status is Status.REJECTED:
+        """Write what the engine carried out into the log, to be sent.
+
+        Raises:
+            InvalidValueError: If it can't be sent, or the plan goes on for too long; nothing is written then.
+        """
+        number, (now, command, answer, _) = self._entries + 1, deed
+        if answer is None or answer.status is not Status.REJECTED:
+            number_in("end of the plan", self.engine.timeline.end, -LATEST, LATEST, "a session time", " s")
+            if command is not None and answer is not None:
+                command = resolved(command, answer, now)
+            if command is not None:
+                check_crosses(command)
+            entry = Entry(number, now, command, newest)
+            # From here on nothing may raise.
+            if command is not None and answer is not None:
+                self._ids[number] = answer.command_id
+            self._under_way[number] = entry, now
+            self._new.append(number)
+            self._entries = number
+        self._inform(lambda listener: listener.commanded(deed))
+
+    def _inform(self, tell: Callable[[Listener], None]) -> None:
+        """Tell who listens, if anybody does; one that fails hears no more, and what it was told of stands."""
+        listener = self.listener
+        if listener is None:
             return
-        self._entries += 1
-        if command is not None and answer is not None:
-            command = _resolved(command, answer, now)
-            self._ids[self._entries] = answer.command_id
-        self._under_way[self._entries] = Entry(self._entries, now, command, newest), now
-        self._new.append(self._entries)
+        try:
+            tell(listener)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the robot goes on
+            self.listener = None
+            listener.failed(error)
 
     def advance(self, *, now: float) -> tuple[Orders, ...]:
         """Do what is due by now [s], and say what is to be sent."""
@@ -233,7 +199,10 @@ class OperatorSite:
         entries = tuple(under_way[n][0] for n in sorted({*chosen, *lost}) if n in under_way)
         heard = 0 if self.report is None else self.report.number
         wanted = self.gathering.wanted(now=now, patience=patience)
-        return (Orders(self.epoch, self._packets, now, self._entries, now, self._began, heard, entries, wanted),)
+        # A robot that knows that it has halted isn't told.
+        halted = "" if self.report is None or self.report.halted else self.halted
+        facts = self._entries, now, self._began, heard, entries, wanted, halted
+        return (Orders(self.epoch, self._packets, now, *facts),)
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
@@ -247,38 +216,78 @@ class OperatorSite:
         if found and self.listener is not None:
             self.listener.measured(found, now=now)
         if report.epoch != self.epoch:
+            self._watch_begin(report, now)
             return
+        answered: list[tuple[int, Receipt]] = []
         for number, receipt in report.receipts:
             known = self._under_way.pop(number, None)
             if known is not None or number in self._ids:
-                command_id = self._ids.pop(number, receipt.command_id)
-                self.receipts[command_id] = receipt
-                if self.listener is not None:
-                    self.listener.answered(command_id, receipt, now=now)
+                answered.append((self._ids.pop(number, receipt.command_id), receipt))
+        self.receipts.update(answered)
+        for command_id, receipt in answered:
+            self._inform(partial(_tell_answer, command_id=command_id, receipt=receipt, now=now))
         if self.report is not None and report.number <= self.report.number:
             return
         self.report = report
-        if self.listener is not None:
-            self.listener.reported(report, now=now)
-        for number in range(self._acknowledged + 1, report.executed + 1):
-            self._under_way.pop(number, None)
-        self._acknowledged = max(self._acknowledged, report.executed)
-        if report.echo is not None:
-            _, sent, arrived = report.echo
-            self.round_trip = now - sent - (report.sent_at - arrived)
-            if sent >= self._measured_since:
-                self.round_trips.add(self.round_trip, now=now)
-        usual = self.round_trips.quantile(0.95)
-        if usual is not None:
-            self._patience = 2.0 * self.config.beat + 1.2 * usual
+        self._inform(lambda listener: listener.reported(report, now=now))
+        self._measure(report, now)
+        self._watch_progress(report, now)
         new = bool(report.halted) and not self.halted
         if new:
-            self.halted = report.halted
-            self._under_way.clear()
+            self._give_up(report.halted)
         correcting = bool(self.corrections) and now < self.corrections[-1].end
         # One at a time: what the correction under way leaves over is corrected after it.
         if report.plan is not None and (new or not correcting):
             self._follow(report.plan, report.halted or "a command was late at the robot")
+
+    def _measure(self, report: Report, now: float) -> None:
+        """Learn from a report how long messages are under way."""
+        if report.echo is None:
+            return
+        _, sent, arrived = report.echo
+        round_trip = now - sent - (report.sent_at - arrived)
+        if abs(round_trip) > LARGEST:
+            # No clock that we sent says so.
+            return
+        self.round_trip = round_trip
+        if sent >= self._measured_since:
+            self.round_trips.add(round_trip, now=now)
+        usual = self.round_trips.quantile(0.95)
+        if usual is not None:
+            self._patience = 2.0 * self.config.beat + 1.2 * usual
+
+    def _watch_progress(self, report: Report, now: float) -> None:
+        """Count a robot as halted that hears what is sent and yet carries nothing out."""
+        progressed = report.executed > self._acknowledged
+        for number in range(self._acknowledged + 1, min(report.executed, self._entries) + 1):
+            self._under_way.pop(number, None)
+        self._acknowledged = max(self._acknowledged, report.executed)
+        if self.halted or self._acknowledged >= self._entries:
+            self._waits_since = None
+        elif progressed or self._waits_since is None:
+            self._waits_since = now
+        elif report.echo is not None and report.echo[1] > self._waits_since + self._stuck_after(STUCK):
+            waited = report.echo[1] - self._waits_since
+            self._give_up(
+                f"it hears the operator, but hasn't carried out a command that it was sent {waited:.1f} s before"
+            )
+
+    def _watch_begin(self, report: Report, now: float) -> None:
+        """Count a robot as halted that goes on saying that it follows an earlier epoch."""
+        if report.epoch < self.epoch and now > self._began + self._stuck_after(TAKES_UP) and not self.halted:
+            self._give_up("it hears nothing of being resumed, or can't take it up")
+
+    def _stuck_after(self, least: float) -> float:
+        """How long a robot may make nothing of what it's sent [s]: it has been sent again often by then."""
+        return max(least, RESENDS * self._patience)
+
+    def _give_up(self, reason: str) -> None:
+        """Command the robot no more until somebody resumes; it's told so."""
+        self.halted = reason
+        self._under_way.clear()
+        self._new = []
+        self._waits_since = None
+        self._due = self._clock.now()
 
     def measure_anew(self, *, now: float) -> None:
         """Forget the round trips of messages that were sent before now [s]: the way is another one."""
@@ -311,8 +320,7 @@ class OperatorSite:
                 # No way keeps the limits from here; the next report finds the arm elsewhere.
                 return
             self.corrections.append(Correction(now, made.end, made.error, reason))
-            if self.listener is not None:
-                self.listener.corrected(self.corrections[-1], truth)
+            self._inform(lambda listener: listener.corrected(self.corrections[-1], truth))
         else:
             self._compared = compared
 
@@ -336,7 +344,12 @@ class OperatorSite:
         self._recent.clear()
         self._under_way.clear()
         self._ids.clear()
+        self._waits_since = None
         return ""
+
+
+def _tell_answer(listener: Listener, *, command_id: int, receipt: Receipt, now: float) -> None:
+    listener.answered(command_id, receipt, now=now)
 
 
 def _differs(mine: Timeline, other: Timeline, t: float) -> bool:
@@ -349,24 +362,3 @@ def _differs(mine: Timeline, other: Timeline, t: float) -> bool:
     middle = 0.5 * (moments[1:] + moments[:-1])
     moments = np.concatenate([moments, middle])
     return bool(np.abs(mine.sample(moments) - other.sample(moments)).max() > _SAME)
-
-
-def _resolved(command: Command, answer: Receipt, now: float) -> Command:
-    """The command with the stamps that it got, and joints for a pose."""
-    issued = getattr(command, "issued_at", None)
-    issued = now if issued is None else issued
-    if isinstance(command, MotionCommand):
-        target = command.target
-        if command.motion is Motion.JOINT and answer.q is not None:
-            target = JointTarget(answer.q)
-        when = answer.execute_at if command.deviation == 0 else command.execute_at
-        return replace(command, target=target, issued_at=issued, execute_at=when)
-    if isinstance(command, (Cancel, InsertVia)) and command.execute_at is None:
-        return replace(command, issued_at=issued, execute_at=max(now, issued))
-    if isinstance(command, SteerCommand):
-        return replace(command, issued_at=issued, execute_at=max(now, issued, command.execute_at or now))
-    if isinstance(command, (ScaleTime, Stop, Resume)):
-        return replace(command, issued_at=issued, execute_at=answer.execute_at)
-    if isinstance(command, (Retime, Cancel, InsertVia)):
-        return replace(command, issued_at=issued)
-    return command

@@ -186,6 +186,8 @@ class RobotSite:
             self._newest = orders.number, orders.sent_at, now
         while self._receipts and self._receipts[0][0] <= orders.heard:
             self._receipts.popleft()
+        if orders.halted:
+            self.halt(f"the operator's site: {orders.halted}", now=now)
         if self.halted:
             return
         self._offset.heard(self._log.complete_until, now=now)

@@ -121,9 +121,11 @@ class MobileEngine(Engine):
             InvalidValueError: If it's no command for a mobile robot; nothing is changed.
         """
         if isinstance(command, DriveCommand):
-            return self._plan.drive(command, self._present())
+            with self.atomic():
+                return self._plan.drive(command, self._present())
         if isinstance(command, Stop):
-            return self._plan.stop(command, self._present())
+            with self.atomic():
+                return self._plan.stop(command, self._present())
         if isinstance(command, PositionQuery):
             t = self.now() if command.t is None else command.t
             posture = frozen_array(self.posture(t))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from math import inf
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
+import msgspec
 import numpy as np
 from msgspec import Meta
 
@@ -22,6 +25,7 @@ from interfaces.stream.wire.fields import (
     Word,
     array,
     numbers,
+    plain,
     text,
 )
 from vrs import commands
@@ -330,3 +334,23 @@ def command_wire(command: Command | None, packed: bool) -> CommandWire | None:
     if kind is None:
         raise InvalidValueError("command", command, f"one of {', '.join(known.__name__ for known in _WIRES)}")
     return kind.of(command, packed)  # type: ignore[return-value]
+
+
+_encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
+
+
+def check_crosses(command: Command) -> None:
+    """Check that whoever gets a command over a connection can read it.
+
+    Raises:
+        InvalidValueError: If it can't be written, or a reader would refuse it.
+    """
+    try:
+        _reader()(_encode(command_wire(command, packed=True))).read()
+    except (msgspec.MsgspecError, OverflowError, TypeError) as error:
+        raise InvalidValueError("command", command, f"one that can cross a connection: {error}") from None
+
+
+@cache
+def _reader() -> Callable[[bytes], CommandWire]:
+    return msgspec.msgpack.Decoder(CommandWire).decode

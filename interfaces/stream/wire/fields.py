@@ -114,6 +114,17 @@ def text(words: str) -> str:
     return words[:LONGEST_TEXT].encode("utf-8", "replace").decode("utf-8")
 
 
+def plain(value: object) -> object:
+    """NumPy's scalars as Python's; for an encoder that meets what it doesn't know.
+
+    Raises:
+        InvalidValueError: If it's anything else.
+    """
+    if isinstance(value, np.generic):
+        return value.item()
+    raise InvalidValueError("field", value, "what a message may hold")
+
+
 def digits(epoch: int | None) -> str | None:
     """An epoch's digits; None where there's none."""
     return str(epoch) if epoch else None

@@ -61,19 +61,22 @@ class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders
     heard: Count = 0
     entries: Annotated[tuple[EntryWire, ...], Meta(max_length=MOST_ENTRIES)] = ()
     wanted: Annotated[tuple[tuple[Number, Number], ...], Meta(max_length=RANGES)] = ()
+    halted: Text = ""
 
     @classmethod
     def of(cls, value: Orders, packed: bool) -> OrdersWire:
         """See `Message.of`."""
         times = value.newest, value.complete_until, value.epoch_began
         entries = tuple(EntryWire.of(entry, packed) for entry in value.entries)
-        return cls(str(value.epoch), value.number, value.sent_at, *times, value.heard, entries, value.wanted)
+        rest = value.heard, entries, value.wanted, text(value.halted)
+        return cls(str(value.epoch), value.number, value.sent_at, *times, *rest)
 
     def read(self) -> Orders:
         """The orders."""
         times = self.newest, self.complete_until, self.epoch_began
         entries = tuple(entry.read() for entry in self.entries)
-        return Orders(epoch(self.epoch), self.number, self.sent_at, *times, self.heard, entries, self.wanted)
+        rest = self.heard, entries, self.wanted, self.halted
+        return Orders(epoch(self.epoch), self.number, self.sent_at, *times, *rest)
 
 
 class PlanPartWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
