@@ -274,7 +274,16 @@ class OperatorSite:
 
     def _watch_begin(self, report: Report, now: float) -> None:
         """Count a robot as halted that goes on saying that it follows an earlier epoch."""
-        if report.epoch < self.epoch and now > self._began + self._stuck_after(TAKES_UP) and not self.halted:
+        longest, known = self.round_trips.maximum, self.report
+        if (
+            report.epoch > self.epoch
+            or self.halted
+            or longest is None
+            or known is None
+            or report.number <= known.number
+        ):
+            return
+        if now > self._began + self._stuck_after(TAKES_UP) + 2.0 * longest:
             self._give_up("it hears nothing of being resumed, or can't take it up")
 
     def _stuck_after(self, least: float) -> float:
