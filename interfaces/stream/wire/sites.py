@@ -68,15 +68,15 @@ class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders
         """See `Message.of`."""
         times = value.newest, value.complete_until, value.epoch_began
         entries = tuple(EntryWire.of(entry, packed) for entry in value.entries)
-        rest = value.heard, entries, value.wanted, text(value.halted)
-        return cls(str(value.epoch), value.number, value.sent_at, *times, *rest)
+        own, halted = (str(value.epoch), value.number, value.sent_at), text(value.halted)
+        return cls(*own, *times, value.heard, entries, value.wanted, halted)
 
     def read(self) -> Orders:
         """The orders."""
         times = self.newest, self.complete_until, self.epoch_began
         entries = tuple(entry.read() for entry in self.entries)
-        rest = self.heard, entries, self.wanted, self.halted
-        return Orders(epoch(self.epoch), self.number, self.sent_at, *times, *rest)
+        own = epoch(self.epoch), self.number, self.sent_at
+        return Orders(*own, *times, self.heard, entries, self.wanted, self.halted)
 
 
 class PlanPartWire(Wire, Generic[C], frozen=True, omit_defaults=True, gc=False):
