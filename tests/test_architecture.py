@@ -132,11 +132,6 @@ def test_a_door_names_what_it_opens(path):
     assert all(hasattr(module, name) for name in module.__all__)
 
 
-def test_no_file_is_over_400_lines():
-    long = [str(path) for path in FILES if len(path.read_text(encoding="utf-8").splitlines()) > 400]
-    assert long == []
-
-
 @pytest.mark.parametrize(("code", "most"), [("import vrs", 0.3), ("import interfaces.cli", 0.7)])
 def test_the_door_opens_quickly_and_loads_nothing_heavy(code, most, tmp_path):
     """Within its bar on a machine of usual pace; NumPy's own import, beside it, says how slow this one is now.
