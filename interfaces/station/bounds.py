@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import re
 import secrets
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
@@ -15,6 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from interfaces.station.files import HEADERS, POLICY
 from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
+from interfaces.stream.strangers import Strangers
 from vrs.checks import number_in
 
 SOCKET: Final = "/_nicegui_ws/"
@@ -29,7 +32,14 @@ class BoundsConfig:
     """How much NiceGUI is asked to do."""
 
     visitors: int = 256
-    """Pages that it keeps at once, 1 to 10,000."""
+    """Pages that it keeps at once, 1 to 10,000; those that opened no socket give way to new ones, the oldest first,
+    and so do sockets."""
+    pages: float = 20.0
+    """Pages that it makes a second, for long, 1 to 1000; each takes the loop some milliseconds."""
+    pages_burst: float = 20.0
+    """Pages that it makes at once, 1 to 1000."""
+    pages_waiting: int = 64
+    """Pages that may be waited for, 1 to 10,000. The newest comes first; the oldest is refused."""
     rate: float = 40.0
     """Messages a second that a page may send for long, 1 to 10,000."""
     burst: float = 200.0
@@ -38,7 +48,15 @@ class BoundsConfig:
     """A page is cut off when a message has waited so long to be sent [s], 0.1 to 60."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (("visitors", 1, 1e4), ("rate", 1, 1e4), ("burst", 1, 1e4), ("blocked", 0.1, 60)):
+        for name, low, high in (
+            ("visitors", 1, 1e4),
+            ("pages", 1, 1e3),
+            ("pages_burst", 1, 1e3),
+            ("pages_waiting", 1, 1e4),
+            ("rate", 1, 1e4),
+            ("burst", 1, 1e4),
+            ("blocked", 0.1, 60),
+        ):
             number_in(name, getattr(self, name), low, high)
 
 
@@ -46,19 +64,20 @@ class Bounds:
     """Stands before NiceGUI's application."""
 
     def __init__(
-        self, app: ASGIApp, page: str, visitors: Callable[[], int], config: BoundsConfig | None = None
+        self, app: ASGIApp, page: str, make_room: Callable[[int], bool], config: BoundsConfig | None = None
     ) -> None:
         """Stand before an application.
 
         Args:
             app: NiceGUI's.
             page: Path of the only page.
-            visitors: How many pages are kept now.
+            make_room: Lets go of pages until there's room for one more among so many; whether there is.
             config: How much is let through.
         """
-        self._app, self._page, self._visitors = app, page, visitors
+        self._app, self._page, self._make_room = app, page, make_room
         self._config = BoundsConfig() if config is None else config
-        self._sockets = 0
+        self._sockets: Strangers[_Ends] = Strangers(self._config.visitors)
+        self._making = _Making(self._config)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on, or refuse."""
@@ -69,23 +88,57 @@ class Bounds:
             await self._app(scope, receive, send)
         elif scope["method"] not in {"GET", "HEAD"} or not (path == self._page or path.startswith(_PARTS)):
             await PlainTextResponse("not here\n", 404, HEADERS)(scope, receive, send)
-        elif path == self._page and self._visitors() >= self._config.visitors:
+        elif path == self._page and not (await self._making.turn() and self._make_room(self._config.visitors)):
             await PlainTextResponse("too many visitors: try again\n", 503, HEADERS)(scope, receive, send)
         else:
             await self._app(scope, receive, _Signed(send) if path == self._page else send)
 
     async def _socket(self, path: str, scope: Scope, receive: Receive, send: Send) -> None:
-        if not path.startswith(SOCKET) or self._sockets >= self._config.visitors:
+        if not path.startswith(SOCKET):
             await receive()
             await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": ""})
             return
-        self._sockets += 1
+        let_stay(scope, known=False)
+        ends = _Ends(scope, receive, send, self._config)
+        oldest = self._sockets.add(ends, (scope.get("client") or ("",))[0], until=math.inf)
+        if oldest is not None:
+            oldest.cut_off()
         try:
-            let_stay(scope, known=False)
-            ends = _Ends(scope, receive, send, self._config)
             await self._app(scope, ends.receive, ends.send)
         finally:
-            self._sockets -= 1
+            self._sockets.discard(ends)
+
+
+class _Making:
+    """Whose page is made next: few at a time, for it holds the loop up, and the newest first."""
+
+    def __init__(self, config: BoundsConfig) -> None:
+        self._pause, self._most = 1.0 / config.pages, config.pages_waiting
+        self._at_once = Bucket(config.pages, config.pages_burst, 0.0)
+        self._waiting: deque[asyncio.Future[bool]] = deque()
+
+    async def turn(self) -> bool:
+        """Wait for a turn; whether it came."""
+        loop = asyncio.get_running_loop()
+        if not self._waiting and self._at_once.take(loop.time()):
+            return True
+        if not self._waiting:
+            loop.call_later(self._pause, self._next)
+        mine: asyncio.Future[bool] = loop.create_future()
+        self._waiting.append(mine)
+        if len(self._waiting) > self._most:
+            self._give(self._waiting.popleft(), turn=False)
+        return await mine
+
+    def _next(self) -> None:
+        self._give(self._waiting.pop(), turn=True)
+        if self._waiting:
+            asyncio.get_running_loop().call_later(self._pause, self._next)
+
+    @staticmethod
+    def _give(waiting: asyncio.Future[bool], *, turn: bool) -> None:
+        if not waiting.done():
+            waiting.set_result(turn)
 
 
 class _Ends:
@@ -96,6 +149,11 @@ class _Ends:
         self._receive, self._send, self._blocked = receive, send, config.blocked
         self._clock = asyncio.get_running_loop().time
         self._allowed = Bucket(config.rate, config.burst, self._clock())
+
+    def cut_off(self) -> None:
+        """Let another one have its place."""
+        if self._socket is not None:
+            self._socket.abort()
 
     async def receive(self) -> Message:
         message = await self._receive()
@@ -109,8 +167,7 @@ class _Ends:
             async with asyncio.timeout(self._blocked):
                 await self._send(message)
         except TimeoutError:
-            if self._socket is not None:
-                self._socket.abort()
+            self.cut_off()
             raise ConnectionResetError from None
 
 

@@ -58,7 +58,7 @@ def ask(bounds: Bounds, path: str, method: str = "GET") -> tuple[int, dict[str, 
 
 def test_only_the_page_and_its_parts_are_there() -> None:
     inner = Inner()
-    bounds = Bounds(inner, "/", lambda: 0)
+    bounds = Bounds(inner, "/", lambda most: True)
     for path, method in (("/elsewhere", "GET"), ("/", "POST"), (SOCKET + "socket.io/", "GET"), ("//", "GET")):
         assert ask(bounds, path, method)[0] == 404
     assert inner.seen == []
@@ -66,16 +66,41 @@ def test_only_the_page_and_its_parts_are_there() -> None:
 
 
 def test_there_are_only_so_many_visitors() -> None:
-    inner, count = Inner(), 3
-    bounds = Bounds(inner, "/", lambda: count, BoundsConfig(visitors=3))
+    inner, asked = Inner(), []
+
+    def make_room(most: int) -> bool:
+        asked.append(most)
+        return len(asked) > 1
+
+    bounds = Bounds(inner, "/", make_room, BoundsConfig(visitors=3))
     assert ask(bounds, "/")[0] == 503
     assert ask(bounds, "/_nicegui/3/static/x.js")[0] == 200
-    count = 2
     assert ask(bounds, "/")[0] == 200
+    assert asked == [3, 3]
+
+
+def test_of_many_pages_that_are_asked_for_at_once_the_newest_is_made_first() -> None:
+    bounds = Bounds(Inner(), "/", lambda most: True, BoundsConfig(pages=100, pages_burst=2, pages_waiting=4))
+    ended: list[tuple[int, int]] = []
+
+    async def one(number: int) -> None:
+        async def send(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                ended.append((number, message["status"]))
+
+        await bounds({"type": "http", "path": "/", "method": "GET", "headers": []}, send, send)
+
+    async def run() -> None:
+        async with asyncio.timeout(5.0):
+            await asyncio.gather(*(one(number) for number in range(8)))
+
+    asyncio.run(run())
+    assert sorted(ended[:4]) == [(0, 200), (1, 200), (2, 503), (3, 503)]
+    assert ended[4:] == [(7, 200), (6, 200), (5, 200), (4, 200)]
 
 
 def test_every_script_of_the_page_is_signed_anew_each_time() -> None:
-    bounds = Bounds(Inner(), "/", lambda: 0)
+    bounds = Bounds(Inner(), "/", lambda most: True)
     words = set()
     for _ in range(3):
         status, headers, body = ask(bounds, "/")
@@ -122,7 +147,7 @@ class Wire:
 
 def test_one_who_says_too_much_is_closed() -> None:
     inner, wire = Inner(), Wire(["x"] * 10)
-    bounds = Bounds(inner, "/", lambda: 0, BoundsConfig(rate=1, burst=5))
+    bounds = Bounds(inner, "/", lambda most: True, BoundsConfig(rate=1, burst=5))
     asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
     assert inner.seen == [SOCKET + "socket.io/", None, "x", "x", "x", "x", "x", 1008]
     assert [message.get("code") for message in wire.sent] == [None, 1008]
@@ -131,7 +156,7 @@ def test_one_who_says_too_much_is_closed() -> None:
 def test_one_who_does_not_read_is_cut_off() -> None:
     inner, wire = Inner(), Wire(["x"], stuck=True)
     inner.forever = True
-    bounds = Bounds(inner, "/", lambda: 0, BoundsConfig(blocked=0.1))
+    bounds = Bounds(inner, "/", lambda most: True, BoundsConfig(blocked=0.1))
     with pytest.raises(ConnectionResetError):
         asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
     assert wire.aborted
@@ -140,21 +165,21 @@ def test_one_who_does_not_read_is_cut_off() -> None:
 @pytest.mark.parametrize("path", ["/ws2", "/_nicegui/3/static/x.js", "/"])
 def test_sockets_are_taken_at_one_place_only(path: str) -> None:
     inner, wire = Inner(), Wire([])
-    asyncio.run(Bounds(inner, "/", lambda: 0)(wire.scope(path), wire.receive, wire.send))
+    asyncio.run(Bounds(inner, "/", lambda most: True)(wire.scope(path), wire.receive, wire.send))
     assert inner.seen == []
     assert [message["type"] for message in wire.sent] == ["websocket.close"]
 
 
 def test_a_socket_that_ended_makes_room() -> None:
     inner = Inner()
-    bounds = Bounds(inner, "/", lambda: 0, BoundsConfig(visitors=1))
+    bounds = Bounds(inner, "/", lambda most: True, BoundsConfig(visitors=1))
     for _ in range(3):
         wire = Wire([])
         asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
         assert wire.sent[0]["type"] == "websocket.accept"
 
 
-def test_there_are_only_so_many_sockets() -> None:
+def test_of_too_many_sockets_the_oldest_gives_way() -> None:
     async def run() -> None:
         held = asyncio.Event()
 
@@ -162,16 +187,16 @@ def test_there_are_only_so_many_sockets() -> None:
             await send({"type": "websocket.accept"})
             await held.wait()
 
-        bounds = Bounds(keep, "/", lambda: 0, BoundsConfig(visitors=2))
-        first, last = [Wire([]), Wire([])], Wire([])
-        tasks = [asyncio.create_task(bounds(wire.scope(), wire.receive, wire.send)) for wire in first]
-        await asyncio.sleep(0)
-        async with asyncio.timeout(5.0):
-            await bounds(last.scope(), last.receive, last.send)
+        bounds = Bounds(keep, "/", lambda most: True, BoundsConfig(visitors=2))
+        wires = [Wire([]) for _ in range(3)]
+        tasks = []
+        for wire in wires:
+            tasks.append(asyncio.create_task(bounds(wire.scope(), wire.receive, wire.send)))
+            await asyncio.sleep(0)
         held.set()
         await asyncio.gather(*tasks)
-        assert [wire.sent[0]["type"] for wire in first] == ["websocket.accept"] * 2
-        assert [(message["type"], message["code"]) for message in last.sent] == [("websocket.close", 1008)]
+        assert [wire.aborted for wire in wires] == [True, False, False]
+        assert wires[2].sent[0]["type"] == "websocket.accept"
 
     asyncio.run(run())
 
