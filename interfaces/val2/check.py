@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -16,11 +16,12 @@ from interfaces.val2.errors import Place, ValError
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
-from interfaces.val2.parser import directive, lines_of, split_comment
+from interfaces.val2.parser import lines_of, split_comment
+from interfaces.val2.reading import read_all, words_of
 from interfaces.val2.signals import legal, settable
 from interfaces.val2.slots import Kind, nearest
-from interfaces.val2.source import SourceFile, parse_file
-from interfaces.val2.structure import Structure, survey
+from interfaces.val2.source import SourceFile
+from interfaces.val2.structure import survey
 from interfaces.val2.syntax import (
     Apply,
     Assign,
@@ -46,10 +47,7 @@ from interfaces.val2.syntax import (
 from robots import puma560
 from vrs.engine import Engine
 
-MOST_ERRORS: Final = 100
-"""Lines that can't be read, of which a file's check tells."""
 _WORD: Final = re.compile(r'"[^"]*"|[#$]?[A-Za-z][A-Za-z0-9_.]*')
-_HEADER: Final = re.compile(r"\s*\.PROGRAM\s+([A-Za-z][A-Za-z0-9_.]*)", re.IGNORECASE | re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +80,10 @@ def check_text(text: str, name: str) -> tuple[SourceFile | None, list[Finding]]:
         What it holds, None if not every line could be read; and what was found, in the order of its lines.
     """
     source, unreadable = read_all(text, name)
-    found = [_error(error) for error in unreadable]
+    found = [_error(error) for error in unreadable.values()]
     if not source.programs and not unreadable:
         found.append(_error(ValError("Undefined program", "the file holds none", place=Place(1, 1))))
-    found += check(source)
+    found += check(source, unreadable.keys(), words_of(text, unreadable))
     found += _alike_names(text)
     return None if unreadable else source, sorted(found, key=_order)
 
@@ -95,39 +93,21 @@ def _order(finding: Finding) -> tuple[int, int]:
     return (0, 0) if place is None else (place.line, place.column)
 
 
-def read_all(text: str, name: str) -> tuple[SourceFile, list[ValError]]:
-    """What can be read of a file, and an error for each line that can't."""
-    errors: list[ValError] = []
-    try:
-        lines = lines_of(text)
-    except ValError as error:
-        return SourceFile(name), [error.at(place=Place(1, 1))]
-    while len(errors) < MOST_ERRORS:
-        try:
-            return parse_file("\n".join(lines), name), errors
-        except ValError as error:
-            errors.append(error)
-            number = error.place.line if error.place is not None else len(lines)
-            lines[number - 1] = _stand_in(lines[number - 1], number)
-    return SourceFile(name), errors
+def check(source: SourceFile, unreadable: Collection[int] = (), words: Collection[str] = ()) -> list[Finding]:
+    """What is wrong with the programs of a file, one after the other.
 
-
-def _stand_in(line: str, number: int) -> str:
-    """What takes the place of a line that can't be read."""
-    if directive(line) != ".PROGRAM":
-        return ""
-    found = _HEADER.match(line)
-    return f".PROGRAM {'' if found is None else found[1][:8]}l{number}"
-
-
-def check(source: SourceFile) -> list[Finding]:
-    """What is wrong with the programs of a file, one after the other."""
-    checker = _Checker(source)
+    Args:
+        source: The file.
+        unreadable: Numbers of lines in whose place others stand: nothing more is said of them.
+        words: Names that those lines may have set.
+    """
+    checker = _Checker(source, unreadable, words)
     return [finding for program in source.programs for finding in checker.program(program)]
 
 
 class _Checker:
-    def __init__(self, source: SourceFile) -> None:
+    def __init__(self, source: SourceFile, unreadable: Collection[int], words: Collection[str]) -> None:
+        self._unreadable = unreadable
         self._programs = {program.name: program for program in source.programs}
         self._context = Context(Arm(EngineRobot(Engine(puma560.model()))))
         """For what compiling shows; nothing runs in it."""
@@ -143,6 +123,7 @@ class _Checker:
             self._known[""][entry.variable.name].add("real")
         for program in source.programs:
             self._gather(program)
+        self._set[""].update(words)
 
     def _gather(self, program: Program) -> None:
         own = self._own(program)
@@ -167,7 +148,7 @@ class _Checker:
     def program(self, program: Program) -> Iterator[Finding]:
         """What is wrong with a program."""
         structure, errors = survey(program)
-        yield from (_error(error) for error in errors)
+        yield from (_error(e) for e in errors if e.place is None or e.place.line not in self._unreadable)
         own = self._own(program)
         parameters = {parameter.name for parameter in program.parameters}
         known = {
@@ -178,8 +159,13 @@ class _Checker:
         }
         usable = self._set[program.name] | {name for name in self._set[""] if name not in own}
         reported: set[str] = set()
-        yield from _cases(program, structure, known)
         for number, step in enumerate(program.steps, 1):
+            if step.at.line in self._unreadable:
+                continue
+            head = structure.blocks.get(number - 1)
+            above = None if head is None else program.steps[head.start]
+            for error in () if above is None or above.at.line in self._unreadable else _case(step, above, known):
+                yield _error(error.at(program=program.name, step=number, place=step.at))
             for finding in self._step(step, known, usable, reported):
                 error = finding.error.at(program=program.name, step=number, place=step.at)
                 yield Finding(finding.severity, error, error.place)
@@ -229,6 +215,8 @@ class _Checker:
                 if called is None:
                     yield self._undefined(name, at)
                     return
+                if called.at.line in self._unreadable:
+                    return
                 parameters = called.parameters
                 if len(arguments) > len(parameters):
                     detail = f"{name} takes {len(parameters)}, and here are {len(arguments)}"
@@ -244,25 +232,15 @@ class _Checker:
         return ValError("Undefined program", f"{name}{close.lower()}", place=at)
 
 
-def _cases(program: Program, structure: Structure, known: dict[str, str]) -> Iterator[Finding]:
+def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
     """CASE of what is neither a number nor a string, and VALUE of what can't be the same."""
-    for i, step in enumerate(program.steps):
-        head = structure.blocks.get(i)
-        values: tuple[Expression, ...] = ()
-        match step.statement:
-            case Case(value):
-                given, values = value, (value,)
-            case Value(values) if head is not None and isinstance(
-                case := program.steps[head.start].statement, Case
-            ):
-                given = case.value
-            case _:
-                continue
-        wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
-        for value in values:
-            for mistake in kinds.mistakes(value, wanted, known):
-                error = mistake.at(program=program.name, step=i + 1, place=step.at)
-                yield _error(error)
+    if not isinstance(head.statement, Case):
+        return
+    given = head.statement.value
+    values = step.statement.values if isinstance(step.statement, Value) else (given,) if step is head else ()
+    wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
+    for value in values:
+        yield from kinds.mistakes(value, wanted, known)
 
 
 def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:

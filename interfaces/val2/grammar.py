@@ -76,7 +76,8 @@ def read(text: str, start: str, line: int) -> Node:
         if error.token.type == "$END":
             raise _unexpected("the end of the line", error.accepts, Place(line, len(text.rstrip()) + 1)) from None
         shown = f"'{error.token}'"
-        raise _unexpected(shown, error.accepts, Place(line, error.column)) from None
+        allowed = error.accepts or _accepted_behind(text[: error.column - 1], start)
+        raise _unexpected(shown, allowed, Place(line, error.column)) from None
     except UnexpectedCharacters as error:
         place = Place(line, error.column)
         if text[error.column - 1] == '"':
@@ -85,6 +86,14 @@ def read(text: str, start: str, line: int) -> Node:
         raise _unexpected(shown, error.allowed or frozenset(), place) from None
     except UnexpectedInput:
         raise ValError("Syntax error", place=Place(line, 1)) from None
+
+
+def _accepted_behind(text: str, start: str) -> set[str]:
+    """What may stand behind a text: what is found wrong when the text counts as complete leaves Lark without it."""
+    parser = _lark().parse_interactive(text, start=start)
+    parser.exhaust_lexer()
+    accepted: set[str] = parser.accepts()
+    return accepted
 
 
 def _unexpected(what: str, allowed: Sequence[str] | frozenset[str] | set[str], place: Place) -> ValError:
@@ -100,7 +109,8 @@ def _unexpected(what: str, allowed: Sequence[str] | frozenset[str] | set[str], p
     shown += sorted(_SHOWN.get(name, name) for name in left - {"$END"} if not name.startswith("__"))
     if last:
         shown.append(_SHOWN["$END"])
-    return ValError("Syntax error", f"unexpected {what}; allowed: {', '.join(shown)}", place=place)
+    allowed_here = f"; allowed: {', '.join(shown)}" if shown else ""
+    return ValError("Syntax error", f"unexpected {what}{allowed_here}", place=place)
 
 
 @cache

@@ -173,5 +173,10 @@ def _listed(slots: tuple[Slot, ...], repeats: bool) -> str:
 
 def nearest(word: str, words: Iterable[str]) -> str:
     """`; did you mean MOVES?`, or nothing."""
-    close = difflib.get_close_matches(word.upper(), list(words), n=1, cutoff=0.7)
-    return f"; did you mean {close[0]}?" if close else ""
+    close = nearest_word(word, words)
+    return f"; did you mean {close}?" if close else ""
+
+
+def nearest_word(word: str, words: Iterable[str]) -> str:
+    """The word that is most like another, upper case; empty where none is."""
+    return next(iter(difflib.get_close_matches(word.upper(), list(words), n=1, cutoff=0.7)), "")

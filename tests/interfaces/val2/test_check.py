@@ -271,3 +271,48 @@ def test_what_counts_as_less_is_said(line):
     ((severity, what, detail, *_),) = found(line)
     assert (severity, what) == ("warning", "Value out of range")
     assert detail.endswith("counts as 100 %")
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["IF x = = 1 THEN", "x = 1", "ELSE", "x = 2", "END"],
+        ["IF (1 THEN", "END"],
+        ["IFF 1 THEN", "x = 1", "END"],
+        ["10 IF 1 = GOTO 20", "20 GOTO 10"],
+        ["IF ) THEN 20", "20"],
+        ["FOR i = 1 TOO 3", "TYPE i", "EXIT", "END"],
+        ["FRO i = 1 TO 3", "TYPE i", "NEXT", "END"],
+        ["WHILE ) DO", "EXIT", "END"],
+        ["WHLE 1 DO", "NEXT", "END"],
+        ["DO 5", "x = 1", "UNTIL x == 1"],
+        ["DO", "x = 1", "UNTIL x =="],
+        ["CASE ) OF", 'VALUE "a":', "VALUE 2:", "ANY", "END"],
+        ["CASE 1 OF", "VALUE ):", "ANY", "END"],
+        ["CASE 1 OF", "VALUE 1:", "ANY 5", "END"],
+        ["IF TRUE THEN", "ELSE 5", "END"],
+        ["IF TRUE THEN", "ELSIF", "END"],
+        ["10 MOVE )", "GOTO 10"],
+        ["n = )", "TYPE n"],
+        ["SET p = TRANS(", "MOVE p"],
+        ["PROMPT 'n?', n", "TYPE n"],
+        ["70000 x = 1", "TYPE x"],
+        ["$for = )", "TYPE $for"],
+        ["FOR = )"],
+    ],
+)
+def test_one_fault_is_one_message(lines):
+    assert len(found(*lines)) == 1
+
+
+def test_a_header_that_cant_be_read_is_one_message():
+    text = ".PROGRAM main()\nCALL part(1, 2)\n.END\n.PROGRAM part(a, b\nTYPE a, b\n.END\n"
+    (only,) = check_text(text, "t.v2")[1]
+    assert (only.error.what, only.place.line) == ("Syntax error", 4)
+
+
+def test_faults_beside_one_that_cant_be_read_are_still_found():
+    lines = ["FOR i = 1 TOO 3", "x = LEN(3)", "END", "END", "y = z + 1"]
+    assert [(f[1], f[3]) for f in found(*lines)] == [
+        ("Syntax error", 2), ("Mixed types", 3), ("Control structure error", 5), ("Undefined value", 6),
+    ]  # fmt: skip

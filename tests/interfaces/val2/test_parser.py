@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import time
 from pathlib import Path
 
@@ -406,3 +407,34 @@ def test_a_long_program_is_read_quickly():
         parse_program(text)
         took.append(time.process_time() - begin)
     assert min(took) < 0.5
+
+
+def refusal(line):
+    """Why a line can't be one; empty where it can."""
+    try:
+        parse_line(line)
+    except ValError as error:
+        return str(error)
+    return ""
+
+
+def test_what_is_allowed_is_never_nothing():
+    """Every beginning of a line may be followed by something, the end of the line at least."""
+    words = '5 NULL x ) ( @ = == ALWAYS THEN TO BY GOTO /S / "a" " , [ ] a[1] $s #p MOD - NOT : STEP TRANS( ^ 1E'
+    rng = random.Random(7)
+    for keyword in (*forms.INSTRUCTIONS, "x =", "SET p =", ""):
+        for count in range(1, 5):
+            line = " ".join([keyword, *rng.choices(words.split(), k=count)])
+            assert not re.search(r"allowed: ?(,|$)|unexpected [^;]*$", refusal(line)), line
+
+
+@pytest.mark.parametrize(
+    ("text", "allowed"),
+    [
+        ("30 ALWAYS", "an operator, ':', the end of the line"), ("30 )", "an operator, ':', the end of the line"),
+        ("NULL NULL", "an operator, '(', ':', '[', the end of the line"), ("(30", "')'"),
+    ],
+)  # fmt: skip
+def test_what_is_allowed_behind_an_expression(text, allowed):
+    with pytest.raises(ValError, match=re.escape(f"allowed: {allowed}, line 1")):
+        parse_expression(text)
