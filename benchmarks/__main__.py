@@ -13,7 +13,7 @@ from benchmarks.running import run
 
 PARTS = (
     "sampling", "past", "commands", "edits", "straight", "hand", "memory", "kinematics", "twins", "physics", "wire",
-    "val2", "recording", "mobile", "localization", "rsp", "middleware",
+    "val2", "recording", "mobile", "localization", "rsp", "middleware", "availability",
 )  # fmt: skip
 """Benchmarks that give results."""
 DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station", "camera")

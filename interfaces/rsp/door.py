@@ -12,9 +12,10 @@ from interfaces.rsp.header import Header, Type
 from interfaces.rsp.numbers import MODULUS
 from interfaces.rsp.security import TAG, Keyring, Opener, Rank, Sealer
 from interfaces.rsp.session import Drop, Dropped, Session, milliseconds
+from interfaces.stream.limits import Bucket
 
 RATE: Final = 100.0
-"""Requests for a session that are looked at [1/s]."""
+"""Requests for a session that are looked at [1/s], of proven addresses and of others."""
 
 
 @dataclass(slots=True, eq=False)
@@ -59,7 +60,8 @@ class Door:
         self._model, self._random, self._keys = model, random_bytes, keys
         self._idle, self._takeover = idle, takeover
         self._cookies = Cookies(random_bytes(32))
-        self._allowed, self._since = RATE, 0.0
+        self._allowed = {proven: Bucket(RATE, RATE, 0.0) for proven in (False, True)}
+        """Requests by whether their address is proven: who makes addresses up takes nothing from who has one."""
         self.pending: Claim | None = None
         """A session that was given, and in which nothing came yet; whoever asks next has it instead."""
 
@@ -85,17 +87,15 @@ class Door:
         asked = handshake.decode_open(body)
         if self._keys is not None and asked.rank is not rank:
             raise Dropped(Drop.AUTHENTICATION)
-        self._allowed = min(RATE, self._allowed + RATE * max(now - self._since, 0.0))
-        self._since = now
-        if self._allowed < 1.0:
+        proven = self._cookies.good(asked, address, now)
+        if not self._allowed[proven].take(now):
             raise Dropped(Drop.UNEXPECTED)
-        self._allowed -= 1.0
 
         def answer(kind: Type, body: bytes, session: int = 0) -> list[tuple[bytes, bytes]]:
             made = Header(self._model, False, kind, 0, milliseconds(now), session, MODULUS - 1, 0)
             return [(handshake.sent(kind, body, made, self._keys, asked.rank), address)]
 
-        if not self._cookies.good(asked, address, now):
+        if not proven:
             cookie = self._cookies.cookie(address, asked.nonce, now)
             return answer(Type.CHALLENGE, handshake.encode_answer(Answer(asked.nonce, cookie)))
         refusal = self._refusal(asked, heard, now)

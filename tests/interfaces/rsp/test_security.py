@@ -337,6 +337,16 @@ def test_the_same_question_from_another_address_is_another_session() -> None:
     assert len(sessions) == 2
 
 
+def test_who_makes_addresses_up_locks_nobody_out_whose_address_is_proven() -> None:
+    robot = RobotCore(MODEL, Random(1).randbytes)
+    question = challenged(robot, b"n" * 16, ADDRESS, 5.0)
+    for k in range(1000):
+        asked(robot, Open(Rank.OPERATOR, False, k.to_bytes(16, "big")), k.to_bytes(6, "big"), 5.0)
+    assert robot.dropped[Drop.UNEXPECTED] > 800
+    *_, (kind, to, _, _) = asked(robot, question, ADDRESS, 5.0)
+    assert (kind, to) == (Type.OPENED, ADDRESS)
+
+
 def test_an_operators_key_doesnt_make_an_admin() -> None:
     robot = RobotCore(MODEL, Random(1).randbytes, keys=KEYS)
     assert asked(robot, Open(Rank.OPERATOR, True, b"n" * 16), ADDRESS, 0.0, KEYS)[0][0] is Type.CHALLENGE

@@ -1,0 +1,192 @@
+"""Loads on a server of this machine, each a process of its own, bounded in number and time.
+
+`python benchmarks/loads.py KIND PORT SECONDS [TOKEN]` says `on` when it's on, and ends with its time or its input.
+It knows the server from docs/protocol.md and docs/console.md alone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import contextlib
+import json
+import os
+import select
+import socket
+import struct
+import sys
+import time
+from collections.abc import Callable
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+HERE = "127.0.0.1"
+VIEWERS, WANTS = 30, 450
+"""Viewers, and messages a second of each: a tenth less than closes a connection."""
+IDLE = 2048
+"""Sockets that are held open."""
+REOPENED = 500
+"""Sockets a second that are opened again where the server closed them."""
+CONNECTIONS = 4000
+"""Connections a second that come and go."""
+TERMINALS = 64
+"""Sockets at the VAL-II port that show no token."""
+LOADED = "flood.v2"
+"""A program of a megabyte, in the server's directory."""
+_TICK = 0.02
+
+
+def ended() -> bool:
+    """Whether standard input has."""
+    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
+    return bool(ready) and not sys.stdin.read(1)
+
+
+def on() -> None:
+    """Say that the load is on."""
+    print("on", flush=True)
+
+
+async def _view(port: int, until: float) -> None:
+    async with connect(f"ws://{HERE}:{port}/ws", subprotocols=["vrs.1.json"], proxy=None) as peer:  # type: ignore[list-item]
+        await peer.send('{"type":"hello","protocol":1,"role":"viewer","name":"load"}')
+        await peer.send('{"type":"follow","number":1,"form":"segments"}')
+        reading = asyncio.create_task(_drop(peer))
+        kinds = (
+            {"type": "want", "edit": 0},
+            {"type": "want", "edit": 1, "index": 0},
+            {"type": "survey", "number": 1},
+            {"type": "ask", "number": 1},
+            {"type": "ping", "number": 1, "t": 0.0},
+        )
+        texts, sent, begun = [json.dumps(kind) for kind in kinds], 0, time.monotonic()
+        with contextlib.suppress(ConnectionClosed):
+            while time.monotonic() < until:
+                while sent < WANTS * (time.monotonic() - begun):
+                    # Mostly what costs most.
+                    await peer.send(texts[0 if sent % 2 else sent // 2 % len(texts)])
+                    sent += 1
+                await asyncio.sleep(_TICK)
+        reading.cancel()
+
+
+async def _drop(peer: ClientConnection) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        async for _ in peer:
+            pass
+
+
+async def view(port: int, seconds: float) -> None:
+    """Viewers at all that they may send."""
+    until = time.monotonic() + seconds
+    tasks = [asyncio.create_task(_view(port, until)) for _ in range(VIEWERS)]
+    await asyncio.sleep(1.0)
+    on()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def _idle(port: int, number: int) -> socket.socket:
+    """A socket that says nothing, or begins a request, or opens a WebSocket and doesn't say who it is."""
+    peer = socket.create_connection((HERE, port), timeout=5.0)
+    host = f"Host: {HERE}:{port}\r\n"
+    if number % 3 == 1:
+        peer.sendall(f"GET / HTTP/1.1\r\n{host}".encode())
+    elif number % 3 == 2:
+        key = base64.b64encode(os.urandom(16)).decode()
+        upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        own = f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Protocol: vrs.1.json\r\n\r\n"
+        peer.sendall(f"GET /ws HTTP/1.1\r\n{host}{upgrade}{own}".encode())
+    peer.setblocking(False)
+    return peer
+
+
+def _is_closed(peer: socket.socket) -> bool:
+    try:
+        return peer.recv(4096) == b""
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+def idle(port: int, seconds: float) -> None:
+    """Sockets that are held open, and opened again where they were closed."""
+    until = time.monotonic() + seconds
+    peers = [_idle(port, number) for number in range(IDLE)]
+    on()
+    while time.monotonic() < until and not ended():
+        again = 0
+        for number, peer in enumerate(peers):
+            if again < REOPENED * 0.1 and _is_closed(peer):
+                peer.close()
+                with contextlib.suppress(OSError):
+                    peers[number] = _idle(port, number)
+                again += 1
+        time.sleep(0.1)
+    for peer in peers:
+        peer.close()
+
+
+def come_and_go(port: int, seconds: float) -> None:
+    """Connections that come, say nothing or half of something, and go."""
+    begun, made = time.monotonic(), 0
+    on()
+    # Closed by a reset: what was closed otherwise keeps its port for a minute.
+    linger = struct.pack("ii", 1, 0)
+    while (passed := time.monotonic() - begun) < seconds:
+        if made % 256 == 0 and ended():
+            break
+        if made >= CONNECTIONS * passed:
+            time.sleep(0.002)
+            continue
+        with socket.socket() as peer, contextlib.suppress(OSError):
+            peer.settimeout(1.0)
+            peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+            peer.connect((HERE, port))
+            if made % 2:
+                peer.send(b"GET / HTTP/1.1\r\nHost")
+        made += 1
+    print(f"{made / (time.monotonic() - begun):.0f} a second", flush=True)
+
+
+def type_on(port: int, seconds: float, token: str) -> None:
+    """A terminal that sends lines and loads a megabyte, as fast as it's let; and others without a token."""
+    until = time.monotonic() + seconds
+    others: list[socket.socket] = []
+    with socket.create_connection((HERE, port), timeout=5.0) as peer:
+        peer.sendall(f"{token}\r\n".encode())
+        on()
+        peer.setblocking(False)
+        lines = (f"load {LOADED}\r\n" + "x = 1\r\ndo x = x + 1\r\nlistr x\r\n" * 2000).encode()
+        sent = 0
+        while time.monotonic() < until and not ended():
+            with contextlib.suppress(BlockingIOError):
+                sent += peer.send(lines[sent % len(lines) :])
+            with contextlib.suppress(BlockingIOError):
+                while peer.recv(65536):
+                    pass
+            with contextlib.suppress(OSError):
+                others.append(socket.create_connection((HERE, port), timeout=1.0))
+            if len(others) > TERMINALS:
+                others.pop(0).close()
+            time.sleep(0.002)
+    for other in others:
+        other.close()
+    print(f"{sent} bytes", flush=True)
+
+
+def main(words: list[str]) -> None:
+    """Be one load."""
+    kind, port, seconds = words[0], int(words[1]), float(words[2])
+    loads: dict[str, Callable[[], None]] = {
+        "viewers": lambda: asyncio.run(view(port, seconds)),
+        "idle": lambda: idle(port, seconds),
+        "connections": lambda: come_and_go(port, seconds),
+        "terminals": lambda: type_on(port, seconds, words[3]),
+    }
+    loads[kind]()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
