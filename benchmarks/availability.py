@@ -60,7 +60,7 @@ def served(directory: Path) -> Iterator[Ports]:
     command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--val-port", "0",
                "--val-files", str(directory), "--until-eof"]  # fmt: skip
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True) as process:
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         try:
@@ -190,7 +190,7 @@ class Operator:
 
     async def ready(self) -> None:
         """Have control over a robot that follows."""
-        async with asyncio.timeout(60.0):
+        async with asyncio.timeout(120.0):
             while not self.epoch or not self.state or self.state.get("halted"):
                 if not self.epoch:
                     await self.send({"type": "acquire", "number": 1})

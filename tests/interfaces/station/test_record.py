@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import socket
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -243,6 +246,34 @@ def test_wrong_names_and_rights_are_refused_with_one_message(page: Page, served:
     assert served.ask(begin, Host="evil.example")[0] == 403
     assert not (served.directory / "refused.mcap").exists()
     assert page.get(NOW) is None
+
+
+def test_a_request_is_waited_for_no_longer_than_it_may_take_and_not_at_all_without_a_token(served: Served) -> None:
+    """By raw sockets: a body that drips, with a viewer's token; none of a stranger's is waited for."""
+    port = int(station(served.server).rsplit(":", 1)[1].strip("/"))
+    head = f"POST /recordings HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 1000\r\n"
+
+    def answer(token: str) -> tuple[bytes, float]:
+        begun = time.monotonic()
+        with socket.create_connection(("127.0.0.1", port), timeout=0.1) as peer:
+            peer.sendall(f"{head}{token}\r\n".encode())
+            while time.monotonic() < begun + 30.0:
+                with contextlib.suppress(TimeoutError):
+                    try:
+                        peer.sendall(b" ")
+                        if heard := peer.recv(4096):
+                            return heard, time.monotonic() - begun
+                    except ConnectionError:
+                        heard = b""
+                    return heard, time.monotonic() - begun
+        raise AssertionError("it's waited for")
+
+    heard, took = answer("")
+    assert heard.startswith(b"HTTP/1.1 403")
+    assert took < 5.0
+    heard, took = answer(f"Authorization: Bearer {served.tokens[Role.VIEWER]}\r\n")
+    assert heard == b""
+    assert 4.0 < took < 20.0
 
 
 def test_one_who_watches_sees_it_and_may_replay(browser: Any, served: Served) -> None:
