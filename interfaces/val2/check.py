@@ -172,7 +172,7 @@ class _Checker:
 
     def _step(self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]) -> Iterator[Finding]:
         statement = step.statement
-        if isinstance(statement, Ignored):
+        if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))

@@ -16,6 +16,7 @@ from interfaces.val2.dialogue import prompt_step, type_step
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Warned
 from interfaces.val2.expressions import Expressions, ResultKind
+from interfaces.val2.forms import UNAVAILABLE
 from interfaces.val2.geometry import to_oat
 from interfaces.val2.instructions import StepFunction, instruction
 from interfaces.val2.memory import MOST_DIMENSIONS, Slot, index, mismatch, undefined, where
@@ -186,6 +187,8 @@ class _Compiler:
                 return self._decompose(decompose, following)
             case React() as react:
                 return self._react(react, following)
+            case Ignored(keyword, _, at) if keyword in UNAVAILABLE:
+                raise ValError("Not available", f"{keyword}: {UNAVAILABLE[keyword]}", place=where(at))
             case Ignored(keyword):
                 text = f"{keyword} has no meaning here: program {self.program.name}, step {i + 1}"
 

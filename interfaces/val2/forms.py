@@ -157,6 +157,20 @@ IGNORED: Final = frozenset((
 ))  # fmt: skip
 """Keywords that are recognised but have no meaning here: files, welding, other tasks."""
 
+_ONE_TASK: Final = "there is one program at a time; allowed: CALL program"
+UNAVAILABLE: Final = {
+    **dict.fromkeys(("ABORT", "CYCLE.END", "EXECUTE", "KILL", "PRIME", "PROCEED", "RETRY"), _ONE_TASK),
+    **dict.fromkeys(("CLEAR.EVENT", "SET.EVENT"), "there are no events; allowed: SIGNAL number, WAIT SIG(number)"),
+    **dict.fromkeys(("REACTE", "RETURNE"), "an error stops the program"),
+    "BITS": "allowed: SIGNAL number, ..",
+    "MC": "commands are the monitor's",
+    "READ": "there are no files; allowed: PROMPT text, variable",
+    "RUNSIG": "allowed: SIGNAL number",
+    "WEAVE": "allowed: MOVES location",
+    "WINDOW": "there is no conveyor",
+}
+"""Those of them without whose work a program would do something else: an error where it comes there, and why."""
+
 _REAL_FUNCTIONS: Final = (
     function("ABS", "x", "real", "Absolute value.", "VAL-II"),
     function("ASC", "text:string, index?", "real", "Code of a character.", "VAL-II"),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Final
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import Place, ValError
 from interfaces.val2.grammar import Node, Worded
-from interfaces.val2.slots import MISSING, TOO_MANY, Form
+from interfaces.val2.slots import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.syntax import Apply, Expression, Number, Text, Unary, Variable
 
 HIGHEST_LABEL: Final = 65535
@@ -178,3 +179,15 @@ def label_of(operand: Expression | None, rest: Rest) -> int:
     if isinstance(operand, Number):
         return checked_label(operand.value, operand.at)
     raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=operand.at if operand else rest.start)
+
+
+def see_no_slip(kind: str, names: list[str], known: Collection[str], at: Place) -> None:
+    """See that names which aren't known don't look like those that are, and don't stand beside them.
+
+    Raises:
+        ValError: If one does.
+    """
+    for name in names:
+        close = nearest(name, known)
+        if name not in known and (close or len(names) > sum(one not in known for one in names)):
+            raise ValError(f"Unknown {kind}", f"{name}{close}; allowed: {', '.join(sorted(known))}", place=at)

@@ -98,6 +98,7 @@ class _Reader:
                     program, i = read_program(self._lines, i)
                     self._add(program)
                 case ".LOCATIONS" | ".REALS" | ".STRINGS" | ".SIGNALS" as section:
+                    _see_alone(line, section, i + 1)
                     i = self._section(section, i + 1)
                 case ".END":
                     i += 1
@@ -141,6 +142,15 @@ class _Reader:
                 variable, value = _ENTRIES[section](code, i + 1)
                 self._entries[section][variable] = value
         return len(self._lines)
+
+
+def _see_alone(line: str, section: str, number: int) -> None:
+    """See that nothing stands behind the word that begins a section."""
+    code, _ = split_comment(line, number)
+    behind = code.lstrip()[len(section) :]
+    if behind.strip():
+        column = len(code) - len(behind.lstrip()) + 1
+        raise ValError("Syntax error", f"allowed: {section} alone on its line", place=Place(number, column))
 
 
 def _variable(code: str, line: int, prefixes: str) -> tuple[Variable, int]:

@@ -9,7 +9,7 @@ from typing import Final
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import Place, ValError
-from interfaces.val2.rest import Rest, as_word, count, label, label_of, operands_and_words
+from interfaces.val2.rest import Rest, as_word, count, label, label_of, operands_and_words, see_no_slip
 from interfaces.val2.slots import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.syntax import (
     AnyValue,
@@ -196,6 +196,7 @@ def _parameter(keyword: str, rest: Rest) -> Statement:
         raise ValError("Syntax error", f"allowed: {row.usage}", place=rest.start)
     name = found[1].upper()
     if name not in forms.PARAMETERS:
+        see_no_slip("parameter", [name], forms.PARAMETERS, Place(rest.line, found.start(1) + 1))
         return Ignored(keyword, rest.text.strip(), rest.at)
     if found[2] is None:
         raise ValError(MISSING, f"allowed: {row.usage}", place=Place(rest.line, found.end() + 1))
@@ -214,6 +215,7 @@ def _switches(keyword: str, rest: Rest) -> Statement:
             raise ValError("Syntax error", f"allowed: {row.usage}", place=at)
         names.append(name)
     if any(name not in forms.SWITCHES for name in names):
+        see_no_slip("switch", names, forms.SWITCHES, rest.start)
         return Ignored(keyword, rest.text.strip(), rest.at)
     return Instruction(keyword, (), tuple(names), rest.at)
 

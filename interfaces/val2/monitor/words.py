@@ -77,7 +77,9 @@ def explained(word: str) -> Iterator[tuple[str, str, str]]:
         if upper in table:
             yield kind, upper, table[upper]
     if upper in forms.IGNORED and upper not in COMMANDS:
-        yield "instruction, V+", upper, "It's recognised in programs, and passed over: it has no meaning here."
+        why = forms.UNAVAILABLE.get(upper)
+        passed = "It's recognised in programs, and passed over: it has no meaning here."
+        yield "instruction, V+", upper, passed if why is None else f"It isn't available: {why}."
 
 
 def help_(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form

@@ -316,3 +316,26 @@ def test_faults_beside_one_that_cant_be_read_are_still_found():
     assert [(f[1], f[3]) for f in found(*lines)] == [
         ("Syntax error", 2), ("Mixed types", 3), ("Control structure error", 5), ("Undefined value", 6),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "line", ["EXECUTE 1 bg", "ABORT 1", "READ (5) x", "WEAVE 3, 1", "MC LOAD a", "SET.EVENT 1", "BITS 1, 8 = 5"]
+)
+def test_what_a_program_cant_go_without_is_an_error(line):
+    ((severity, what, detail, *_),) = found(line)
+    assert (severity, what) == ("error", "Not available")
+    assert detail.startswith(line.split()[0])
+
+
+@pytest.mark.parametrize(
+    "line", ["ENABLE DRY.RUNN", "ENABLE CP, scale", "DISABLE POWR", "PARAMETER HAND.TIMES = 1"]
+)
+def test_a_slip_in_a_name_isnt_passed_over(line):
+    ((severity, what, detail, *_),) = found(line)
+    assert (severity, what[:7]) == ("error", "Unknown")
+    assert "allowed: " in detail
+
+
+def test_values_beside_the_word_of_their_section_arent_passed_over():
+    ((_, what, detail, line, column),) = found("x = 1", sections=".REALS count 3\n.END")
+    assert (what, detail, line, column) == ("Syntax error", "allowed: .REALS alone on its line", 4, 8)

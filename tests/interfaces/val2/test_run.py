@@ -193,3 +193,13 @@ def test_speeds_that_count_as_less_are_said_once():
         "SPEED 150 % counts as 100 %", "SPEED 900 MMPS counts as 500 MMPS", "Monitor SPEED 120 % counts as 100 %",
         "DRIVE at 130 % counts as 100 %",
     ]  # fmt: skip
+
+
+def test_a_task_that_cant_be_started_ends_the_run(tmp_path):
+    path = tmp_path / "tasks.v2"
+    path.write_text(program("TYPE 1", "EXECUTE 1 bg", "TYPE 2") + program("SIGNAL 1", name="bg"))
+    assert vrs("check", path, "--static") == 2
+    assert vrs("run", path, "--out", tmp_path / "out") != 0
+    played, typed, _ = twins(path.read_text())
+    assert played.error.what == "Not available"
+    assert (played.error.step, typed.split()) == (2, ["1"])

@@ -202,7 +202,7 @@ statements = st.one_of(
         st.sampled_from(["", "REAL", "LOC"]),
     ),
     st.builds(Ignored, ignored, rests),
-    st.just(Ignored("DISABLE", "color.speed, CP")),
+    st.just(Ignored("DISABLE", "color.speed, scale")),
     st.just(Ignored("PARAMETER", "vscale = 3")),
 )
 comments = st.none() | st.text(
