@@ -52,6 +52,8 @@ class Receipt:
     """Ids for `shifted`, or what finds them: naming a long tail takes time that a command hasn't got."""
     superseded_names: Names = ()
     """Ids for `superseded`, or what finds them."""
+    hindrance: str = ""
+    """Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it."""
 
     @property
     def shifted(self) -> tuple[int, ...]:

@@ -167,7 +167,7 @@ class Scheduler(Agenda[Timeline]):
             if hold <= 0:
                 raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
             state = self.timeline.state_before(t)
-            plan, note = steering.steer(
+            plan, note, hindrance = steering.steered(
                 state, command.rates, command.twist, command.frame, hold, self.model, self.limits
             )
         except REFUSALS as error:
@@ -183,13 +183,17 @@ class Scheduler(Agenda[Timeline]):
         if len(plan) or t < before.end or session is None:
             after = lengthened(before, t, piece(plan, command_id))
         if after is before:
-            return self.ledger.receipt(command_id)
+            stands = self.ledger.receipt(command_id)
+            if stands.hindrance != hindrance:
+                stands = replace(stands, hindrance=hindrance)
+                self.ledger.rewrite(stands)
+            return stands
         target = end_position(plan) if len(plan) else state.q
         self.note_profile(command_id, Profile.JERK_LIMITED)
         self._session = _Session(command_id, after.version, start)
         receipt = Receipt(
             command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
-            joined(moment.reason, note), after.version,
+            joined(moment.reason, note), after.version, hindrance=hindrance,
         )  # fmt: skip
         if session is not None:
             self.timeline = after

@@ -6,7 +6,8 @@ Every plan ends at rest, so the watchdog is in the plan: what no further input r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
+from math import degrees, hypot
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +20,7 @@ from vrs.model import Array, Limits, RobotModel
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, violation
 from vrs.planning.steer_course import (
+    SLOW_FROM,
     Twist,
     damped_rates,
     rates_to_limits,
@@ -28,8 +30,23 @@ from vrs.planning.steer_course import (
 from vrs.planning.steer_joint import rates_plan
 from vrs.planning.steer_tool import STANDING, along
 
+_SLOWED = 0.5
+"""A hand is told what is in its way where less than this share is left of what it asks for."""
+_TRIED = 0.1
+"""How far each joint is moved to see whether that leads away from a singularity [rad]."""
 BRAKED_ONLY = "braked with parabolas: no jerk-limited plan from this state keeps the limits"
 DROPPED = "accelerations dropped at the start: bounded jerk would pass a speed limit from this state"
+
+
+class Steered(NamedTuple):
+    """What comes of a hand's input."""
+
+    plan: Plan
+    """Certified, ends at rest; empty where the arm stands and stays."""
+    note: str
+    """What the user must know of it; empty if nothing."""
+    hindrance: str
+    """What keeps the arm from going as asked, and what leads away from it; empty if nothing does."""
 
 
 def steer(
@@ -41,6 +58,19 @@ def steer(
     model: RobotModel,
     limits: Limits,
 ) -> tuple[Plan, str]:
+    """Return the plan and the note of `steered`."""
+    return steered(state, rates, twist, frame, hold, model, limits)[:2]
+
+
+def steered(
+    state: State,
+    rates: ArrayLike | None,
+    twist: ArrayLike | None,
+    frame: Frame,
+    hold: float,
+    model: RobotModel,
+    limits: Limits,
+) -> Steered:
     """Plan what a hand asks for now, for as long as the input is fresh, and the stop after that.
 
     Args:
@@ -53,10 +83,6 @@ def steer(
         model: The arm.
         limits: Limits that hold at every instant.
 
-    Returns:
-        A certified plan that ends at rest, empty where the arm stands and stays; and what the user must know of
-        it (empty if nothing).
-
     Raises:
         InvalidValueError: If not exactly one of rates and twist is given, or something is of the wrong form.
         PlanningError: If the state can't be brought to rest within the limits.
@@ -67,7 +93,7 @@ def steer(
         raise InvalidValueError("frame", frame, "base or tool")
     if rates is not None and twist is None:
         u = finite_array("rates", rates, (n,), f"finite joint rates [rad/s], shape ({n},)")
-        return _by_rates(state, u, lasting, limits)
+        return Steered(*_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits))
     if twist is None or rates is not None:
         raise InvalidValueError("rates and twist", (rates, twist), "one of the two, the other None")
     given = finite_array("twist", twist, (6,), "a finite twist (v [m/s], w [rad/s]), shape (6,)")
@@ -99,19 +125,57 @@ def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twis
     return Twist(v / scale_linear, w / scale, frame is Frame.TOOL)
 
 
-def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, str]:
+def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits) -> Steered:
     J = weighted_jacobian(model, state.q[None])
     asked = np.concatenate([twist.linear, twist.angular])
     u = damped_rates(J, asked[None])[0][0]
     if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
-        return _released(state, J[0], hold, model, limits)
+        stuck = hold > 0.0 and bool(asked.any())
+        return Steered(*_released(state, J[0], hold, model, limits), _singular(state.q, model) if stuck else "")
     low, high = rates_to_limits(state.q, limits)
     blocked = bool((u < low).any() or (u > high).any())
     plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
+    hindrance = _at_limit(state.q, u, limits)
+    missed = asked - J[0] @ u
+    slowed = share < _SLOWED or float(missed @ missed) > (1.0 - _SLOWED) ** 2 * float(asked @ asked)
+    if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
+        hindrance = _singular(state.q, model)
     if plan is not None:
-        return plan, ""
+        return Steered(plan, "", hindrance)
     u = share * sliding_rates(J[0], asked, low, high)
-    return _by_rates(state, u, hold, limits, _together(state, u, limits))
+    return Steered(*_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance)
+
+
+def _at_limit(q: Array, u: Array, limits: Limits) -> str:
+    """Say which joint a position limit keeps from moving at the rates u [rad/s]; empty where none does."""
+    low, high = rates_to_limits(q, limits)
+    most = np.where(u < 0.0, -low, high)
+    left = np.where(u == 0.0, 1.0, most / np.maximum(np.abs(u), 1e-12))
+    joint = int(left.argmin())
+    if left[joint] >= _SLOWED:
+        return ""
+    which, back = ("lower", "up") if u[joint] < 0.0 else ("upper", "down")
+    at = degrees(float((limits.q_min if u[joint] < 0.0 else limits.q_max)[joint]))
+    return f"joint {joint + 1} is at its {which} limit, {at:.0f}°: jog it {back}, or move back"
+
+
+def _nearness(J: Array) -> Array:
+    """σ_min / σ_max of weighted Jacobians, (k,)."""
+    S = np.linalg.svd(J, compute_uv=False)
+    return np.asarray(S[:, -1] / np.maximum(S[:, 0], 1e-300))
+
+
+def _singular(q: Array, model: RobotModel) -> str:
+    """Say which joint, and which way, leads away from the singularity that is near q."""
+    limits, n = model.limits, len(q)
+    places = np.concatenate([q + _TRIED * np.eye(n), q - _TRIED * np.eye(n)])
+    gains = _nearness(weighted_jacobian(model, places)) - _nearness(weighted_jacobian(model, q[None]))
+    gains[((places < limits.q_min) | (places > limits.q_max)).any(axis=1)] = -np.inf
+    best = int(gains.argmax())
+    joint, other = best % n, float(gains[(best + n) % (2 * n)])
+    # From a singularity itself both ways lead away.
+    way = "" if other > 0.5 * float(gains[best]) else " up" if best < n else " down"
+    return f"near a singularity: jog joint {joint + 1}{way}, or move back"
 
 
 def _released(state: State, J: Array, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, str]:

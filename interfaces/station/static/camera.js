@@ -36,7 +36,7 @@ export function mount(station, box) {
   const sound = h("button.small", { type: "button", id: "camera-sound", "aria-pressed": "false", onclick: listen },
     icon("volume_off"), h("span", {}, "Sound on"));
   const problem = h("p.advice", { id: "camera-problem", role: "status", hidden: true });
-  const said = h("p.refused", { id: "camera-refused", role: "alert", hidden: true });
+  const said = h("p.refused", { id: "camera-refused", hidden: true });
 
   const link = sideLink(station, "/media", { take: (data) => take(JSON.parse(data)), state: connected });
   const receiver = new Receiver(video, (message) => link.send(JSON.stringify(message)), fallBack);
@@ -66,7 +66,7 @@ export function mount(station, box) {
   function refuse(why) {
     said.hidden = !why;
     write(said, why);
-    if (why) station.announce(why, { urgent: true });
+    station.refuse(why);
   }
 
   function utter(what) {

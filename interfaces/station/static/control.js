@@ -28,7 +28,7 @@ export function mount(station, box) {
 
   function ask(type) {
     wanted = type === "acquire";
-    if (!session.wish(type)) station.announce("No connection: nothing was asked", { urgent: true });
+    session.wish(type);
   }
 
   function confirmTakeOver() {
@@ -81,9 +81,6 @@ export function mount(station, box) {
     // The robot was still coming to rest when it was asked for.
     if (session.holds || lease.state === "held") wanted = false;
     else if (wanted && lease.state === "free") ask("acquire");
-  });
-  station.on("problem", (problem) => {
-    if (problem.code === "lease" || problem.code === "stale-epoch") station.announce(problem.text, { urgent: true });
   });
   for (const type of ["link", "welcome"]) station.on(type, show);
   show();

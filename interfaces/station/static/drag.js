@@ -89,6 +89,7 @@ export function mount(station) {
     offset = seen(here).sub(met);
     target = here;
     droppedAt = null;
+    station.notices.use(handle);
     if (!steer.hold("drag", input, end)) return;
     handle.classList.add("held");
     pane.setPointerCapture(event.pointerId);

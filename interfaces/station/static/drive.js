@@ -25,6 +25,8 @@ export function mount(station, box) {
   document.head.append(h("link", { rel: "stylesheet", href: "/station/driving.css" }));
   const session = station.session;
   const steer = steering(station);
+  /** The buttons, by what they ask for. */
+  const buttons = new Map();
   /** Keys that are down, by what they ask for. */
   const down = new Map();
 
@@ -75,7 +77,9 @@ export function mount(station, box) {
   mountPad(station, pad, steer, { twist: ([forward, left]) => drive(forward, left) }, WORDS);
 
   function button(label, symbol, [forward, left]) {
-    return held(steer, "button", { "aria-label": label, title: label }, icon(symbol), () => drive(forward, left));
+    const made = held(steer, "button", { "aria-label": label, title: label }, icon(symbol), () => drive(forward, left));
+    buttons.set(`${forward} ${left}`, made);
+    return made;
   }
 
   // Arrow keys drive again once the mouse has let go of what takes them too.
@@ -90,6 +94,7 @@ export function mount(station, box) {
     event.preventDefault();
     if (event.repeat) return;
     down.set(event.code, parts);
+    station.notices.use(buttons.get(parts.join(" ")));
     if (down.size === 1) steer.hold("keys", pressed, () => down.clear());
   });
   window.addEventListener("keyup", (event) => {
@@ -112,11 +117,4 @@ export function mount(station, box) {
   }
 
   setInterval(tell, PERIOD);
-  // What was refused is said: the robot may be coming to rest, or wait.
-  let said = "";
-  station.on("outcome", ({ command, outcome }) => {
-    const text = command?.type === "drive" ? outcome.refusal ?? "" : "";
-    if (text && text !== said) station.announce(text, { urgent: true });
-    said = text;
-  });
 }

@@ -78,7 +78,7 @@ export function mount(station, box) {
   const { session } = station;
   const list = h("ol.jobs", { id: "jobs" });
   const empty = h("p.muted", { id: "jobs-empty" }, "No jobs yet. Add the first one below.");
-  const fault = h("p.refused", { id: "jobs-fault", role: "alert" });
+  const fault = h("p.refused", { id: "jobs-fault" });
   const stage = h("p.journey", { id: "jobs-stage", role: "status" });
   const screen = h("p.screen", { id: "jobs-shows", hidden: true });
   const policy = h("p.muted", { id: "jobs-policy" });
@@ -105,7 +105,7 @@ export function mount(station, box) {
   const places = () => listed().places ?? {};
   const say = (words) => {
     write(fault, words);
-    if (words) station.announce(words, { urgent: true });
+    station.refuse(words);
   };
   const command = (word) => ask(station, { do: word }, say);
   function send(entries, named = places()) {

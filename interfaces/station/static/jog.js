@@ -65,14 +65,19 @@ export function mount(station, box) {
     return h("section", {}, head, content);
   }
 
-  const button = (label, text, input) => held(steer, "jog", { "aria-label": label }, text, input);
+  /** The buttons, by the joint or the axis of the tool and the sign. */
+  const buttons = new Map();
+  function button(what, label, text, input) {
+    buttons.set(what, held(steer, "jog", { "aria-label": label }, text, input));
+    return buttons.get(what);
+  }
 
   AXES.forEach((name, k) => {
     const along = (sign) => () => shared.twist([0, 1, 2, 3, 4, 5].map((other) => (other === k ? sign : 0)));
     const label = k < 3 ? `Tool along ${name}` : `Tool: ${name}`;
     const keys = Object.entries(TOOL).filter(([, [axis]]) => axis === k).map(([code]) => code.replace("Key", ""));
-    axes.append(h("div.axis", { title: `Keys ${keys.join(" and ")}` }, button(label + ", minus", "−", along(-1)), h("span", {}, name),
-      button(label + ", plus", "+", along(1))));
+    axes.append(h("div.axis", { title: `Keys ${keys.join(" and ")}` }, button(`tool ${k} -1`, label + ", minus", "−", along(-1)),
+      h("span", {}, name), button(`tool ${k} 1`, label + ", plus", "+", along(1))));
   });
 
   function build() {
@@ -83,8 +88,8 @@ export function mount(station, box) {
       const bar = h("i");
       const name = `Joint ${k + 1}`;
       bars.append(h("div.joint", {}, h("span.name", {}, "J" + (k + 1)),
-        button(name + " down", "−", () => shared.rates(k, -1)),
-        h("span.track", { "aria-hidden": "true" }, bar), value, button(name + " up", "+", () => shared.rates(k, 1))));
+        button(`joint ${k} -1`, name + " down", "−", () => shared.rates(k, -1)),
+        h("span.track", { "aria-hidden": "true" }, bar), value, button(`joint ${k} 1`, name + " up", "+", () => shared.rates(k, 1))));
       return { value, bar, low: limits.q_min[k], high: limits.q_max[k] };
     });
     for (const [name, q] of Object.entries(named)) {
@@ -103,18 +108,22 @@ export function mount(station, box) {
   window.addEventListener("keydown", (event) => {
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || isTyping(event)) return;
     if (event.target.closest?.("#strip-box, select, [role=tablist], [role=separator], input, dialog")) return;
-    const input = keyed(event.code);
+    const [what, input] = keyed(event.code);
     if (!input || !session.holds) return;
     event.preventDefault();
+    station.notices.use(buttons.get(what));
     steer.hold("keys:" + event.code, input);
   });
   window.addEventListener("keyup", (event) => steer.release("keys:" + event.code));
 
   function keyed(code) {
-    if (UP.includes(code) && UP.indexOf(code) < joints.length) return () => shared.rates(UP.indexOf(code), 1);
-    if (DOWN.includes(code) && DOWN.indexOf(code) < joints.length) return () => shared.rates(DOWN.indexOf(code), -1);
-    const axis = TOOL[code];
-    return axis ? () => shared.twist([0, 1, 2, 3, 4, 5].map((k) => (k === axis[0] ? axis[1] : 0))) : null;
+    for (const [codes, sign] of [[UP, 1], [DOWN, -1]]) {
+      const joint = codes.indexOf(code);
+      if (joint >= 0 && joint < joints.length) return [`joint ${joint} ${sign}`, () => shared.rates(joint, sign)];
+    }
+    const [axis, sign] = TOOL[code] ?? [];
+    if (axis === undefined) return ["", null];
+    return [`tool ${axis} ${sign}`, () => shared.twist([0, 1, 2, 3, 4, 5].map((k) => (k === axis ? sign : 0)))];
   }
 
   /** The joints of the picture, ten times a second. */

@@ -37,6 +37,7 @@ export function mount(station, box) {
   box.append(link.element, robot.element, resume);
   askForTokens(station);
 
+  let told = "";
   function show() {
     const [name, word] = WORDS[session.link];
     link.show(TONES[session.link], name, word);
@@ -50,7 +51,11 @@ export function mount(station, box) {
     else if (busy(session)) robot.show("good", "route", "Drives by itself");
     else robot.show("good", body, "Real robot follows");
     robot.element.title = halted ? state.halted : "The real robot, as the server last heard of it";
-    resume.hidden = !(halted && session.holds);
+    const hidden = !(halted && session.holds);
+    if (resume.hidden && !hidden) requestAnimationFrame(() => resume.scrollIntoView({ block: "nearest", inline: "nearest" }));
+    resume.hidden = hidden;
+    if (halted && session.holds && halted !== told) station.announce(`Real robot waits: ${halted}`);
+    told = halted;
   }
 
   for (const type of ["link", "state", "lease", "welcome", "tasks"]) station.on(type, show);

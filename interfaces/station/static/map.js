@@ -28,7 +28,7 @@ export function mount(station, box) {
     number("x", "x", "m", true), number("y", "y", "m", true), number("heading", "Heading", "deg", false),
     h("button.main", { id: "goal-go" }, "Go"));
   const places = h("div.places", { role: "group", "aria-label": "Places" });
-  const fault = h("p.refused", { id: "goal-fault", role: "alert" });
+  const fault = h("p.refused", { id: "goal-fault" });
   const state = h("p.journey", { id: "journey", role: "status" });
   const doubt = h("p.muted", { id: "map-doubt" });
   box.append(needs(station, box, "map-needs"), chart.element,
@@ -38,7 +38,6 @@ export function mount(station, box) {
   function go(goal) {
     ask(station, { go: goal }, (text) => {
       write(fault, text);
-      if (text) station.announce(text, { urgent: true });
     });
   }
 

@@ -19,7 +19,7 @@ export function mount(station, box) {
   const apply = h("button.main", { id: "net-apply" }, "Apply");
   const reset = h("button", { type: "button", id: "net-reset" }, "As it is");
   const needs = h("p.needs", { id: "net-needs" });
-  const fault = h("p.refused", { id: "net-fault", role: "alert" });
+  const fault = h("p.refused", { id: "net-fault" });
   const advice = h("p.advice", { id: "net-advice", role: "status" });
   const by = h("p.muted", { id: "net-by" });
   /** Whether something was written that isn't applied. */
@@ -114,7 +114,7 @@ export function mount(station, box) {
     event.preventDefault();
     complain("");
     asked = session.wish("impair", { forward: wanted("forward"), backward: wanted("backward") });
-    if (!asked) complain("There's no connection: nothing was changed.");
+    if (!asked) complain("There's no connection: nothing was asked.");
   });
 
   function answered(network) {

@@ -69,6 +69,7 @@ export function mountPad(station, box, steer, jog, words = TOOL) {
     if (pressed && !stopped) station.shared.stop();
     stopped = pressed;
     const moves = twistOf(pad).some((part) => part !== 0);
+    if (moves && !held && station.session.holds) station.notices.use(null);
     if (moves && !held && station.session.holds) held = steer.hold("pad", () => jog.twist(twistOf(gamepad())), () => (held = false));
     else if (!moves && held) {
       held = false;

@@ -5,12 +5,12 @@ import { StationScene } from "./twins.js";
 import { Viewport } from "./viewport.js";
 
 const PERIOD = 80;
-/** How long a falsified frame is spoken of [s]. */
-const FALSIFIED = 2.5;
+/** How long a change of the time that is looked at is spoken of [s]. */
+const CHANGED = 2.5;
 const BADGES = {
   predicted: ["auto_awesome", "Predicted", "The server's clock hasn't passed what is shown: a command may still change it"],
   confirmed: ["verified", "Confirmed", "The server's clock has passed what is shown: it came true"],
-  falsified: ["report", "Falsified", "A command changed what had been shown"],
+  falsified: ["update", "Changed", "A command changed what is planned for the time that you look at"],
   none: ["help", "Nothing known", "Nothing has come from the server yet, or nothing comes any more"],
 };
 const LEGEND = [
@@ -26,9 +26,8 @@ export function mount(station, box) {
   const { pane, scene } = viewport;
 
   const history = new History(station);
-  let falsifiedAt = -Infinity;
-  let falsifiedBy = null;
-  let newest = -Infinity;
+  let changedAt = -Infinity;
+  let changedBy = null;
   /** The time of the past that is shown [s]; null: now. */
   let cursor = null;
 
@@ -46,7 +45,7 @@ export function mount(station, box) {
       if (scene && cursor === null && t !== null) scene.leave();
       if (scene && cursor !== null && t === null) scene.resume();
       cursor = t;
-      falsifiedAt = -Infinity;
+      changedAt = -Infinity;
       dress();
       station.dispatchEvent(new CustomEvent("cursor", { detail: t }));
       say();
@@ -64,15 +63,12 @@ export function mount(station, box) {
 
   station.on("edit", ({ before, after, change }) => {
     dress();
-    const shown = cursor ?? newest;
-    if (!before || !change || shown === -Infinity) return;
-    // What was shown after the server's clock, and is otherwise now, was falsified.
-    const from = Math.max(session.past, change.start ?? change.end);
-    if (shown <= from) return;
-    const [then, now] = [before.joints(shown), after.joints(shown)];
+    // Who looks at now sees each command at once: only who looks ahead had been shown something else.
+    if (cursor === null || !before || !change || cursor <= Math.max(session.now ?? 0, change.start ?? change.end)) return;
+    const [then, now] = [before.joints(cursor), after.joints(cursor)];
     if (then.some((x, k) => Math.abs(x - now[k]) > 1e-9)) {
-      falsifiedAt = performance.now() / 1000;
-      falsifiedBy = change.command_id ?? null;
+      changedAt = performance.now() / 1000;
+      changedBy = change.command_id ?? null;
     }
   });
 
@@ -80,14 +76,14 @@ export function mount(station, box) {
     if (!session.timeline || session.now === null) return "none";
     if (cursor !== null && cursor <= session.past) return "confirmed";
     if (session.link !== "live") return "none";
-    if (performance.now() / 1000 - falsifiedAt < FALSIFIED) return "falsified";
+    if (performance.now() / 1000 - changedAt < CHANGED) return "falsified";
     return "predicted";
   }
 
   function say() {
     const status = standing();
     const [symbol, word, meaning] = BADGES[status];
-    const by = status === "falsified" && falsifiedBy !== null ? ` by #${falsifiedBy}` : "";
+    const by = status === "falsified" && changedBy !== null ? ` by #${changedBy}` : "";
     viewport.stand(status, symbol, word + by + (cursor === null ? "" : ` · ${clockText(cursor)}`));
     viewport.badge.title = meaning;
     const live = session.link === "live";
@@ -96,10 +92,7 @@ export function mount(station, box) {
     viewport.cover(cursor === null ? null : ["history", "You look at another time; the robot goes on"]);
   }
 
-  setInterval(() => {
-    if (cursor === null && session.link === "live" && session.now !== null) newest = session.now;
-    say();
-  }, PERIOD);
+  setInterval(say, PERIOD);
   station.on("link", say);
   say();
 }

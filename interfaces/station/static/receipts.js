@@ -114,15 +114,13 @@ export function mount(station, box) {
       return;
     }
     fill(parts, entry);
-    const [status, why] = standing(entry);
-    if (status === "refused" || status === "rejected") station.announce(`${describe(entry)} ${status}: ${why}`);
   });
 
-  /** An input that wasn't taken is told of; the first one aloud. */
+  /** An input that wasn't taken is told of. */
   function settle(row, entry) {
     const [status, why] = standing(entry);
     if (status !== "refused" && status !== "rejected") return;
-    if (row.missed++ === 0) station.announce(`Steering ${status}: ${why}`);
+    row.missed += 1;
     row.parts.element.dataset.tone = "warn";
     write(row.parts.symbol, "warning");
     write(row.parts.why, `${row.missed} of ${row.count} inputs not taken: ${why}`);

@@ -50,7 +50,7 @@ export function mount(station, box) {
   const what = h("span.what");
   const facts = h("span.muted");
   const card = h("div.recording", { id: "recording", hidden: true }, symbol, h("div.grow", {}, what, facts), end);
-  const problem = h("p.refused", { id: "record-problem", role: "alert", hidden: true });
+  const problem = h("p.refused", { id: "record-problem", hidden: true });
   const idle = h("p.muted", { id: "record-idle" });
   const list = h("ul.recordings", { id: "recordings", "aria-label": "Recordings, newest first" });
   const where = h("p.muted.where");
@@ -68,6 +68,7 @@ export function mount(station, box) {
   function complain(text) {
     problem.hidden = !text;
     write(problem, text);
+    station.refuse(text);
   }
 
   /** Ask the server; what it answers, or null where it doesn't do it. */

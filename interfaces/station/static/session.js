@@ -21,7 +21,7 @@ const seconds = () => performance.now() / 1000;
 
 /**
  * Events: "link" (how the connection is), "welcome", "lease", "state" (the real robot), "edit" (of the timeline),
- * "network" (the way to the robot), "rerouted" (that it has changed), "order" and "outcome" (of commands), "problem" (what couldn't be done), "locked" (a token is asked for).
+ * "network" (the way to the robot), "rerouted" (that it has changed), "order" and "outcome" (of commands), "wish" (a request), "problem" (what couldn't be done), "locked" (a token is asked for).
  */
 export class Session extends EventTarget {
   /** @param {{name: string, token: ?string}} who */
@@ -258,6 +258,9 @@ export class Session extends EventTarget {
   wish(type, fields = {}) {
     const message = { type, number: ++this.requests, ...fields };
     if (HOLDERS.includes(type)) message.epoch = this.epoch ?? "1";
-    return this.send(message) ? message.number : 0;
+    const sent = this.send(message);
+    if (sent) this.emit("wish", message);
+    else if (type !== "survey") this.emit("problem", { code: "lease", text: "There's no connection: nothing was asked." });
+    return sent ? message.number : 0;
   }
 }

@@ -3,6 +3,7 @@ import { Chain } from "./chain.js";
 import { h } from "./dom.js";
 import { DriveSession } from "./drivesession.js";
 import { Layout } from "./layout.js";
+import { Notices } from "./notice.js";
 import { Session } from "./session.js";
 
 const NAME = "vrs-name";
@@ -20,12 +21,18 @@ class Station extends EventTarget {
     /** What panels offer each other, by the panel's name. */
     this.shared = {};
     this.polite = root.appendChild(h("div.spoken", { "aria-live": "polite" }));
+    this.notices = new Notices(this.session, root);
     this.urgent = root.appendChild(h("div.spoken", { role: "alert", "aria-live": "assertive", id: "alert" }));
   }
 
   /** Say something to those who listen to the page. */
   announce(text, { urgent = false } = {}) {
     (urgent ? this.urgent : this.polite).textContent = text;
+  }
+
+  /** Say at the control that was used why something isn't done; nothing of "". */
+  refuse(why) {
+    this.notices.say(why);
   }
 
   /** Let people be known by a name from now on. */

@@ -15,6 +15,7 @@ export function ask(station, task, refused) {
   const why = !session.holds ? "Take control first" : session.link === "live" ? "" : "There's no connection";
   if (why) {
     refused(why + ": nothing was sent.");
+    station.refuse(why + ": nothing was sent.");
     return;
   }
   const number = session.wish("task", { task });

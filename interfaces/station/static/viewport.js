@@ -6,6 +6,9 @@ const OLD = {
   lost: ["wifi_off", "Lost: what you see is old. Trying again"],
 };
 
+/** So long a robot may wait before it's told why [ms]: for who takes control it goes on by itself. */
+const PATIENCE = 1200;
+
 export class Viewport {
   /**
    * @param {object} station
@@ -23,6 +26,8 @@ export class Viewport {
     this.badge = h("span.badge", { id: "badge", role: "status" }, this.symbol, this.words);
     this.banner = h("div.banner", { id: "banner", hidden: true });
     this.across = "";
+    /** Since when the real robot has been waiting for who has control [ms]; null while it isn't. */
+    this.waiting = null;
     const entries = h("ul.legend");
     const home = h("button.quiet", { type: "button", id: "home", title: "Reset the view", "aria-label": "Reset the view" },
       icon("center_focus_strong"));
@@ -57,6 +62,16 @@ export class Viewport {
     connection.connect();
   }
 
+  /** Why the real robot has been waiting for some time for who has control, [symbol, words]; null where it hasn't. */
+  waits() {
+    const { state, holds } = this.session;
+    const now = performance.now();
+    if (!state?.halted || !holds) this.waiting = null;
+    else this.waiting ??= now;
+    if (this.waiting === null || now - this.waiting < PATIENCE) return null;
+    return ["pause_circle", `Real robot waits: ${state.halted}. Resume lets it go on.`];
+  }
+
   /** Say how the picture stands. */
   stand(status, symbol, words) {
     mark(this.badge, "data-status", status);
@@ -64,13 +79,14 @@ export class Viewport {
     write(this.words, words);
   }
 
-  /** Lay words across: that what one sees is old, else others, [symbol, words], or none. */
+  /** Lay words across: that what one sees is old, else others, [symbol, words], else why the real robot waits. */
   cover(otherwise = null) {
     const { link } = this.session;
     const old = OLD[link];
-    const shown = old ?? otherwise;
+    const waits = this.waits();
+    const shown = old ?? otherwise ?? waits;
     mark(this.box, "data-link", link);
-    mark(this.banner, "data-kind", old ? link : "past");
+    mark(this.banner, "data-kind", old ? link : otherwise ? "past" : "halted");
     this.banner.hidden = !shown;
     if (!shown || shown[1] === this.across) return;
     this.across = shown[1];

@@ -266,6 +266,7 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
     undone: bool = False
     shifted: Names = ()
     superseded: Names = ()
+    hindrance: Text = ""
 
     @classmethod
     def of(cls, receipt: Receipt) -> Self:
@@ -285,6 +286,7 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
             receipt.undone,
             receipt.shifted[: cls.most_names],
             receipt.superseded[: cls.most_names],
+            text(receipt.hindrance),
         )
 
     def read(self) -> Receipt:
@@ -304,6 +306,7 @@ class ReceiptWire(Wire, frozen=True, omit_defaults=True, gc=False):
             self.undone,
             self.shifted,
             self.superseded,
+            self.hindrance,
         )
 
 

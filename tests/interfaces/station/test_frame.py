@@ -123,7 +123,7 @@ def test_what_a_command_changes_of_what_is_shown_is_falsified(page: Page) -> Non
     )
     page.wait("badge.dataset.status === 'predicted'")
     page.page.locator(f".move[data-id='{move}']").press("Shift+ArrowRight")
-    page.wait(f"said.some((text) => text.startsWith('falsified') && text.includes('by #{move}'))")
+    page.wait(f"said.some((text) => text.startsWith('falsified') && text.includes('Changed by #{move}'))")
     page.wait("badge.dataset.status === 'predicted'")
     # What changes behind the time that is shown falsifies nothing.
     page.page.evaluate("said.length = 0; station.shared.pane.show(station.session.now + 3)")

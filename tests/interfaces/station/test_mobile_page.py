@@ -9,6 +9,7 @@ import pytest
 
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import Page, paged, station
+from tests.interfaces.station.test_notices import told
 
 SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--port", "0")
 OWNERS = {
@@ -61,3 +62,29 @@ def test_a_panels_style_sheet_dresses_no_other_panel(page: Page) -> None:
     box = icon.bounding_box()
     assert box["height"] < 22
     assert sorted(set(page.page.evaluate(LEAKS, OWNERS))) == []
+
+
+def test_what_is_refused_is_said_where_the_hand_is(page: Page) -> None:
+    page.page.keyboard.press("Escape")
+    if page.get("station.session.holds"):
+        page.page.click("#give")
+        page.wait("!station.session.holds")
+    forward = "button[aria-label='Forward']"
+    page.page.click("#tab-drive")
+    page.page.click(forward)
+    told(page, "you don't have control", forward)
+    page.page.click("#tab-map")
+    page.wait("Boolean(document.querySelector('.plan-things')?.getAttribute('d'))")
+    page.page.click("#map")
+    told(page, "take control first", "#map")
+    page.page.fill("#goal-x", "1")
+    page.page.fill("#goal-y", "1")
+    page.page.click("#goal-go")
+    told(page, "take control first", "#goal-go")
+    page.shoot("mobile-refused")
+    page.page.click("#tab-jobs")
+    page.page.fill("#job-text", "nowhere")
+    page.page.click("#job-add-it")
+    told(page, "no place of this list", "#job-add-it")
+    page.take_control()
+    page.wait("document.getElementById('notice').hidden")
