@@ -6,6 +6,7 @@ its reference is to be at that time.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from enum import StrEnum
 from typing import TypeAlias, TypeVar
 
@@ -46,6 +47,8 @@ class FaultKind(StrEnum):
     """A reference came that the one before can't go to within the limits."""
     REFUSED = "refused"
     """References that aren't numbers, are too fast, or lie too far ahead."""
+    SENSOR = "sensor"
+    """What it measures isn't sound, as its encoder reads NaN."""
     BODY = "body"
     """The body itself failed; the process ends."""
 
@@ -147,6 +150,30 @@ class TickCounts(msgspec.Struct, frozen=True):
     """Ticks on the way onto references that came late."""
     histogram: tuple[int, ...]
     """How many in each class of `LATENESS`."""
+
+
+class TickCounter:
+    """Counts how late ticks are."""
+
+    def __init__(self, tick: float) -> None:
+        """Count from none, of ticks so long [s]."""
+        self._tick = tick
+        self._ticks = self._late = 0
+        self.skipped = self.merged = 0
+        self._worst = 0.0
+        self._histogram = [0] * (len(LATENESS) + 1)
+
+    def add(self, late: float) -> None:
+        """Count a tick that begins so much after it was due [s]."""
+        self._ticks += 1
+        self._late += late > self._tick
+        self._worst = max(self._worst, late)
+        self._histogram[bisect_left(LATENESS, late)] += 1
+
+    def counts(self) -> TickCounts:
+        """All until now."""
+        histogram = tuple(self._histogram)
+        return TickCounts(self._ticks, self._late, self._worst, self.skipped, self.merged, histogram)
 
 
 class Measurement(msgspec.Struct, frozen=True, tag="measured"):

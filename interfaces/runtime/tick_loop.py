@@ -6,12 +6,14 @@ last reference, and the arm holds until the parent has acknowledged that. Where 
 motion come too late, by up to `row_buffer.KEPT` ticks, it begins late, and is on time again when it rests next.
 Where it moves and rows come too late, or rests where none of them do, it goes over onto them within its limits, if
 it isn't too far from them.
+
+What the body measures is looked at here, before anybody else sees it. Where it isn't sound, the measurement
+before it is told again, with its own tick; where that lasts, the arm brakes, and doesn't move while it can't see.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections import deque
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
@@ -20,7 +22,6 @@ import numpy as np
 
 from interfaces.runtime.merging import Merging
 from interfaces.runtime.physics_messages import (
-    LATENESS,
     Attach,
     Close,
     Doing,
@@ -33,9 +34,10 @@ from interfaces.runtime.physics_messages import (
     Release,
     Row,
     Rows,
-    TickCounts,
+    TickCounter,
 )
 from interfaces.runtime.row_buffer import RowBuffer
+from robots.onboard.following import SensorMonitor
 from robots.onboard.stops import from_measured
 from vrs.errors import FormatError, VrsError
 from vrs.model import Array, Limits
@@ -95,29 +97,6 @@ class _Step(NamedTuple):
     prepared: Any
 
 
-class _Counter:
-    """Counts how late ticks are."""
-
-    def __init__(self, tick: float) -> None:
-        self._tick = tick
-        self._ticks = self._late = 0
-        self.skipped = self.merged = 0
-        self._worst = 0.0
-        self._histogram = [0] * (len(LATENESS) + 1)
-
-    def add(self, late: float) -> None:
-        """Count a tick that begins so much after it was due [s]."""
-        self._ticks += 1
-        self._late += late > self._tick
-        self._worst = max(self._worst, late)
-        self._histogram[bisect_left(LATENESS, late)] += 1
-
-    def counts(self) -> TickCounts:
-        """All until now."""
-        histogram = tuple(self._histogram)
-        return TickCounts(self._ticks, self._late, self._worst, self.skipped, self.merged, histogram)
-
-
 class TickLoop:
     """Runs a body on references, and brings it to rest where they fail."""
 
@@ -139,7 +118,8 @@ class TickLoop:
         self._speeds, self._changes = (_OVER * limits.qd_max).tolist(), (_TICKS * tick * limits.qdd_max).tolist()
         self._last = math.floor(now / tick + _SAME)
         self._at = _Step(list(q), [0.0] * len(q), [0.0] * len(q), None)
-        self._measured = Moved(q, [0.0] * len(q), ())
+        self._measured, self._measured_tick = Moved(q, [0.0] * len(q), ()), (self._last, self._last)
+        self._monitor, self._blind = SensorMonitor(limits), False
         self._buffer, self._ahead = RowBuffer(), deque[tuple[int, _Step]]()
         self._placing: int | None = None
         self._lag = 0
@@ -149,7 +129,7 @@ class TickLoop:
         self._doing = Doing.FOLLOWING
         self._faults = self._acknowledged = 0
         self._alone = self._failed = False
-        self._counter = _Counter(tick)
+        self._counter = TickCounter(tick)
         self._news: deque[News] = deque([Ready(self._last, realtime)])
 
     @property
@@ -215,7 +195,7 @@ class TickLoop:
         self._counter.add(late)
         step = self._step(k)
         try:
-            self._measured = self._body.step(step.prepared)
+            moved = self._body.step(step.prepared)
         except VrsError as problem:
             self._failed = True
             self._faults += 1
@@ -223,12 +203,24 @@ class TickLoop:
             self._tell(Fault(self._faults, FaultKind.BODY, str(problem), k, here, k))
             return
         self._at, self._last = step, k
+        self._see(moved, k)
         if self._doing is Doing.BRAKING and not self._brake:
             self._settle()
         if k % self._every == 0:
             q, qd, tau = map(tuple, self._measured)
-            followed = k - self._lag
-            self._tell(Measurement(k, self._doing, q, qd, tau, tuple(step.q), followed, self._counter.counts()))
+            seen, followed = self._measured_tick
+            self._tell(Measurement(seen, self._doing, q, qd, tau, tuple(step.q), followed, self._counter.counts()))
+
+    def _see(self, moved: Moved, k: int) -> None:
+        """Take what was measured after a tick, if it's sound; brake where it hasn't been for a while."""
+        now = k * self._tick
+        if self._monitor.look(moved.q, moved.qd, moved.tau, now=now):
+            self._measured, self._measured_tick, self._blind = moved, (k, k - self._lag), False
+            return
+        fault = self._monitor.blind(now=now)
+        if fault is not None and self._doing is Doing.FOLLOWING and (not self._blind or any(self._at.qd)):
+            self._blind = True
+            self._fail(FaultKind.SENSOR, str(fault), k + 1)
 
     def _take_rows(self, message: Rows) -> None:
         if message.run != self._faults or self._alone:

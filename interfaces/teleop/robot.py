@@ -23,6 +23,7 @@ from interfaces.teleop.measured import SampleLog
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.received import ReceivedLog
+from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.play import EvenPlay, PlayState, play_of
 from robots.onboard.playout import Playout, PlayoutConfig
 from robots.onboard.stamps import Stamp, Verdict
@@ -99,13 +100,7 @@ class RobotSite:
     """What runs beside the real robot, all but its body."""
 
     def __init__(
-        self,
-        model: RobotModel,
-        q: Array,
-        *,
-        now: float,
-        config: RobotSiteConfig | None = None,
-        reported: int = 0,
+        self, model: RobotModel, q: Array, *, now: float, config: RobotSiteConfig | None = None, reported: int = 0
     ) -> None:
         """Stand at rest until the first message comes.
 
@@ -123,6 +118,9 @@ class RobotSite:
         self.epoch = 0
         self.halted = ""
         """Why it stopped by itself; empty while it follows the operator."""
+        self.violation: Violation | None = None
+        """What was measured that stopped it; None where it wasn't that, or since it may move again."""
+        self._monitor = SensorMonitor(model.limits)
         self._uncertainty: float | None = None
         self.parted = False
         """Whether its timeline is another than the operator's."""
@@ -234,7 +232,7 @@ class RobotSite:
             self.engine = Engine(self._model, timeline=stood, clock=self._clock)
         else:
             self.engine = Engine(self._model, q=stood.initial, clock=self._clock)
-        self.epoch, self.halted, self.parted = orders.epoch, "", False
+        self.epoch, self.halted, self.violation, self.parted = orders.epoch, "", None, False
         self._log, self._newest, self._messages = ReceivedLog(began), None, 0
         self._offset = AdaptiveOffset(self.config.offset)
         self._receipts.clear()
@@ -314,27 +312,32 @@ class RobotSite:
     def measured(self, q: Array, *, now: float, at: float | None = None) -> bool:
         """Take in measured joints; where one is too far from its reference, the robot stops.
 
+        What isn't sound is left out; where nothing else comes for `BLIND` seconds, the robot brakes.
+
         Args:
-            q: Joints [rad], (n,).
+            q: Joints [rad], (n,): anything.
             now: By the robot's clock [s].
             at: When it was to be there, where that's another time [s].
 
         Returns:
             Whether it stops for that, and is to be held where it was measured.
         """
+        if not self._monitor.look(q, now=now):
+            return self._violated(self._monitor.blind(now=now), now)
         at = now if at is None else at
         p = float(self.play_at(np.array([at])).p[0])
         self._measured, self._measured_at = np.array(q, float), (at, p)
         self._samples.add(at, p, self._measured)
-        if self.halted or self.epoch == 0:
+        abort = too_far(self.engine.timeline.sample(p), self._measured, self.config.tolerance)
+        return self._violated(abort, now, measured=self._measured)
+
+    def _violated(self, violation: Violation | None, now: float, measured: Array | None = None) -> bool:
+        """Stop for what was measured, if it's something; whether it's to be held where it was measured."""
+        if violation is None or self.halted or self.epoch == 0:
             return False
-        away = np.abs(q - self.engine.timeline.sample(p))
-        joint, limit = int(away.argmax()), self.config.tolerance
-        if away[joint] <= limit:
-            return False
-        reason = f"joint {joint + 1} is {away[joint]:.3g} rad from where it should be, more than {limit:g} rad"
-        self.halt(reason, now=now, measured=q)
-        return True
+        self.violation = violation
+        self.halt(str(violation), now=now, measured=measured)
+        return measured is not None
 
     def halt(self, reason: str, *, now: float, measured: Array | None = None) -> None:
         """Stop at once, and wait for a new epoch; who has stopped already only lets itself be held elsewhere.
@@ -365,7 +368,7 @@ class RobotSite:
         self.halted, self.parted = self.halted or reason, True
         self._due = now
         if self._watchdog is not None and self._watchdog.state is WatchdogState.RUNNING:
-            self._watchdog.stop(StopReason.FAULT, now=now)
+            self._watchdog.stop(StopReason.FAULT if self.violation is None else StopReason.TOLERANCE, now=now)
 
     def _play_at(self, now: float) -> float:
         return float(self._play.at(np.array([now])).p[0])

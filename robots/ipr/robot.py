@@ -21,6 +21,7 @@ from robots.ipr.reality import MobileReality
 from robots.ipr.scanner import LaserScanner
 from robots.ipr.sensing import Fix, OverheadCamera, SonarRing, SonarScan
 from robots.onboard.laser import LaserScan
+from robots.onboard.sensor_watch import SensorWatch
 from vrs.checks import finite, integer_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
@@ -28,6 +29,12 @@ from vrs.model import Array, frozen_array
 
 MOST_COLLISIONS = 1000
 """Collisions that are kept."""
+_LEAP = 100.0
+"""No wheel turns further from one reading to the next [rad]."""
+_LONGEST = 1e3
+"""No beam is longer [m]."""
+_FAR = 1e4
+"""No camera sees a robot further away [m, rad]."""
 _ROOMS: Final = Path(__file__).parent / "rooms"
 PLACES: Final = ("berths", "corridor", "empty", "fig13", "fig13_person", "furnished", "home", "lane", "slalom")
 """Rooms that come with the package."""
@@ -116,6 +123,11 @@ class MobileRobot(ABC):
             self._every_sweep = self._every(senses.laser.rate)
         every = self._every_encoder, self._every_sonar, self._every_frame, self._every_sweep
         self._ticks = [n for n in every if n]
+        self.watch = SensorWatch()
+        """What its sensors read is looked at before anybody uses it."""
+        self._shafts_read, self._beams_sound = (0.0, 0.0), True
+        self._fix: Fix | None = None
+        self._looked: Fix | None = None
         self._period_steps = round(finite("period", period) / reality.dt)
         if self._period_steps < 1 or abs(self._period_steps * reality.dt - period) > 1e-9:
             raise InvalidValueError("period", period, f"a multiple of the step, {reality.dt:g} s")
@@ -164,7 +176,12 @@ class MobileRobot(ABC):
     @property
     def camera(self) -> Fix | None:
         """Newest posture that the overhead camera has told; None before the first, or without a camera."""
-        return None if self._camera is None else self._camera.newest(self.time)
+        fix = None if self._camera is None else self._camera.newest(self.time)
+        if fix is not self._looked and fix is not None:
+            self._looked = fix
+            if self.watch.see("camera", fix.posture, -_FAR, _FAR, now=self.time):
+                self._fix = fix
+        return self._fix
 
     @property
     def sonar(self) -> SonarScan | None:
@@ -285,32 +302,60 @@ class MobileRobot(ABC):
     def _sense(self) -> None:
         """Read what is due at this step."""
         if self._steps % self._every_encoder == 0:
-            self._reading = self._train.read(self._shafts())
-            self._odometry.update(self._reading)
+            self._read_shafts()
             if self._steps:
                 self._train.wander(self._every_encoder * self.reality.dt)
         if self._camera is not None and self._steps % self._every_frame == 0:
             self._camera.look(self._truth, self.time)
         if self._sonar is not None and self._steps % self._every_sonar == 0:
             origins, directions = self._sonar.rays(self._truth)
-            height = self.chassis.sonar_height
-            self._scan = self._sonar.scan(
-                self._distances(origins, directions, self._sonar.reach, height), self.time
-            )
+            found = self._distances(origins, directions, self._sonar.reach, self.chassis.sonar_height)
+            if self._sees("sonar ring", found, len(origins)):
+                self._scan = self._sonar.scan(found, self.time)
         if self._laser is not None and self._steps % self._every_sweep == 0:
             self._laser.begin(self.time)
-            self._laser.go_on(self._truth, self._truth, (self.time, self.time), self._cast_laser)
+            self._go_on(self._laser, self._truth, self.time)
 
     def _sweep(self, laser: LaserScanner) -> None:
         """Go one step on while the laser sweeps."""
         before, begun = self._truth, self.time
         self._advance(1)
+        self._go_on(laser, before, begun)
+
+    def _go_on(self, laser: LaserScanner, before: tuple[float, float, float], begun: float) -> None:
+        """Let the laser sweep from a posture and time on; a sweep with a beam that isn't sound is left out."""
+        known = laser.newest
         laser.go_on(before, self._truth, (begun, self.time), self._cast_laser)
+        if laser.newest is not known:
+            if not self._beams_sound:
+                laser.newest = known
+            self._beams_sound = True
+
+    def _read_shafts(self) -> None:
+        """Read the encoders; what can't be is left out."""
+        shafts, sound = self._shafts(), True
+        for side, angle, before in zip(("right", "left"), shafts, self._shafts_read, strict=True):
+            leap = before - _LEAP, before + _LEAP
+            sound &= self.watch.see(f"{side} wheel's encoder", angle, *leap, now=self.time)
+        if sound:
+            self._shafts_read = shafts
+            self._reading = self._train.read(shafts)
+            self._odometry.update(self._reading)
+
+    def _sees(self, sensor: str, distances: Array, count: int) -> bool:
+        """Whether so many distances are sound; infinite ones met nothing."""
+        if np.shape(distances) != (count,):
+            return self.watch.note(sensor, f"numbers of shape {np.shape(distances)}, not ({count},)", now=self.time)
+        return self.watch.see(sensor, distances, 0.0, _LONGEST, now=self.time, endless=True)
 
     def _cast_laser(self, origins: Array, directions: Array) -> Array:
         model = self.senses.laser
         assert model is not None
-        return self._distances(origins, directions, model.reach, model.height)
+        found = self._distances(origins, directions, model.reach, model.height)
+        if self._beams_sound and self._sees("laser scanner", found, len(origins)):
+            return found
+        self._beams_sound = False
+        return np.full(len(origins), np.inf)
 
     def _overlap(self, posture: tuple[float, float, float]) -> str:
         """What the body's outline overlaps at a posture."""

@@ -11,7 +11,7 @@ from robots.onboard.command_filter import (
 from robots.onboard.curve import Curve, CurveKind, CurvePoint
 from robots.onboard.curve_file import load_curve, read_curve
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.following import FollowingAbort, FollowingMonitor, Tolerance
+from robots.onboard.following import FollowingAbort, SensorFault, SensorMonitor, too_far
 from robots.onboard.free_ways import Outline
 from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
 from robots.onboard.gsp_map import GspMap, Lines, load_map, read_map, save_map
@@ -44,12 +44,10 @@ from robots.onboard.quadratic_tracker import (
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
 from robots.onboard.servo import FeedForward, Servo, ServoGains
 from robots.onboard.stamps import Kind, Stamp, Verdict
-from robots.onboard.stops import StopMotion, at_rest, from_commanded, from_measured
-from robots.onboard.supervision import Supervision
+from robots.onboard.stops import StopMotion, from_commanded, from_measured
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
 from robots.onboard.surveying import Surveyor
 from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
-from robots.onboard.values import Refusal, RefusalCode, ValueGuard
 from robots.onboard.watchdog import (
     AcceptedFuture,
     BeginStop,
@@ -89,7 +87,6 @@ __all__ = [
     "FilterEventKind",
     "FilterOutput",
     "FollowingAbort",
-    "FollowingMonitor",
     "Found",
     "FrameReader",
     "GoOn",
@@ -146,12 +143,12 @@ __all__ = [
     "QuadraticCurveTracker",
     "QuadraticTrackerConfig",
     "Reference",
-    "Refusal",
-    "RefusalCode",
     "Route",
     "RouteConfig",
     "RouteMap",
     "SearchConfig",
+    "SensorFault",
+    "SensorMonitor",
     "Servo",
     "ServoGains",
     "SonarMount",
@@ -159,22 +156,18 @@ __all__ = [
     "Status",
     "StopMotion",
     "StopReason",
-    "Supervision",
     "SupervisorConfig",
     "Surroundings",
     "Surveyor",
-    "Tolerance",
     "Tracker",
     "TrackingConfig",
     "TrajectoryTracker",
-    "ValueGuard",
     "Verdict",
     "Watchdog",
     "WatchdogConfig",
     "WatchdogState",
     "Yielding",
     "YieldingConfig",
-    "at_rest",
     "decode_scan",
     "deskewed",
     "encode_scan",
@@ -188,5 +181,6 @@ __all__ = [
     "read_curve",
     "read_map",
     "save_map",
+    "too_far",
     "wheel_rates",
 ]

@@ -1,126 +1,138 @@
-"""Whether a robot is where it was commanded to be."""
+"""Whether a robot measures sound numbers, and is where it was commanded to be.
+
+What an encoder reads is looked at before anything else uses it. A single bad reading is left out: what was measured
+before it stands. Bad readings for `BLIND` seconds are a fault: the robot brakes from its commanded state, as nobody
+knows the measured one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from vrs.checks import finite, finite_array
-from vrs.errors import InvalidValueError
-from vrs.model import Array, frozen_array
+from vrs.model import Array, Limits
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tolerance:
-    """How far a robot may stay away from its command."""
-
-    joints: Array
-    """Largest error of each joint [rad], (n,), positive."""
-    tool: float | None
-    """Largest distance of the tool from where it should be [m], positive; None asks for none."""
-
-    def __init__(self, joints: ArrayLike, tool: float | None = None) -> None:
-        """Take joints [rad], (n,), and the tool's distance [m].
-
-        Raises:
-            InvalidValueError: If a value isn't finite and positive.
-        """
-        allowed = "positive errors [rad], shape (n,)"
-        array = finite_array("joints", joints, None, allowed)
-        if array.ndim != 1 or len(array) == 0 or not (array > 0).all():
-            raise InvalidValueError("joints", joints, allowed)
-        if tool is not None:
-            tool = finite("tool", tool, "None or a positive distance [m]")
-            if tool <= 0:
-                raise InvalidValueError("tool", tool, "None or a positive distance [m]")
-        object.__setattr__(self, "joints", array)
-        object.__setattr__(self, "tool", tool)
+BLIND = 0.05
+"""So long a robot goes on without a sound measurement [s]."""
+_BEYOND = math.pi
+"""A joint may read so far beyond its limits [rad]: it hit something, or its encoder is off."""
+_FASTEST = 1e3
+"""No joint is faster [rad/s]; one that hits something has moments of 34."""
+_STRONGEST = 1e6
+"""No drive is stronger [N m]."""
+_ROUNDING = 1e-9
+"""Of times [s]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FollowingAbort:
-    """A robot didn't follow: what, by how much and when, of the first violation."""
+@dataclass(frozen=True, slots=True)
+class SensorFault:
+    """What was measured is no sound number."""
 
-    t: float
-    """Time of the reference that it didn't follow [s]."""
     joint: int | None
-    """Index of the joint, the worst by its tolerance; None where only the tool's distance was too large."""
-    error: float
-    """Reference less measured [rad], or the tool's distance [m]; NaN where the sensor read no finite number."""
-    tolerance: float
-    """What was allowed [rad or m]."""
-    q: Array
-    """Measured [rad], (n,)."""
-    q_ref: Array
-    """Commanded [rad], (n,)."""
+    """Index of the first bad joint; None where the number of joints is wrong."""
+    given: str
+    """What it read."""
 
     def __str__(self) -> str:
         """Say it in a line."""
         if self.joint is None:
-            return f"at {self.t:.3f} s the tool was {self.error:.4g} m away, over {self.tolerance:.4g} m"
-        return (
-            f"at {self.t:.3f} s joint {self.joint + 1} was {self.error:.4g} rad away, over {self.tolerance:.4g} rad"
+            return f"the encoders read {self.given}"
+        return f"the encoder of joint {self.joint + 1} reads {self.given}"
+
+
+@dataclass(frozen=True, slots=True)
+class FollowingAbort:
+    """A robot isn't where it should be."""
+
+    joint: int
+    """Index of the joint that is furthest away."""
+    error: float
+    """Its distance from the reference [rad]."""
+    tolerance: float
+    """What was allowed [rad]."""
+
+    def __str__(self) -> str:
+        """Say it in a line."""
+        away, limit = f"{self.error:.3g} rad", f"{self.tolerance:g} rad"
+        return f"joint {self.joint + 1} is {away} from where it should be, more than {limit}"
+
+
+Violation: TypeAlias = FollowingAbort | SensorFault
+"""What is measured that a robot stops for."""
+
+
+class SensorMonitor:
+    """Looks at what was measured before anybody uses it, and knows for how long it hasn't been sound."""
+
+    __slots__ = ("_bounds", "_fault", "_since")
+
+    def __init__(self, limits: Limits) -> None:
+        """Take the joints' limits."""
+        n = limits.dof
+        self._bounds = (
+            ((limits.q_min - _BEYOND).tolist(), (limits.q_max + _BEYOND).tolist(), "rad"),
+            ([-_FASTEST] * n, [_FASTEST] * n, "rad/s"),
+            ([-_STRONGEST] * n, [_STRONGEST] * n, "N m"),
         )
+        self._fault: SensorFault | None = None
+        self._since = 0.0
 
-
-class FollowingMonitor:
-    """Compares what was commanded with what was measured, tick by tick; it keeps no state."""
-
-    __slots__ = ("_forward", "_tolerance")
-
-    def __init__(self, tolerance: Tolerance, forward: Callable[[Array], Array] | None = None) -> None:
-        """Take the tolerance, and for the tool's the forward kinematics, (k, n) [rad] to (k, 4, 4).
-
-        Raises:
-            InvalidValueError: If the tool has a tolerance and there are no kinematics.
-        """
-        if tolerance.tool is not None and forward is None:
-            raise InvalidValueError("forward", forward, "the forward kinematics, where the tool has a tolerance")
-        self._tolerance, self._forward = tolerance, forward
-
-    def check(self, t: ArrayLike, q_ref: ArrayLike, q: ArrayLike) -> FollowingAbort | None:
-        """Compare k ticks, row i of each for the same time.
+    def look(self, q: object, qd: object = None, tau: object = None, *, now: float) -> bool:
+        """Look at one measurement; nobody else is to use one that isn't sound.
 
         Args:
-            t: Times of the references [s], (k,).
-            q_ref: Commanded [rad], (k, n).
-            q: Measured [rad], (k, n); a value that isn't finite is a violation, not an error.
+            q: Joints [rad], (n,).
+            qd: Their speeds [rad/s], (n,); None isn't looked at.
+            tau: Their drives' torques [N m], (n,); None or an empty list isn't looked at.
+            now: [s].
 
         Returns:
-            The first violation; None if there's none.
-
-        Raises:
-            InvalidValueError: If the shapes differ or a reference isn't finite.
+            Whether it's sound.
         """
-        n = len(self._tolerance.joints)
-        times = finite_array("t", t, None, "finite seconds, shape (k,)")
-        references = finite_array("q_ref", q_ref, (times.size, n), f"finite joint values [rad], shape (k, {n})")
-        try:
-            measured = np.asarray(q, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InvalidValueError("q", q, f"joint values [rad], shape (k, {n})") from None
-        if times.ndim != 1 or measured.shape != references.shape:
-            raise InvalidValueError("q", measured.shape, f"of shape ({times.size}, {n})")
-        error = references - measured
-        share = np.abs(error) / self._tolerance.joints
-        kept = np.all(share <= 1, axis=1)
-        distance = np.zeros(len(measured))
-        if self._tolerance.tool is not None and self._forward is not None:
-            # Kinematics needn't take what isn't finite.
-            sound = np.all(np.isfinite(measured), axis=1)
-            X_asked, X_measured = np.split(self._forward(np.concatenate([references[sound], measured[sound]])), 2)
-            distance[sound] = np.linalg.norm(X_asked[:, :3, 3] - X_measured[:, :3, 3], axis=1)
-            kept &= distance <= self._tolerance.tool
-        if np.all(kept):
-            return None
-        i = int(np.argmin(kept))
-        t_first, q_first, q_asked = float(times[i]), frozen_array(measured[i]), frozen_array(references[i])
-        if self._tolerance.tool is not None and np.all(share[i] <= 1):
-            return FollowingAbort(t_first, None, float(distance[i]), self._tolerance.tool, q_first, q_asked)
-        # For argmax a NaN is the largest.
-        j = int(np.argmax(share[i]))
-        allowed = float(self._tolerance.joints[j])
-        return FollowingAbort(t_first, j, float(error[i, j]), allowed, q_first, q_asked)
+        tau = None if isinstance(tau, (list, tuple)) and not tau else tau
+        fault = None
+        for values, bounds in zip((q, qd, tau), self._bounds, strict=True):
+            if fault is None and (values is not None or values is q):
+                fault = _fault(values, *bounds)
+        if self._fault is None:
+            self._since = now
+        self._fault = fault
+        return fault is None
+
+    def blind(self, *, now: float) -> SensorFault | None:
+        """What is wrong with what is measured, where it has been so for `BLIND` seconds by now [s]."""
+        return self._fault if now - self._since >= BLIND - _ROUNDING else None
+
+
+def too_far(q_ref: Array, q: Array, tolerance: float) -> FollowingAbort | None:
+    """Compare sound measured joints with their references.
+
+    Args:
+        q_ref: Commanded [rad], (n,).
+        q: Measured [rad], (n,).
+        tolerance: How far a joint may be away [rad].
+
+    Returns:
+        The joint that is furthest away, where that's too far; None if none is.
+    """
+    away = np.abs(q - q_ref)
+    joint = int(away.argmax())
+    return None if away[joint] <= tolerance else FollowingAbort(joint, float(away[joint]), tolerance)
+
+
+def _fault(values: object, low: Sequence[float], high: Sequence[float], unit: str) -> SensorFault | None:
+    """The first number that isn't in its range; None if all are."""
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if not isinstance(values, (list, tuple)) or len(values) != len(low):
+        given = len(values) if isinstance(values, (list, tuple)) else "no"
+        return SensorFault(None, f"{given} numbers, not {len(low)}")
+    for joint, (value, least, most) in enumerate(zip(values, low, high, strict=True)):
+        # NaN is in no range.
+        if not isinstance(value, (int, float)) or not least <= value <= most:
+            return SensorFault(joint, f"{value} {unit}"[:60])
+    return None

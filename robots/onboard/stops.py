@@ -99,12 +99,6 @@ def from_measured(t: float, q: ArrayLike, qd: ArrayLike, limits: Limits) -> Stop
     return _stop(timeline, t, timeline.end, limits, on_path=False)
 
 
-def at_rest(qd: ArrayLike, limits: Limits, share: float = 0.01) -> bool:
-    """Whether measured speeds [rad/s], (n,) or (k, n), are all below a share of the largest."""
-    speed: Array = np.abs(np.asarray(qd, dtype=np.float64))
-    return bool((speed <= share * limits.qd_max).all())
-
-
 def _stop(timeline: Timeline, begin: float, end: float, limits: Limits, *, on_path: bool) -> StopMotion:
     rest = frozen_array(np.clip(timeline.final(), limits.q_min, limits.q_max))
     return StopMotion(timeline, begin, end, rest, on_path)

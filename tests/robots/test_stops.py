@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robots import puma560
-from robots.onboard.stops import StopMotion, at_rest, from_commanded, from_measured
+from robots.onboard.stops import StopMotion, from_commanded, from_measured
 from vrs import Engine, JointTarget, ManualClock, Motion, MotionCommand, PoseTarget, Profile, SteerCommand, Timeline
 from vrs.errors import InvalidValueError
 
@@ -123,10 +123,3 @@ def test_a_robot_without_sensors_isnt_stopped_by_numbers(bad: float) -> None:
             from_measured(0.0, q, qd, LIMITS)
     with pytest.raises(InvalidValueError):
         from_commanded(Timeline(Q), bad, LIMITS)
-
-
-def test_at_rest() -> None:
-    assert at_rest(np.zeros(6), LIMITS)
-    assert at_rest(0.009 * LIMITS.qd_max, LIMITS)
-    assert not at_rest(np.array([0, 0, 0, 0, 0, 0.1]), LIMITS)
-    assert not at_rest([math.nan] * 6, LIMITS)

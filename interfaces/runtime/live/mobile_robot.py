@@ -36,6 +36,7 @@ from robots.ipr.parameters import IPR_LIMITS
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
 from robots.onboard.laser import LaserModel
+from robots.onboard.sensor_watch import SoundPosition
 from vrs.checks import one_of
 from vrs.clock import WallClock
 
@@ -93,11 +94,12 @@ class LiveMobileRobot:
         senses = Senses(laser=LaserModel())
         rng = np.random.default_rng(config.seed)
         self.body = MobileBody("ipr", room=config.room, rng=rng, senses=senses)
-        self._position = POSITIONS[config.position](self.body)
+        body, position = self.body, POSITIONS[config.position](self.body)
+        self._position = SoundPosition(position, lambda: body.time)
         # The first look of its senses, before anybody waits for it.
         self.body.drive(0.0, 0.0, 0)
         self.autonomy = Autonomy(NavigatorPilot(self.body, CONTROL), config.hands, config.jobs)
-        self._sight = LaserSight(self.body, self._position)
+        self._sight = LaserSight(self.body, position)
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
         self.host = DrivenHost(
@@ -176,6 +178,9 @@ class LiveMobileRobot:
         body = self.body
         body.drive(drive.v, drive.w, round(CONTROL / body.reality.dt))
         self.ticks += 1
+        site = self.host.site
+        if body.watch.fault and site is not None and not site.halted:
+            self.host.halt(body.watch.fault, now=now)
         collisions = body.collisions
         if len(collisions) > self._touched:
             self._touched = len(collisions)

@@ -13,12 +13,15 @@ from interfaces.teleop.hosting import LOST, lost
 from interfaces.teleop.tasks import Doing, Errand, Sight, TaskReport, stops
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, kept
+from robots.onboard.sensor_watch import SoundPosition
 from vrs.checks import number_in
 from vrs.mobile import DriveLimits
 from vrs.mobile.limiting import braking
 
 TOO_FAR = "the drive is to begin too far from where the robot is"
 """Why a new epoch isn't followed."""
+NO_NUMBER = "what follows the path asks for no finite drive"
+"""Why it stops by itself where nothing else says so."""
 TOLD = 0.5
 """So often at least it's told how far the robot is with what it does by itself [s]."""
 
@@ -81,7 +84,10 @@ class DrivenRobot:
         """Whether the operator was lost, and it goes on by itself nevertheless."""
         self._told: tuple[float, TaskReport] | None = None
         self.config = DrivenConfig() if config is None else config
-        self._make, self._position, self._limits, self._world = make, position, limits, world
+        self._make, self._limits, self._world, self._now = make, limits, world, now
+        if not isinstance(position, SoundPosition):
+            position = SoundPosition(position, lambda: self._now)
+        self._position: SoundPosition = position
         self._site: RobotSite | None = None
         self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
         self.epoch, self.halted = 0, ""
@@ -226,12 +232,18 @@ class DrivenRobot:
     def drive(self, *, now: float) -> Drive:
         """What to drive for the next period, from now [s] on."""
         self._watch(now)
+        self._now = now
         if self._site is not None and not self.halted:
-            self._drive = self._site.drive(now=self._since(now))
-            self._posture = self._site.posture
-        else:
-            self._posture = self._position.posture()
-            self._drive = self._by_itself(now)
+            drive, here = self._site.drive(now=self._since(now)), self._site.posture
+            wrong = self._position.fault or ("" if all(map(math.isfinite, (*drive, *here))) else NO_NUMBER)
+            if not wrong:
+                self._posture, self._drive, self._driven_at = here, drive, now
+                return drive
+            self.halt(wrong, now=now)
+        self._posture = self._position.posture()
+        if self._position.fault and self.epoch and not self.halted:
+            self.halt(self._position.fault, now=now)
+        self._drive = self._by_itself(now)
         self._driven_at = now
         return self._drive
 
