@@ -16,7 +16,9 @@ PARTS = (
     "val2", "recording", "mobile", "localization", "rsp", "middleware", "availability",
 )  # fmt: skip
 """Benchmarks that give results."""
-DETAILS = ("timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station", "camera")
+DETAILS = (
+    "timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station", "camera", "recordings",
+)  # fmt: skip
 """Benchmarks that print more about one thing."""
 
 
@@ -26,15 +28,19 @@ def main(words: list[str]) -> int:
     names = [*PARTS, *DETAILS]
     parser.add_argument("name", nargs="*", help=f"{', '.join(PARTS)} (all by default), {', '.join(DETAILS)}")
     parser.add_argument("--write", action="store_true", help=f"write {page.PAGE}, its plots and {page.DATA}")
+    parser.add_argument("--seconds", type=float, metavar="S", help="how long each run of recordings lasts (300)")
     asked = parser.parse_args(words)
     unknown = [name for name in asked.name if name not in names]
     if unknown:
         parser.error(f"unknown {', '.join(unknown)}; there are {', '.join(names)}")
     if asked.write and asked.name:
         parser.error("--write runs everything: name nothing")
+    if asked.seconds is not None and "recordings" not in asked.name:
+        parser.error("--seconds is of recordings")
     for name in asked.name:
         if name in DETAILS:
-            importlib.import_module(f"benchmarks.{name}").main()
+            options = () if asked.seconds is None or name != "recordings" else (asked.seconds,)
+            importlib.import_module(f"benchmarks.{name}").main(*options)
     parts = [name for name in asked.name or PARTS if name in PARTS]
     facts, start = machine.facts(), time.monotonic()
     found = run(parts)

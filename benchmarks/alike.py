@@ -11,7 +11,7 @@ import os
 
 import numpy as np
 
-from interfaces.lab.statistics import bootstrap
+from interfaces.lab.statistics import bootstrap, interval_name
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
@@ -123,7 +123,7 @@ def main() -> None:
     """Print the figures of both, with their intervals."""
     here = np.array([in_laboratory(seed) for seed in range(RUNS)])
     there = np.array([asyncio.run(live(seed)) for seed in range(1000, 1000 + RUNS)])
-    print(f"{RUNS} runs each, delay {PROFILE}, adaptive D, physics; means with 95 % intervals")
+    print(f"{RUNS} runs each, delay {PROFILE}, adaptive D, physics; means, {interval_name(RUNS)} in brackets")
     for name, a, b in zip(NAMES, here.T, there.T, strict=True):
         one, other = bootstrap(a, 1), bootstrap(b, 2)
         rng = np.random.default_rng(3)

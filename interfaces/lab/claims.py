@@ -62,7 +62,7 @@ class Claim:
     holds: bool
     """Whether it's so."""
     interval: tuple[float, float] | None = None
-    """95 % bootstrap interval over seeds of what was measured; None where nothing is random."""
+    """Interval over seeds of what was measured, see `interfaces.lab.statistics`; None where nothing is random."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,7 +111,7 @@ def rich_tables(reproduction: Reproduction) -> list[RichTable]:
             ("source", 2),
             ("expected", 2),
             ("measured", 2),
-            ("95 %", 2),
+            ("interval", 2),
             ("holds", 1),
         ):
             table.add_column(name, ratio=share, overflow="fold")

@@ -143,22 +143,30 @@ class _Reading:
             corrections=corrections,
             events=self._events(t, play, q_reference, measured),
             gap_s=float(gap_lengths(track, t).sum()),
+            samples=self._samples(track, alone, shown),
         )
 
     def _grid(self, track: Track) -> Array:
-        """User times of the run [s], (k,)."""
+        """User times of the run [s], (k,): even ones."""
         step, known = self.begin.step, track.t
         if not len(known):
             raise FormatError(str(self.recording.path), "holds no samples of the real robot to compare with")
-        first = max(math.ceil(float(known[0]) / step - 1e-9), 0)
-        last = math.floor(float(known[-1]) / step + 1e-9)
+        start = 0.0
+        if self.begin.sampled is not None:
+            # Times of every other sample, but where the body was late.
+            period = self.begin.sampled
+            start = float(np.median(known - period * np.round((known - known[0]) / period)))
+            step = 2 * period
+            start %= step
+        first = max(math.ceil((float(known[0]) - start) / step - 1e-6), 0)
+        last = math.floor((float(known[-1]) - start) / step + 1e-6)
         if self.end is not None and not self._live:
             last = round(self.end.t / step)
         if last - first < 1:
             raise FormatError(str(self.recording.path), "holds less than two samples of the real robot")
         if last - first >= MOST_ROWS:
             raise FormatError(str(self.recording.path), f"is longer than the {MOST_ROWS} samples that are compared")
-        t: Array = step * np.arange(first, last + 1, dtype=np.float64)
+        t: Array = start + step * np.arange(first, last + 1, dtype=np.float64)
         return t
 
     def _real(self, track: Track, t: Array) -> tuple[Array, Array, Array]:
@@ -172,6 +180,13 @@ class _Reading:
         if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
             raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
         return np.maximum.accumulate(play), q, reference
+
+    def _samples(self, track: Track, alone: Timeline, shown: Timeline) -> tuple[Array, Array, Array, Array] | None:
+        """See `TwinRun.samples`; of very many, some."""
+        if self.begin.sampled is None:
+            return None
+        t, play, q = (column[:: -(-len(track.t) // MOST_ROWS)] for column in (track.t, track.play, track.q))
+        return alone.sample(play), shown.sample(t), shown.sample(play), q
 
     def _shown(self, again: Rerun) -> Timeline:
         """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""

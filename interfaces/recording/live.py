@@ -21,6 +21,7 @@ from interfaces.runtime.happenings import correction_events
 from interfaces.software import software
 from interfaces.stream.wire import fields
 from interfaces.teleop import Correction, Deed, Report, RobotLine, Sample
+from interfaces.teleop.measured import PERIOD
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
@@ -164,6 +165,7 @@ class LiveRecorder:
             lateness=str(engine.parameters["lateness"]),
             software=software(),
             began=began,
+            sampled=PERIOD,
             late=late_of(self._capture.late),
         )
         self._recorder: Recorder | None = None

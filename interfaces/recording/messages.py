@@ -93,6 +93,8 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     """What wrote the file, with its version."""
     began: Stamp | None = None
     """Seconds since 1970 at `t`; None in the laboratory, where the same seed gives the same bytes."""
+    sampled: Seconds | None = None
+    """Between two samples of a live arm [s]; None where they came with its reports alone."""
     late: Late | None = None
     """None where nothing had been commanded yet."""
     drive: DriveFacts | None = None

@@ -77,7 +77,7 @@ class Track:
         gaps = self.gaps
         left = np.searchsorted(gaps[:, 0], t, side="left") - 1
         inside = (left >= 0) & (t < gaps[np.maximum(left, 0), 1]) if len(gaps) else np.zeros(len(t), dtype=bool)
-        return np.asarray(inside | (t < self.t[0] - 1e-9) | (t > self.t[-1] + 1e-9))
+        return np.asarray(inside | (t < self.t[0] - 1e-6) | (t > self.t[-1] + 1e-6))
 
 
 class Tracks:

@@ -19,7 +19,7 @@ from vrs.errors import FormatError
 PAGE: Final = "reproduce.html"
 DATA: Final = "reproduce.json"
 SCHEMA: Final = "vrs-claims/1"
-HEAD: Final = ("claim", "", "expected", "measured", "95 %", "source")
+HEAD: Final = ("claim", "", "expected", "measured", "interval", "source")
 """Of the table; the verdict has no name."""
 
 

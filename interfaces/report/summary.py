@@ -43,14 +43,14 @@ def summarize(
     seen = run.measured
     lag, D = best_lag(run.t, run.q_matched, run.q_real), float(run.D[seen].mean())
     aligned = run.q_matched if lag is None else shifted(run.t, run.q_matched, -lag)
+    matched, shown, reference, real = run.samples or (
+        q[seen] for q in (run.q_matched, run.q_shown, run.q_reference, run.q_real)
+    )
     errors = {
-        name: agreement(run.model, q[seen], run.q_real[seen])
-        for name, q in (
-            ("timeline_time", run.q_matched),
-            ("lag_removed", aligned),
-            ("user_time", run.q_shown),
-            ("servo", run.q_reference),
-        )
+        "timeline_time": agreement(run.model, matched, real),
+        "lag_removed": agreement(run.model, aligned[seen], run.q_real[seen]),
+        "user_time": agreement(run.model, shown, real),
+        "servo": agreement(run.model, reference, real),
     }
     value = {
         "schema": SCHEMA,

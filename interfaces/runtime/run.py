@@ -92,6 +92,9 @@ class TwinRun:
     """When the virtual robot was put where the real one was going."""
     events: tuple[Event, ...]
     """Everything else that happened, by time, kind and text."""
+    samples: tuple[Array, Array, Array, Array] | None = None
+    """q_matched, q_shown, q_reference and q_real when the real robot was measured, (m, n) each; None where
+    those are the grid's rows."""
     gap_s: float = 0.0
     """For how long nothing was measured of the real robot, between its first and its last sample [s]."""
 

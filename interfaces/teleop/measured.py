@@ -16,11 +16,11 @@ import numpy as np
 
 from vrs.model import Array, frozen_array
 
-PERIOD: Final = 0.02
-"""Time between two samples [s]."""
+PERIOD: Final = 0.01
+"""Time between two samples [s], as between two measurements of the body."""
 KEPT: Final = 600.0
 """For so long the robot's site keeps samples [s]: an outage as long as that leaves no gap."""
-NEW: Final = 64
+NEW: Final = 128
 """New samples in one report, at most; the older ones are asked for."""
 AGAIN: Final = 32
 """Samples in one report that were asked for, at most."""
@@ -29,7 +29,7 @@ RANGES: Final = 32
 WANTED: Final = 128
 """Samples that are asked for in one message, at most."""
 LATE: Final = 128
-"""Late samples that are told to who looks on, at most; one of three is, which is often enough to look at."""
+"""Late samples that are told to who looks on, at most; one of six is, which is often enough to look at."""
 _MOST: Final = round(KEPT / PERIOD)
 _ASKED: Final = 4096
 """Samples that wait to be sent again, at most."""
@@ -116,7 +116,7 @@ class Gathering:
         self._late: deque[tuple[float, Sample]] = deque(maxlen=LATE)
 
     def late(self, *, since: float) -> tuple[Sample, ...]:
-        """Samples that have come since a time [s] although later ones had come before; one of three."""
+        """Samples that have come since a time [s] although later ones had come before; one of six."""
         return tuple(sample for came, sample in self._late if came >= since)
 
     def take(self, samples: Iterable[Sample], oldest: int, *, now: float) -> list[Sample]:
@@ -140,7 +140,7 @@ class Gathering:
                 self._newest = number
             else:
                 new = self._missing.pop(number, None) is not None
-                if new and number % 3 == 0:
+                if new and number % 6 == 0:
                     self._late.append((now, sample))
             if new:
                 self._t = max(self._t, sample.t)

@@ -116,7 +116,8 @@ class TestStatistics:
         assert 0.87 <= np.mean([e.low <= 2.0 <= e.high for e in estimates]) <= 0.99
 
     def test_one_value_and_no_spread(self):
-        assert bootstrap([1.5], 0) == (1.5, 1.5, 1.5)
+        assert bootstrap([1.5], 0)[:3] == (1.5, 1.5, 1.5)
+        assert bootstrap([1.5] * 6, 0)[:3] == bootstrap([1.5] * 12, 0)[:3] == (1.5, 1.5, 1.5)
         assert bootstrap([1.0, 2.0, 9.0], 0, median).value == 2.0
         assert bootstrap([-1.0, -2.0], 0).is_below_zero
         assert not bootstrap([-1.0, 2.0], 0).is_below_zero

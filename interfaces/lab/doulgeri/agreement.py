@@ -10,7 +10,7 @@ import numpy as np
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.lab.statistics import bootstrap, median
+from interfaces.lab.statistics import bootstrap, interval_name, median
 from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import Correction, OperatorSite, OperatorSiteConfig, RobotSite, RobotSiteConfig
@@ -243,7 +243,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     columns = (
         "what",
         "agree after s, median",
-        "95 %",
+        interval_name(study.runs, of_median=True),
         "max",
         "corrections",
         "size deg, mean",

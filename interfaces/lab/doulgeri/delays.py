@@ -10,7 +10,7 @@ from interfaces import Designer, Viewer
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import Joined, arrivals, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.lab.statistics import Estimate, bootstrap
+from interfaces.lab.statistics import Estimate, bootstrap, interval_name
 from interfaces.messages import Broadcast, Form, FrameStatus, Outcome, Reply
 from interfaces.ports import RemotePort
 from vrs import MotionCommand
@@ -200,7 +200,7 @@ def conclude(study: Study, found: tuple[object, ...]) -> Findings:
         "measured s",
         "shown at most s",
         "falsified %",
-        "95 %",
+        interval_name(study.runs),
         "foretold by commands %",
     )
     table = Table(
@@ -331,7 +331,16 @@ def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
     points = [bootstrap(100 * column, study.seed) for column in shares.T]
     y = np.array([p.value for p in points])
     error = np.array([[p.value - p.low for p in points], [p.high - p.value for p in points]])
-    ax.errorbar(LEADS, y, error, fmt="o", color=REAL, markersize=4, capsize=3, label="measured, 95 % over seeds")
+    ax.errorbar(
+        LEADS,
+        y,
+        error,
+        fmt="o",
+        color=REAL,
+        markersize=4,
+        capsize=3,
+        label=f"measured, {points[0].name} over seeds",
+    )
     ax.set_xlabel("lead, s")
     ax.set_ylabel("falsified, %")
     ax.set_ylim(0.0, 100.0)

@@ -10,7 +10,7 @@ import numpy as np
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script, tool
 from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.lab.statistics import bootstrap, clustered
+from interfaces.lab.statistics import bootstrap, clustered, interval_name
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
@@ -283,10 +283,10 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
         "offset",
         "D fixed s",
         "path error mm, mean",
-        "95 %",
+        interval_name(study.runs),
         "max",
         "time difference s",
-        "95 % over seeds",
+        f"{interval_name(study.runs)} over seeds",
         "max",
         "bursts",
         "limit used",
@@ -356,7 +356,7 @@ def _paint(canvas: Canvas, study: Study, results: dict[str, Result]) -> None:
             error = np.array([[p.value - p.low for p in points], [p.high - p.value for p in points]])
             ax.bar(x + shift, y, 0.34, color=colour, label=f"{name} D")
             ax.errorbar(x + shift, y, error, fmt="none", ecolor=MUTED, elinewidth=1.0, capsize=2)
-    above.set_title("mean path error, mm (95 % over seeds)")
+    above.set_title(f"mean path error, mm ({interval_name(study.runs)} over seeds)")
     below.set_title("mean time difference, s")
     below.set_xticks(x, list(results))
     below.set_xlabel("delay each way, @ correlation time in s")

@@ -15,7 +15,7 @@ from interfaces.lab.driving.attribution import CAUSES, Attribution
 from interfaces.lab.driving.run import Case
 from interfaces.lab.driving.sweep import METRICS, Group, Row, grouped, paired
 from interfaces.lab.output import DIGITS, write_files
-from interfaces.lab.statistics import Estimate
+from interfaces.lab.statistics import LEVEL, RANGE, Estimate
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -53,10 +53,12 @@ def facts_of(row: Row) -> dict[str, Any]:
     return dict(zip(COLUMNS, shown, strict=True))
 
 
-def _estimate(found: Estimate | None) -> dict[str, float] | None:
+def _estimate(found: Estimate | None) -> dict[str, Any] | None:
+    """A figure with its interval; `level` only where that isn't 95 %, null of a range."""
     if found is None:
         return None
-    return {name: float(_cell(value)) for name, value in found._asdict().items()}
+    value: dict[str, Any] = {name: float(_cell(getattr(found, name))) for name in ("value", "low", "high")}
+    return value if found.level == LEVEL else value | {"level": found.level}
 
 
 def attributions(chosen: Sequence[Case], found: Sequence[tuple[Attribution, ...]]) -> list[dict[str, Any]]:
@@ -151,17 +153,24 @@ def write(rows: Sequence[Row], found: dict[str, Any], figures: Sequence[Figure],
     write_files(out, figures, {"runs.csv": lines.getvalue(), "summary.json": text + "\n"})
 
 
+SHOWN = ("path_error_max", "time_difference_mean", "speed_error")
+"""Figures whose intervals the table shows."""
+
+
 def rich_table(rows: Sequence[Row]) -> RichTable:
-    """Medians of the groups with their 95 % intervals, and the worst path error."""
+    """Medians of the groups with their intervals, and the worst path error."""
     from rich.table import Table
 
     groups = grouped(rows)
+    shown = [group.median(name) for group in groups for name in SHOWN]
+    names = sorted({found.name for found in shown if found is not None}, key=lambda name: name == RANGE)
+    what = ", ".join(f"({name})" if name == RANGE else f"[{name} interval]" for name in names)
     # What is the same in all rows is said once.
     varying = [k for k in range(len(KEYS)) if len({group.key[k] for group in groups}) > 1 or k == 0]
     same = ", ".join(groups[0].key[k] for k in range(len(KEYS)) if k not in varying)
     title = f"{same}; " if same else ""
     table = Table(
-        title=f"{title}medians of {len(groups[0].rows)} runs [95 % interval]".replace("[", r"\["),
+        title=f"{title}medians of {len(groups[0].rows)} runs {what}".replace("[", r"\["),
         title_justify="left",
     )
     for k in varying:
@@ -176,8 +185,7 @@ def rich_table(rows: Sequence[Row]) -> RichTable:
     ):
         table.add_column(name.replace("[", r"\["), justify="right")
     for group in groups:
-        path, late = group.median("path_error_max"), group.median("time_difference_mean")
-        speed, progress = group.median("speed_error"), group.median("progress")
+        (path, late, speed), progress = map(group.median, SHOWN), group.median("progress")
         table.add_row(
             *(group.key[k] for k in varying),
             _said(path, 100),
@@ -193,5 +201,6 @@ def rich_table(rows: Sequence[Row]) -> RichTable:
 def _said(found: Estimate | None, scale: float, digits: int = 1) -> str:
     if found is None:
         return ""
-    value, low, high = (f"{scale * x:.{digits}f}" for x in found)
-    return f"{value} [{low}, {high}]".replace("[", r"\[")
+    value, low, high = (f"{scale * x:.{digits}f}" for x in found[:3])
+    ends = f"({low} to {high})" if found.level is None else f"[{low}, {high}]"
+    return f"{value} {ends}".replace("[", r"\[")

@@ -139,7 +139,7 @@ class Paired:
     difference: Estimate
     """Mean of first − second, with its interval."""
     verdict: str
-    """`below`, `above` (the interval doesn't touch zero), `equal` (within 10 %) or `unclear`."""
+    """`below`, `above` (the interval doesn't touch zero), `equal` (within 10 %), `unclear`, as of few seeds."""
 
 
 def paired(first: Group, second: Group, metric: str) -> Paired | None:
@@ -155,7 +155,9 @@ def paired(first: Group, second: Group, metric: str) -> Paired | None:
         return None
     a, b = np.array(pairs).T
     difference = bootstrap(a - b, 0)
-    if difference.high < 0:
+    if difference.level is None:
+        verdict = "unclear"
+    elif difference.high < 0:
         verdict = "below"
     elif difference.low > 0:
         verdict = "above"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import fields
 from pathlib import Path
@@ -10,10 +11,11 @@ import numpy as np
 import pytest
 
 from interfaces.lab.driving.legs import point_ahead, way_left
+from interfaces.lab.driving.output import rich_table, summary
 from interfaces.lab.driving.recorded import name_of, paths
 from interfaces.lab.driving.run import Case
-from interfaces.lab.driving.sweep import comparable
-from interfaces.lab.statistics import bootstrap, clustered, median
+from interfaces.lab.driving.sweep import Row, comparable, grouped, paired
+from interfaces.lab.statistics import bootstrap, clustered, interval_name, median
 from vrs.comparison import PathComparison
 from vrs.errors import InvalidValueError
 
@@ -36,6 +38,79 @@ def test_there_is_no_interval_of_nothing(values: list[float]) -> None:
         bootstrap(values, 0)
     with pytest.raises(InvalidValueError):
         clustered(values if np.ndim(values) == 1 else [[1.0], [math.inf]], 0)
+
+
+COVERAGE = {
+    (5, None): (0.935, 0.90, 0.95), (7, None): (0.935, 0.90, 0.95), (9, None): (0.935, 0.90, 0.95),
+    (10, None): (0.85, 0.82, None), (20, None): (0.89, 0.86, None), (50, None): (0.9, 0.88, None),
+    (5, median): (0.92, 0.92, 0.9375), (6, median): (0.955, 0.955, 0.96875), (9, median): (0.945, 0.945, 0.9609),
+    (20, median): (0.88, 0.88, None),
+}  # fmt: skip
+"""How often intervals cover at least, of normal and of skewed runs; and in theory."""
+
+
+@pytest.mark.parametrize(("case", "expected"), COVERAGE.items(), ids=lambda x: str(x[0]))
+def test_intervals_cover_as_often_as_is_said(case, expected) -> None:
+    (k, statistic), (normal, skewed, theory) = case, expected
+    options = () if statistic is None else (statistic,)
+    rng = np.random.default_rng(7)
+    count = 2000 if k < 10 else 250
+    draws = {"normal": rng.normal(3.0, 1.0, (count, k)), "skewed": rng.gamma(4.0, 0.5, (count, k))}
+    truth = {"normal": 3.0, "skewed": 2.0 if statistic is None else 0.5 * 3.672060748850897}
+    covered = {}
+    for name, rows in draws.items():
+        found = [bootstrap(row, 1, *options) for row in rows]
+        covered[name] = np.mean([e.low <= truth[name] <= e.high for e in found])
+        assert all(e.low <= e.value <= e.high for e in found)
+    assert covered["normal"] >= normal
+    assert covered["skewed"] >= skewed
+    if theory is not None:
+        assert covered["normal"] == pytest.approx(theory, abs=0.015)
+        assert found[0].name == f"{100 * min(found[0].level, 0.95):.0f} %"
+
+
+@pytest.mark.parametrize("statistic", [None, median])
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_fewer_than_five_runs_have_a_range_and_no_95_percent(k, statistic) -> None:
+    values = np.random.default_rng(k).normal(0.0, 1.0, k)
+    found = bootstrap(values, 0, *(() if statistic is None else (statistic,)))
+    assert found.interval == (values.min(), values.max())
+    assert found.level is None
+    assert found.name == interval_name(k) == interval_name(k, of_median=True) == "smallest to largest"
+
+
+def test_what_few_runs_say_is_called_what_it_is() -> None:
+    assert [interval_name(k) for k in (5, 9, 10, 100)] == ["95 %"] * 4
+    assert [interval_name(k, of_median=True) for k in (5, 6, 10)] == ["94 %", "95 %", "95 %"]
+    # Student's: 2.776 deviations of a mean of five.
+    values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    found = bootstrap(values, 0)
+    assert found.high - found.value == pytest.approx(2.776 * math.sqrt(2.5 / 5), abs=1e-3)
+    # Three networks a seed: the seeds are what varies.
+    assert clustered(np.tile(values[:, None], 3), 0) == pytest.approx(found)
+
+
+@pytest.mark.parametrize(("runs", "said"), [(3, "smallest to largest"), (5, "94 %"), (12, "95 %")])
+def test_the_laboratory_says_what_its_intervals_are(runs: int, said: str) -> None:
+    rows = [_row(name, seed) for name in ("I", "II") for seed in range(runs)]
+    first, second = grouped(rows)
+    verdict = paired(first, second, "path_error_max")
+    assert verdict is not None
+    # All runs differ alike, but three of them are no proof.
+    assert verdict.verdict == ("unclear" if runs < 5 else "below")
+    found = summary(rows, {})
+    level = found["groups"][0]["median"]["path_error_max"].get("level", 0.95)
+    assert level == {3: None, 5: 0.9375, 12: 0.95}[runs]
+    title = str(rich_table(rows).title)
+    assert said in title
+    assert ("95 %" in title) == (runs > 5)
+    json.dumps(found, allow_nan=False)
+
+
+def _row(architecture: str, seed: int) -> Row:
+    value = (1.0 if architecture == "I" else 2.0) + 0.01 * seed
+    metrics = PathComparison(*([value] * 8), progress=1.0)
+    return Row(architecture, "datagrams", "mon", "bare", "slalom", seed, metrics, 0, 0, 100, 0.5)
 
 
 def test_runs_of_one_seed_are_no_more_news_than_one_of_them() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -160,3 +163,22 @@ def test_samples_that_are_all_apart_are_no_measurement(tmp_path):
     made.finish()
     with open_recording(tmp_path / "live.mcap") as recording, pytest.raises(FormatError, match="no two samples"):
         summary(recording)
+
+
+def test_a_recording_of_before_samples_were_numbered_has_its_figures():
+    here = Path(__file__).parent
+    with open_recording(here / "before.mcap") as recording:
+        value = summary(recording)
+        assert np.isfinite(recording.real(np.linspace(0.1, 2.5, 100))).all()
+    assert value["gap_s"] == 0.0
+    for name, expected in json.loads((here / "before.json").read_text(encoding="utf-8")).items():
+        assert value[name] == approx(expected), name
+
+
+def approx(expected):
+    """The same, but for the last digits of numbers."""
+    if isinstance(expected, dict):
+        return {name: approx(one) for name, one in expected.items()}
+    if isinstance(expected, list):
+        return [approx(one) for one in expected]
+    return pytest.approx(expected, rel=1e-5, abs=1e-8) if isinstance(expected, float) else expected
