@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import OrderedDict, deque
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 
-from interfaces.changes import difference
-from interfaces.messages import Change
+from interfaces.changes import difference, parts
+from interfaces.messages import Change, History
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import UnknownCommandError
@@ -18,6 +18,9 @@ from vrs.timeline import Timeline
 
 KEPT = 256
 """Edits that are kept. Timelines share what they have in common."""
+
+HISTORIES = 64
+"""Parts of histories that are kept for whoever asks for the same."""
 
 NAMES = 1000
 """Commands that a receipt names on the wire, at most."""
@@ -72,6 +75,7 @@ class Journal:
         owners = self._timeline.owners(0, len(self._timeline))
         self._newest = max((*ids, *owners), default=0)
         self._edits: deque[Edit] = deque(maxlen=KEPT)
+        self._parts: OrderedDict[tuple[int, int], list[History]] = OrderedDict()
         self._done: Receipt | None = None
         """What `execute` did since `look`."""
         self._seen = self.past
@@ -126,6 +130,22 @@ class Journal:
         edit = Edit(self.number + 1, self._timeline, timeline, command_id, self._seen, others)
         self._edits.append(edit)
         self._timeline, self.number = timeline, edit.number
+
+    def parts(self, edit: int, timeline: Timeline, index: int) -> list[History]:
+        """The next parts of a history from a segment on; made once for all who ask, the newest ones.
+
+        Args:
+            edit: Number that the history has.
+            timeline: The history.
+            index: First segment that's lacking.
+        """
+        key = edit, index
+        found = self._parts.get(key)
+        if found is None:
+            found = self._parts[key] = parts(edit, timeline, index)
+            if len(self._parts) > HISTORIES:
+                self._parts.popitem(last=False)
+        return found
 
     def since(self, number: int) -> tuple[Edit, ...]:
         """The edits after one, oldest first; where they aren't all kept, the newest alone, by nobody known."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from interfaces.broadcast import DUE, MOST_VIEWERS, Broadcaster, Slot
-from interfaces.changes import MOST_CHANGED, parts
+from interfaces.changes import MOST_CHANGED
 from interfaces.forecasts import Forecasts
 from interfaces.journal import Journal, portable
 from interfaces.messages import (
@@ -192,7 +192,7 @@ class Servlet:
 
     def _fetch(self, want: Want, now: float) -> None:
         if want.index is not None and want.edit == self._snapshot[0]:
-            self._outbox.extend(parts(*self._snapshot, want.index))
+            self._outbox.extend(self.journal.parts(*self._snapshot, want.index))
         elif want.index is None and self._send_changes(want.edit):
             return
         else:

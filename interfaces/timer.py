@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections.abc import Callable
 
@@ -10,6 +11,11 @@ from vrs.clock import Clock
 
 LONGEST = 0.25
 """Longest time between two turns [s], if nothing else is said."""
+AGAIN = 0.05
+"""Time after which a turn that failed is tried again [s]."""
+TOLD = 20
+"""Failures of which the log tells."""
+_LOG = logging.getLogger(__name__)
 
 
 class Lateness:
@@ -82,6 +88,8 @@ class Turning:
         self._clock, self._turn, self._longest = clock, turn, longest
         self._asked = False
         self.running = False
+        self.failures = 0
+        """Turns that raised."""
         self.lateness = Lateness()
         """How late turns began that were due; a deadline that was past already counts from when it was known."""
         self._timer = Timer(clock, self._now, self.lateness)
@@ -106,7 +114,14 @@ class Turning:
         self._asked = False
         if not self.running:
             return
-        deadline = self._turn(self._clock.now())
+        try:
+            deadline = self._turn(self._clock.now())
+        except Exception:  # noqa: BLE001 - whatever it is, the next turn comes
+            # Whoever waits for the next turn gets it: a robot must not wait for ever for what failed once.
+            self.failures += 1
+            if self.failures <= TOLD:
+                _LOG.exception("a turn failed; it's tried again in %g s", AGAIN)
+            deadline = self._clock.now() + AGAIN
         now = self._clock.now()
         due = now + self._longest
         if deadline is not None:

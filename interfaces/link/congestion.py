@@ -11,15 +11,19 @@ from vrs.checks import number_in
 
 LONGEST = MAX_DELAY
 """Longest correlation time [s]."""
+SHORTEST = 1e-6
+"""Shortest one but 0 [s]."""
 
 
 def correlation_time(value: float) -> float:
     """Check a correlation time [s]; 0 means independent draws.
 
     Raises:
-        InvalidValueError: If it isn't in [0, 3600].
+        InvalidValueError: If it isn't 0 or in [1e-6, 3600].
     """
-    return number_in("correlation time", value, 0.0, LONGEST, "seconds")
+    if number_in("correlation time", value, 0.0, LONGEST, "seconds") == 0:
+        return value
+    return number_in("correlation time", value, SHORTEST, LONGEST, "0, or seconds")
 
 
 class Congestion:

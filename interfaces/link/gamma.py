@@ -12,6 +12,9 @@ from interfaces.link.delay import CORRELATION_TIME, MAX_DELAY, DelaySource, shar
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
+SHORTEST = 1e-6
+"""Least mean of what's above the smallest delay [s]: of nearly nothing no share can be worked out."""
+
 
 @dataclass(frozen=True, slots=True)
 class GammaDelay:
@@ -22,7 +25,7 @@ class GammaDelay:
 
     name: str
     mean: float
-    """Mean one-way delay [s], in (low, 3600]."""
+    """Mean one-way delay [s], at least 1 µs above low, at most 3600."""
     deviation: float
     """Standard deviation [s], from 1/1000 to 10 times mean − low."""
     low: float = 0.0
@@ -34,7 +37,7 @@ class GammaDelay:
         number_in("smallest delay", self.low, 0.0, MAX_DELAY, "seconds")
         if not self.low < number_in("mean delay", self.mean, 0.0, MAX_DELAY, "seconds"):
             raise InvalidValueError("mean delay", self.mean, f"more than the smallest, {self.low:g} s")
-        above = self.mean - self.low
+        above = number_in("mean delay above the smallest", self.mean - self.low, SHORTEST, MAX_DELAY, "seconds")
         number_in("standard deviation", self.deviation, above / 1e3, above * 10, "seconds")
         correlation_time(self.correlation_time)
 

@@ -192,8 +192,12 @@ def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
     return reader
 
 
+FOR_ONE = (messages.Outcome, messages.Answer, messages.Scene, messages.Pulse, control.Pong, control.Problem)
+"""What one client alone gets: remembering it would push out what others are still to get."""
+
+
 class SharedEncoder:
-    """Encodes the same message for many receivers once: it remembers the newest ones, by identity."""
+    """Encodes the same message for many receivers once: of what many get it remembers the newest, by identity."""
 
     def __init__(self, size: int = 64) -> None:
         """Remember so many."""
@@ -202,6 +206,8 @@ class SharedEncoder:
 
     def encode(self, message: Value, encoding: Encoding) -> bytes:
         """See `encode`."""
+        if isinstance(message, FOR_ONE):
+            return encode(message, encoding)
         key = id(message), encoding
         known = self._known.get(key)
         # An id is free again once its object is gone; what is remembered isn't gone.

@@ -65,6 +65,8 @@ class ProblemCode(enum.StrEnum):
     """The epoch isn't that of the lease in force."""
     STOPPING = "stopping"
     """The server goes."""
+    FAILED = "failed"
+    """The server failed at this client's message; nobody else is affected."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.control import PROTOCOL, Problem, ProblemCode, Role
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import Leasing, Robot
-from interfaces.stream.limits import Bucket, ClientLimits
+from interfaces.stream.limits import Allowances, Bucket, ClientLimits
 from interfaces.stream.network import Impair, Network
 from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, News, Seat, Session, State, Welcome, Wish
 from interfaces.stream.tasks import TaskOrder, Tasks, Wanted
@@ -25,6 +25,8 @@ from vrs.errors import InvalidValueError, VrsError
 
 SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
+SURVEYED = 0.1
+"""How old what is told of the way to the robot may be [s]."""
 CHANGES = 5.0
 """The way to the robot may change so many times a second, for long; twice as often for a moment."""
 KEY_BYTES = 16
@@ -134,6 +136,9 @@ class Hub:
         self._emulation = emulation
         self._changes = Bucket(CHANGES, 2 * CHANGES, 0.0)
         self._sessions: dict[Session, None] = {}
+        self._opened: dict[Session, str] = {}
+        self._allowances = Allowances(self.limits, 0.0)
+        self._surveyed: tuple[float, int, Network | None] = (-math.inf, 0, None)
         self._seats: dict[str, Seat] = {}
         self._edit = site.journal.look()
         self._sweep = -math.inf
@@ -178,18 +183,24 @@ class Hub:
         seat = self._seats.get(key)
         return seat is not None and seat.role is not Role.VIEWER and self._leasing.admits(seat, epoch, now)
 
+    def commanding(self, seat: Seat) -> bool:
+        """Whether a session has the lease, or shares it."""
+        return self._leasing.commanding(seat)
+
     def stopped(self, *, now: float) -> None:
         """Say that the robot is at rest after a lease ended, and takes no command."""
         self._leasing.stopped(now=now)
 
-    def open(self, encoding: Encoding, *, now: float) -> Session:
+    def open(self, encoding: Encoding, *, now: float, address: str = "") -> Session:
         """Take a connection; with too many, one that's closed at once.
 
         Args:
             encoding: How its messages are written.
             now: Session time [s].
+            address: Where it comes from: what clients cost is counted by address, too.
         """
-        session = Session(self, encoding, now=now)
+        session = Session(self, encoding, self._allowances.join(address, now=now), now=now)
+        self._opened[session] = address
         if len(self._sessions) >= _OPEN * self.limits.clients:
             session.close(TRY_AGAIN, ProblemCode.FULL, f"there are {len(self._sessions)} connections already")
         else:
@@ -205,6 +216,7 @@ class Hub:
             now: Session time [s].
         """
         self._sessions.pop(session, None)
+        self._allowances.leave(self._opened.pop(session))
         seat = session.seat
         if seat is None or seat.session is not session:
             return
@@ -289,8 +301,9 @@ class Hub:
         elif seat.session is not None:
             seat.session.close(POLICY, ProblemCode.REFUSED, "the session is continued by another connection")
             seat.session.seat = None
+        welcome = self._welcome(seat, resumed, now)
         seat.session = session
-        return seat, self._welcome(seat, resumed, now)
+        return seat, welcome
 
     def _full(self, role: Role) -> str:
         """Why there's no place for one more; empty if there is. Who goes on with a session has its place."""
@@ -311,8 +324,13 @@ class Hub:
         return self._greeting(Greeting(*facts))
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
-        """How the way to the robot is; None where none is emulated."""
-        found = None if self._emulation is None else self._emulation.network(now=now)
+        """How the way to the robot is, worked out now and then for all who ask; None where none is emulated."""
+        if self._emulation is None:
+            return None
+        at, version, found = self._surveyed
+        if found is None or version != self.network_version or now >= at + SURVEYED:
+            found = self._emulation.network(now=now)
+            self._surveyed = now, self.network_version, found
         return found if found is None or answers is None else replace(found, answers=answers)
 
     def impair(self, seat: Seat, wish: Impair, now: float) -> Problem | None:

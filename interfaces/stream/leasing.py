@@ -125,6 +125,10 @@ class Leasing:
             return Problem(code, _REASONS[refusal], number)
         return None if number is None else self.seen_by(seat, number)
 
+    def commanding(self, seat: Seat) -> bool:
+        """Whether a session has the lease, or shares it."""
+        return seat is self.holder or self._shares.get(seat, False)
+
     def admits(self, seat: Seat, epoch: int, now: float) -> bool:
         """Whether a session has the lease, and this is its epoch."""
         admitted = seat is self.holder and self._lease.heard(epoch, now=now) is None

@@ -17,7 +17,7 @@ class Outbox:
     What finds no room is dropped, and counted: the client asks for it again.
     """
 
-    __slots__ = ("_encode", "_encoding", "_limit", "_newest", "_queue", "_waiting", "dropped")
+    __slots__ = ("_encode", "_encoding", "_limit", "_newest", "_queue", "_waiting", "dropped", "total")
 
     def __init__(self, encode: Callable[[Value, Encoding], bytes], encoding: Encoding, limit: int) -> None:
         """Begin empty.
@@ -33,6 +33,8 @@ class Outbox:
         self._waiting = 0
         self.dropped = 0
         """Messages that found no room."""
+        self.total = 0
+        """Bytes that were put so far, without those of which only the newest counts."""
 
     def __bool__(self) -> bool:
         return bool(self._queue or self._newest)
@@ -55,6 +57,7 @@ class Outbox:
             return False
         self._queue.append(data)
         self._waiting += len(data)
+        self.total += len(data)
         return True
 
     def put_newest(self, message: Value) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import math
+from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from starlette.applications import Starlette
@@ -17,18 +20,71 @@ from websockets.frames import Opcode
 
 from interfaces.stream.access import check_host, check_origin
 from interfaces.stream.codec import Encoding
+from interfaces.stream.control import Role
 from interfaces.stream.hub import Hub
 from interfaces.stream.session import Session
 from interfaces.stream.sockets import BoundedWebSocket
 from interfaces.timer import Turning
 from vrs.clock import Clock
 
+SLICE = 2e-3
+"""So long clients' messages may be worked on before all others of the loop have had their turn [s]."""
+LONGEST_WAIT = 0.5
+"""After so long at most it's looked again whether a client that has spent too much may go on [s]."""
 BLOCKED = 2.0
 """A client is cut off when a message has waited so long to be sent [s]."""
 _LOOK = 0.25
 """Time between two looks at who is blocked [s]."""
 _DONE = 1000, 1001
 """Close codes of a client that is done."""
+
+
+_LOG = logging.getLogger(__name__)
+
+
+class Slices:
+    """Lets many tasks of a loop work by turns, so long together in each of its rounds.
+
+    Whoever may go first doesn't wait: only what it takes counts.
+    """
+
+    def __init__(self, length: float = SLICE) -> None:
+        """Begin with a whole slice.
+
+        Args:
+            length: So long they may work in a round [s].
+        """
+        self._length = self._left = length
+        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._armed = False
+
+    async def turn(self, *, first: bool = False) -> None:
+        """Wait for one's turn."""
+        while self._left <= 0.0 and not first:
+            turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+            self._waiting.append(turn)
+            await turn
+
+    def spend(self, seconds: float) -> None:
+        """Note what was done in one's turn."""
+        self._left -= seconds
+        self._arm()
+
+    def _arm(self) -> None:
+        if not self._armed:
+            self._armed = True
+            asyncio.get_running_loop().call_soon(self._renew)
+
+    def _renew(self) -> None:
+        """Begin another round; what was too long in the one before is left out of it."""
+        self._armed = False
+        self._left = min(self._left + self._length, self._length)
+        while self._waiting and self._waiting[0].done():
+            self._waiting.popleft()
+        if self._left > 0.0 and self._waiting:
+            self._waiting.popleft().set_result(None)
+        if self._waiting or self._left < self._length:
+            self._arm()
 
 
 class _Client:
@@ -64,6 +120,7 @@ class HubServer:
         self._clients: dict[Session, _Client] = {}
         self._turning = Turning(clock, self._turn, longest=math.inf)
         self._now = clock.now()
+        self._slices = Slices()
         self.cut_off = 0
         """Clients that were cut off because their sending was blocked."""
 
@@ -101,19 +158,34 @@ class HubServer:
 
     async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection that was accepted, until it ends."""
-        session = self.hub.open(encoding, now=self.clock.now())
-        client = self._clients[session] = _Client(session, scope["state"]["socket"])
+        address = (scope.get("client") or ("", 0))[0]
+        session = self.hub.open(encoding, now=self.clock.now(), address=address)
+        socket: BoundedWebSocket = scope["state"]["socket"]
+        client = self._clients[session] = _Client(session, socket)
         writer = asyncio.create_task(self._write(client, send))
+        writer.add_done_callback(partial(self._written, client))
         client.wake.set()
         done = known = False
         try:
             while (message := await receive())["type"] != "websocket.disconnect":
+                await self._slices.turn(first=session.commands)
+                begun = self.clock.now()
                 data = message.get("bytes")
-                session.receive(message["text"] if data is None else data, now=self.clock.now())
+                session.receive(message["text"] if data is None else data, now=begun)
                 if not known and session.seat is not None:
                     known = True
-                    client.socket.let_stay(known=True)
-                self.kick()
+                    socket.let_stay(known=True)
+                if session.role is not Role.VIEWER:
+                    self.kick()
+                elif session.is_due(begun):
+                    client.wake.set()
+                now = self.clock.now()
+                work, socket.work = now - begun + socket.work, 0.0
+                self._slices.spend(work)
+                session.spend(work, now=now)
+                # Meanwhile nothing more is read: it waits at the client's end.
+                while (wait := session.wait(now=self.clock.now())) > 0.0:
+                    await asyncio.sleep(min(wait, LONGEST_WAIT))
             done = message.get("code") in _DONE and session.closing is None
         finally:
             writer.cancel()
@@ -138,6 +210,12 @@ class HubServer:
             assert session.closing is not None
             code, reason = session.closing
             await send({"type": "websocket.close", "code": code, "reason": reason[:100]})
+
+    def _written(self, client: _Client, writer: asyncio.Task[None]) -> None:
+        """Cut a client off that can't be written to, for a reason that nobody expects."""
+        if not writer.cancelled() and (error := writer.exception()) is not None:
+            _LOG.error("a client is cut off", exc_info=error)
+            client.socket.abort()
 
     async def _watch(self) -> None:
         while True:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Protocol, TypeAlias
 
 from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want
@@ -9,19 +10,21 @@ from interfaces.stream import control
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
 from interfaces.stream.control import Problem, ProblemCode, Role
 from interfaces.stream.errors import ProtocolError
-from interfaces.stream.limits import Bucket, ClientLimits
+from interfaces.stream.limits import Bucket, ClientLimits, Spending
 from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.network import Impair, Network, Survey
 from interfaces.stream.outbox import Outbox
 from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks
 
-POLICY, TOO_LARGE, RESTART, TRY_AGAIN = 1008, 1009, 1012, 1013
+POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""
 
 _FORGIVEN = 1.0
 """Bad messages that are forgiven a second."""
 _MUTE = 1.0
 """Time between two complaints that a client sends too fast [s]."""
+
+_LOG = logging.getLogger(__name__)
 
 Closing = tuple[int, str]
 """Close code and reason."""
@@ -85,6 +88,9 @@ class Desk(Protocol):
     def lease_version(self) -> int:
         """Counts the changes of the lease."""
 
+    def commanding(self, seat: Seat) -> bool:
+        """Whether a session has the lease, or shares it."""
+
     def engine_time(self, now: float) -> float:
         """The engine's time [s]."""
 
@@ -110,14 +116,18 @@ class Desk(Protocol):
 class Session:
     """One connection. Whatever comes in, others aren't affected; what goes out is bounded."""
 
-    def __init__(self, desk: Desk, encoding: Encoding, *, now: float) -> None:
+    def __init__(self, desk: Desk, encoding: Encoding, spending: Spending, *, now: float) -> None:
         """Wait for `Hello`.
 
         Args:
             desk: The hub.
             encoding: How its messages are written.
+            spending: What it may cost.
             now: Session time [s].
         """
+        self._spending, self._told = spending, 0
+        self._wanted: set[Want] = set()
+        """What was asked for and is on its way."""
         self._desk, self._limits = desk, desk.limits
         self.encoding = encoding
         self.seat: Seat | None = None
@@ -158,6 +168,43 @@ class Session:
             data: What has come.
             now: Session time [s].
         """
+        try:
+            self._hear(data, now)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        """Something raised that nobody expects: this connection ends, and no other."""
+        _LOG.exception("a client's connection is closed")
+        self._news, self._wanted = {}, set()
+        self.close(FAILED, ProblemCode.FAILED, f"the server failed at this: {type(error).__name__}")
+
+    @property
+    def role(self) -> Role:
+        """Of a client that hasn't said hello yet, the least."""
+        return Role.VIEWER if self.seat is None else self.seat.role
+
+    @property
+    def commands(self) -> bool:
+        """Whether it has control, or shares it."""
+        return self.seat is not None and self._desk.commanding(self.seat)
+
+    def spend(self, work: float, *, now: float) -> None:
+        """Note what the messages of the client have cost.
+
+        Args:
+            work: Processor time since the last call [s]; the bytes that it's answered are known here.
+            now: Session time [s].
+        """
+        total = self._outbox.total
+        self._spending.spend(work, total - self._told, commands=self.commands, now=now)
+        self._told = total
+
+    def wait(self, *, now: float) -> float:
+        """How long nothing more of the client is to be looked at [s]; 0 for at once."""
+        return 0.0 if self.closing is not None else self._spending.wait(commands=self.commands, now=now)
+
+    def _hear(self, data: bytes | str, now: float) -> None:
         if self.closing is not None:
             return
         if not self._allowed.take(now):
@@ -220,6 +267,10 @@ class Session:
         if not isinstance(message, Order):
             if self._outbox.is_full:
                 return
+            if isinstance(message, Want):
+                if message in self._wanted:
+                    return
+                self._wanted.add(message)
         elif seat.role is Role.VIEWER:
             text = "a viewer commands nothing"
             self._complain(Problem(ProblemCode.NOT_ALLOWED, text, message.number), now)
@@ -230,8 +281,14 @@ class Session:
     def look(self, *, now: float) -> None:
         """Put what the servlet has into the outbox; of frames and pulses only the newest waits."""
         seat = self.seat
-        if seat is None:
+        if seat is None or self.closing is not None:
             return
+        try:
+            self._look(seat, now)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+            self._fail(error)
+
+    def _look(self, seat: Seat, now: float) -> None:
         for reply in seat.servlet.advance(now=self._desk.engine_time(now)):
             if isinstance(reply, Broadcast | Pulse):
                 self._outbox.put_newest(reply)
@@ -265,10 +322,16 @@ class Session:
         """
         if self.closing is None:
             if self.seat is not None:
-                self._look_around(self.seat, now)
+                try:
+                    self._look_around(self.seat, now)
+                except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+                    self._fail(error)
             elif now >= self._hello_until:
                 self.close(POLICY, ProblemCode.HELLO_LATE, f"hello must come within {self._limits.hello:g} s")
-        return self._outbox.take()
+        found = self._outbox.take()
+        if not self._outbox:
+            self._wanted.clear()
+        return found
 
     def _look_around(self, seat: Seat, now: float) -> None:
         desk = self._desk

@@ -10,7 +10,7 @@ from asyncio.transports import BaseTransport, Transport
 from collections.abc import AsyncIterator, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import uvicorn
 from starlette.types import Scope
@@ -25,6 +25,9 @@ from interfaces.stream.strangers import Strangers
 from vrs.checks import number_in
 from vrs.errors import FormatError
 
+if TYPE_CHECKING:
+    from uvicorn._types import ASGIReceiveEvent
+
 LARGEST_MESSAGE = 65536
 """Largest message that is received [bytes], and always of who hasn't shown who it is."""
 KERNEL_BUFFER = 16384
@@ -38,6 +41,10 @@ FAREWELL = 2.0
 """Time for a closing handshake, and for what waits to be sent [s]."""
 _LOOK = 0.1
 """Time between two looks at deadlines [s]."""
+CHUNK = 512
+"""Bytes of which frames are read at once: many may be in few."""
+MOMENT = 1e-3
+"""Longest that reading frames of one connection goes on [s], but for one chunk."""
 _GRACE = 1.0
 """Time for handlers to end when a server stops [s]."""
 
@@ -211,12 +218,52 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         super().connection_made(transport)
         cast("Transport", transport).set_write_buffer_limits(HIGH, LOW)
         self._enter(self._state.limits.hello)
+        self._unread = b""
+        self.work = 0.0
+        """Processor time that reading frames has taken, until somebody sets it back [s]."""
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Let it go."""
         super().connection_lost(exc)
         # The parser is a generator that holds what holds it.
         self.conn.parser.close()
+
+    def data_received(self, data: bytes) -> None:
+        """Read frames, as many as take a moment; the others when those have been taken."""
+        self._unread += data
+        self._read()
+
+    def _read(self) -> None:
+        """Read what is there, until there's a message or a moment is over."""
+        begun = now = self.loop.time()
+        # Once it's closed nobody takes messages any more, and the other end's farewell is read all the same.
+        while self._unread and (self.queue.empty() or self.close_sent) and now < begun + MOMENT:
+            if self.transport.is_closing():
+                self._unread = b""
+                return
+            chunk, self._unread = self._unread[:CHUNK], self._unread[CHUNK:]
+            super().data_received(chunk)
+            now = self.loop.time()
+        self.work += now - begun
+        if self._unread:
+            if not self.read_paused:
+                self.read_paused = True
+                self.transport.pause_reading()
+            if self.queue.empty() or self.close_sent:
+                self.loop.call_soon(self._read)
+        elif self.read_paused and self.queue.empty():
+            self.read_paused = False
+            self.transport.resume_reading()
+
+    async def receive(self) -> ASGIReceiveEvent:
+        """Take the next message; more is read when all that were have been taken."""
+        if self._unread and self.queue.empty():
+            self._read()
+        message = await self.queue.get()
+        if self.read_paused and self.queue.empty() and not self._unread:
+            self.read_paused = False
+            self.transport.resume_reading()
+        return message
 
     def handle_connect(self, event: Request) -> None:
         """Take the handshake."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import secrets
 from collections import deque
 from collections.abc import Callable
@@ -32,6 +33,7 @@ _WAITING = 64
 """Most messages that wait to be sent; older ones are dropped, for newer ones repeat what counts."""
 _BLOCKED = 2.0
 """A connection that takes nothing for so long is broken [s]."""
+_LOG = logging.getLogger(__name__)
 
 
 class RobotRefusedError(VrsError):
@@ -111,6 +113,9 @@ class RobotClient:
                 RobotUnfitError,
             ) as error:
                 self.problem = str(error) or type(error).__name__
+            except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+                _LOG.exception("the connection to the robot failed")
+                self.problem = f"this site failed at a message of the robot's: {type(error).__name__}"
             finally:
                 self._line.connected, self.attached = False, None
                 self._changed()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -35,6 +36,8 @@ _PROBLEMS = 32
 _GONE = 1001
 _NO_ROOM = 1013
 _POLICY = 1008
+_FAILED = 1011
+_LOG = logging.getLogger(__name__)
 
 
 class _Connection:
@@ -169,7 +172,13 @@ class RobotServer:
                 connection.end(_POLICY, "too many messages that can't be taken")
             return
         self._heard()
-        self._host.receive(message, now=self._clock.now())
+        try:
+            self._host.receive(message, now=self._clock.now())
+        except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+            _LOG.exception("a message of the operator's site failed")
+            reason = f"the robot's site failed at a message: {type(error).__name__}"
+            self._host.halt(reason, now=self._clock.now())
+            connection.end(_FAILED, reason)
 
     async def _write(self, connection: _Connection, send: Send) -> None:
         kind = "bytes" if connection.encoding is Encoding.MSGPACK else "text"
