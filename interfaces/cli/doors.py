@@ -151,11 +151,20 @@ def keep_quiet() -> None:
     gc.freeze()
 
 
-async def start_robot(robots: AsyncExitStack, robot_at: str | None, options: Sequence[str]) -> str:
-    """Where the robot is; one is started if there's none."""
+async def start_robot(
+    robots: AsyncExitStack, robot_at: str | None, options: Sequence[str], ended: Callable[[str], None]
+) -> str:
+    """Where the robot is; one is started if there's none, and if that ends it's told why."""
     from interfaces.runtime.live.process import local_robot
 
-    return await robots.enter_async_context(local_robot(options)) if robot_at is None else robot_at
+    return await robots.enter_async_context(local_robot(options, ended)) if robot_at is None else robot_at
+
+
+def say_lost(lose: Callable[[str], None], lost: asyncio.Future[str]) -> None:
+    """Say once that the robot is lost for good, here and to whoever commands it."""
+    if not lost.cancelled():
+        typer.echo(f"vrs: {lost.result()}", err=True)
+        lose(lost.result())
 
 
 async def abandon(task: asyncio.Task[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -17,6 +18,7 @@ from interfaces.cli.doors import (
     end_on_signal,
     end_with_input,
     keep_quiet,
+    say_lost,
     say_robot,
     saying_policy,
     start_robot,
@@ -164,7 +166,8 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
     async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
         listening = stack.enter_context(contextlib.closing(sockets.bind(host, serving.port)))
         port = listening.getsockname()[1]
-        robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options))
+        lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options, lost.set_result))
         stack.push_async_callback(abandon, robot)
         await asyncio.to_thread(_load)
 
@@ -183,6 +186,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
             camera=CameraConfig(serving.camera) if serving.camera else None, link_loss=serving.link_loss,
         )  # fmt: skip
         operator = LiveMobileOperator(config, access)
+        lost.add_done_callback(partial(say_lost, operator.lose))
         panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
         station = Station({"mobile": True, "name": model.name}, panels=panels)
         app = application([*operator.routes, *station.routes], serving.allowed(port))

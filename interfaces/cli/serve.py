@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,7 @@ from interfaces.cli.doors import (
     end_on_signal,
     end_with_input,
     keep_quiet,
+    say_lost,
     say_robot,
     start_robot,
 )
@@ -305,7 +307,8 @@ async def _serve(
         val_listening = None
         if doors.val_port is not None:
             val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", doors.val_port)))
-        robot = asyncio.create_task(start_robot(robots, robot_at, options))
+        lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        robot = asyncio.create_task(start_robot(robots, robot_at, options, lost.set_result))
         stack.push_async_callback(abandon, robot)
         await asyncio.to_thread(_load)
 
@@ -327,6 +330,7 @@ async def _serve(
             server=software(), recording=recording, link_loss=link_loss,
         )  # fmt: skip
         operator = LiveOperator(config, access)
+        lost.add_done_callback(partial(say_lost, operator.lose))
         station = Station(described(model, operator.scene.tool))
         shown = Address(host, port)
         near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared

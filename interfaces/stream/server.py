@@ -237,7 +237,8 @@ class HubServer:
             "cut_off": self.cut_off,
             "lease": hub.lease_state.value,
         }
-        return JSONResponse(facts | dict(self._health() if self._health is not None else {}))
+        facts |= dict(self._health() if self._health is not None else {})
+        return JSONResponse(facts, 200 if facts["ok"] else 503)
 
 
 class Endpoint:

@@ -92,6 +92,10 @@ class OperatorSite:
         self.epoch, self._began = 1, now
         self.halted = halted
         """Why the robot stopped by itself; empty while it follows."""
+        self.gone = ""
+        """Why there's no robot any more, whatever anybody does; empty while there may be one."""
+        self.stuck = False
+        """Whether it's halted because it made no progress."""
         self.corrections: list[Correction] = []
         self.report: Report | None = None
         """The newest one."""
@@ -138,6 +142,8 @@ class OperatorSite:
 
     def _refusal(self) -> str:
         """Why the robot can't be commanded; empty if it can."""
+        if self.gone:
+            return f"{NOT_FOLLOWING}: {self.gone}"
         if self.halted:
             return f"{NOT_FOLLOWING}: {self.halted}; resume first"
         if len(self._under_way) >= _UNDER_WAY_MOST:
@@ -234,7 +240,7 @@ class OperatorSite:
         self._watch_progress(report, now)
         new = bool(report.halted) and not self.halted
         if new:
-            self._give_up(report.halted)
+            self._give_up(report.halted, stuck=False)
         correcting = bool(self.corrections) and now < self.corrections[-1].end
         # One at a time: what the correction under way leaves over is corrected after it.
         if report.plan is not None and (new or not correcting):
@@ -290,9 +296,9 @@ class OperatorSite:
         """How long a robot may make nothing of what it's sent [s]: it has been sent again often by then."""
         return max(least, RESENDS * self._patience)
 
-    def _give_up(self, reason: str) -> None:
+    def _give_up(self, reason: str, *, stuck: bool = True) -> None:
         """Command the robot no more until somebody resumes; it's told so."""
-        self.halted = reason
+        self.halted, self.stuck = reason, stuck
         self._under_way.clear()
         self._new = []
         self._waits_since = None
@@ -340,6 +346,8 @@ class OperatorSite:
             Why it can't be yet; empty if it's done.
         """
         self._clock.set(now)
+        if self.gone:
+            return self.gone
         if not self.halted:
             return "the robot follows: there's nothing to resume"
         if self.report is None or not self.report.halted:
@@ -347,7 +355,7 @@ class OperatorSite:
         if now < self.engine.timeline.end:
             left = self.engine.timeline.end - now
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"
-        self.epoch, self._began, self.halted = self.epoch + 1, now, ""
+        self.epoch, self._began, self.halted, self.stuck = self.epoch + 1, now, "", False
         self._entries, self._acknowledged, self._due = 0, 0, now
         self._new = []
         self._recent.clear()

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
@@ -111,8 +112,12 @@ class Child:
     def health(self) -> dict[str, Any]:
         """What it says of itself."""
         base = self.url.replace("ws://", "http://").rsplit("/", 1)[0]
-        with urllib.request.urlopen(f"{base}/health", timeout=5) as answer:
-            facts: dict[str, Any] = json.load(answer)
+        try:
+            with urllib.request.urlopen(f"{base}/health", timeout=5) as answer:
+                facts: dict[str, Any] = json.load(answer)
+        except urllib.error.HTTPError as refused:
+            with refused:
+                facts = json.load(refused)
         return facts
 
     def wait(self, ready: Callable[[dict[str, Any]], Any], timeout: float = 30.0) -> dict[str, Any]:

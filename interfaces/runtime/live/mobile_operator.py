@@ -231,6 +231,13 @@ class LiveMobileOperator:
             self.hub.stopped(now=now)
             self.server.kick()
 
+    def lose(self, reason: str) -> None:
+        """The robot is lost for good: nothing is sent any more, and commands are refused with the reason."""
+        self.robot.lost = self.operator.gone = reason
+        self.operator.halt(reason)
+        self._show(self.clock.now())
+        self._turning.soon()
+
     @property
     def connected(self) -> bool:
         """Whether the robot's site is heard of."""
@@ -254,7 +261,7 @@ class LiveMobileOperator:
                 command=operator.site.before,
                 estimate=Posture(*operator.site.estimator.posture.tolist()),
                 connected=self.connected,
-                halted="" if operator.halted == BY_ITSELF else operator.halted,
+                halted=operator.gone or ("" if operator.halted == BY_ITSELF else operator.halted),
                 drives=operator.epochs,
                 round_trip=operator.round_trip,
                 messages=self.line.messages(),
@@ -273,6 +280,7 @@ class LiveMobileOperator:
             "delay": self.line.link.conditions.forward.delay.name,
             "connected": self.connected,
             "problem": self.robot.problem,
+            **self.robot.health(),
             "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
             "halted": self.operator.halted,
             "epoch": self.operator.epoch,

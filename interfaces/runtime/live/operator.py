@@ -260,6 +260,11 @@ class LiveOperator:
             self.hub.stopped(now=now)
             self.server.kick()
 
+    def lose(self, reason: str) -> None:
+        """The robot is lost for good: nothing is sent any more, and commands are refused with the reason."""
+        self.robot.lost = self.operator.gone = reason
+        self._turning.soon()
+
     @property
     def connected(self) -> bool:
         """Whether the robot's site is heard of."""
@@ -268,7 +273,8 @@ class LiveOperator:
     def _show(self, now: float) -> None:
         """Tell clients where the real robot is, when that's news."""
         report = self.operator.report
-        shown = report, self.connected, self.operator.halted
+        halted = self.operator.gone or self.operator.halted
+        shown = report, self.connected, halted
         if report is None or shown == self._shown:
             return
         self._shown = shown
@@ -285,7 +291,7 @@ class LiveOperator:
                 following_error=float(np.abs(expected - report.q).max()),
                 epoch=report.epoch,
                 connected=self.connected,
-                halted=self.operator.halted,
+                halted=halted,
                 corrections=len(self.operator.corrections),
                 reference=report.reference,
                 round_trip=self.operator.round_trip,
@@ -304,6 +310,7 @@ class LiveOperator:
             "delay": self.line.link.conditions.forward.delay.name,
             "connected": self.connected,
             "problem": self.robot.problem,
+            **self.robot.health(self.operator.halted if self.operator.stuck else ""),
             "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
             "halted": self.operator.halted,
             "epoch": self.operator.epoch,

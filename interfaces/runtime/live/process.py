@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Sequence
+import signal
+from asyncio.subprocess import Process
+from collections.abc import AsyncIterator, Callable, Sequence
 
 from interfaces.runtime.children import module_process
 from vrs.errors import VrsError
@@ -25,12 +27,20 @@ class RobotStartError(VrsError):
         super().__init__(f"the robot's site didn't start: {problem}")
 
 
+async def _watch(process: Process, ended: Callable[[str], None]) -> None:
+    """Tell when a process ends."""
+    status = await process.wait()
+    how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"with status {status}"
+    ended(f"the robot's process has ended ({how}): start vrs serve again")
+
+
 @contextlib.asynccontextmanager
-async def local_robot(options: Sequence[str]) -> AsyncIterator[str]:
+async def local_robot(options: Sequence[str], ended: Callable[[str], None]) -> AsyncIterator[str]:
     """Run `vrs robot` on a loopback port meanwhile; it ends by itself if this process does.
 
     Args:
         options: Of `vrs robot`, but for the address.
+        ended: Is told why there's no robot any more, if it ends meanwhile.
 
     Returns:
         Where its site listens.
@@ -56,7 +66,11 @@ async def local_robot(options: Sequence[str]) -> AsyncIterator[str]:
             raise RobotStartError(f"it said nothing for {_START:g} s") from None
         if not line.startswith(READY):
             raise RobotStartError(line or "it ended at once")
-        yield line.removeprefix(READY).split()[0]
+        watch = asyncio.create_task(_watch(process, ended))
+        try:
+            yield line.removeprefix(READY).split()[0]
+        finally:
+            watch.cancel()
     finally:
         if process.stdin is not None:
             process.stdin.close()

@@ -26,13 +26,15 @@ from interfaces.runtime.physics import (
     Silent,
 )
 from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, Ready
-from interfaces.stream.access import Access
-from interfaces.stream.control import Attached
+from interfaces.stream.access import Access, bearer
+from interfaces.stream.control import Attached, Role
 from interfaces.teleop import RobotHost, RobotHostConfig
 from interfaces.timer import Turning
 from vrs.clock import WallClock
 from vrs.model import Array, RobotModel
 
+JOINTS = frozenset(("q", "qd", "q_ref", "qd_ref"))
+"""Of `/health`, what only an operator's site is told."""
 _REST = 2.0
 """Longest time to come to rest in the end [s]."""
 
@@ -64,7 +66,7 @@ class LiveRobot:
             config: The robot.
             access: Who may come in as `Role.SITE`.
         """
-        self.config = config
+        self.config, self._access = config, access
         warm(config.model, config.q)
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
@@ -207,8 +209,11 @@ class LiveRobot:
             "timer_late": self._turning.lateness.worst,
         }  # fmt: skip
 
-    async def _say_health(self, request: Request) -> JSONResponse:  # noqa: ARG002 - Starlette gives it
-        return JSONResponse(self.health())
+    async def _say_health(self, request: Request) -> JSONResponse:
+        facts = self.health()
+        if self._access.refusal(Role.SITE, bearer(request.headers.get("authorization", ""))):
+            facts = {name: fact for name, fact in facts.items() if name not in JOINTS}
+        return JSONResponse(facts, 503 if self.problem else 200)
 
 
 def _finite(value: float) -> float | None:

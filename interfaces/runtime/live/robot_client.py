@@ -25,6 +25,8 @@ from vrs.errors import VrsError
 
 AGAIN = 0.25
 """Time between two attempts to connect [s]."""
+GONE = 2.0
+"""A robot that was connected and of which nothing has come for so long [s] is gone."""
 OPENING = 3.0
 """Longest that a connection may take to be made, and answered [s]."""
 LARGEST = 4 << 20
@@ -92,6 +94,19 @@ class RobotClient:
         self.heard = -1e9
         """When something came off the connection last [s]; the emulated delay isn't in it."""
         self.connections = 0
+        self.lost = ""
+        """Why there's no robot to connect to any more; empty while there may be one."""
+
+    def health(self, also: str = "") -> dict[str, object]:
+        """Whether all is well with the robot, for `/health`, and why not.
+
+        Args:
+            also: What else is wrong; empty if nothing is.
+        """
+        reason = self.lost or also
+        if not reason and self.connections and self._clock.now() - self.heard > GONE:
+            reason = f"nothing is heard of the robot at {self.url}: {self.problem or 'it is silent'}"
+        return {"ok": not reason, "reason": reason}
 
     def send(self, message: Value) -> None:
         """Put a message on the connection."""
@@ -102,7 +117,7 @@ class RobotClient:
         """Connect, and connect again, until it's cancelled."""
         while True:
             try:
-                if self.url:
+                if self.url and not self.lost:
                     await self._once()
             except (
                 OSError,
@@ -118,6 +133,7 @@ class RobotClient:
                 self.problem = f"this site failed at a message of the robot's: {type(error).__name__}"
             finally:
                 self._line.connected, self.attached = False, None
+                self.problem = self.lost or self.problem
                 self._changed()
             await asyncio.sleep(AGAIN)
 

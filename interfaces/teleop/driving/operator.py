@@ -60,6 +60,8 @@ class DrivingOperator:
         self._model, self._around = model, around
         self.halted = NOT_MET
         """Why the real robot doesn't follow; empty while it does."""
+        self.gone = ""
+        """Why there's no robot any more, whatever anybody does; empty while there may be one."""
         self.epoch = 1
         self.steps = 0
         """Commands since the drive began."""
@@ -118,6 +120,8 @@ class DrivingOperator:
         """
         finite("v", v)
         finite("w", w)
+        if self.gone:
+            return f"the robot doesn't follow: {self.gone}"
         if self.halted == BY_ITSELF and (v or w):
             # Who takes the wheel drives: first the robot comes to rest.
             self.stop()
@@ -154,6 +158,8 @@ class DrivingOperator:
         Returns:
             Why not; empty if it's told to.
         """
+        if self.gone:
+            return f"the robot doesn't follow: {self.gone}"
         if self.report is None:
             return NOT_MET
         if not all(stops(task) for task in tasks):
@@ -195,8 +201,8 @@ class DrivingOperator:
     def resume(self, *, now: float) -> str:
         """Begin a drive where the real robot stands; why that can't be, empty if it does."""
         report = self.report
-        if report is None:
-            return NOT_MET
+        if self.gone or report is None:
+            return self.gone or NOT_MET
         if not self.halted:
             return ""
         if report.doing is not Doing.NOTHING and not self._errands:
