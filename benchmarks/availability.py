@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
+from websockets.typing import Subprotocol
 
 from benchmarks.loads import LOADED
 from benchmarks.results import Bar, Cost, Part, Result
@@ -114,15 +115,14 @@ class Operator:
     """Round trips of commands [s]."""
 
     @classmethod
-    async def join(cls, port: int, session: str = "") -> Operator:
-        """Connect, perhaps to go on with a session, until the server has said welcome."""
-        peer = await connect(
-            f"ws://127.0.0.1:{port}/ws", subprotocols=["vrs.1.json"], compression=None, proxy=None, open_timeout=1.0  # type: ignore[list-item]
-        )  # fmt: skip
+    async def join(cls, port: int, session: str = "", *, wait: float = 30.0) -> Operator:
+        """Connect within a time [s], perhaps to go on with a session, until the server has said welcome."""
+        url, protocol = f"ws://127.0.0.1:{port}/ws", Subprotocol("vrs.1.json")
+        peer = await connect(url, subprotocols=[protocol], compression=None, proxy=None, open_timeout=wait)
         self = cls(port, peer)
         hello = {"type": "hello", "protocol": 1, "role": "operator", "name": "Ada"}
         await self.send(hello | ({"session": session} if session else {}))
-        welcome = await self.until("welcome")
+        welcome = await self.until("welcome", wait)
         self.session, self.offset = welcome["session"], welcome["now"] - time.monotonic()
         if session and not welcome.get("resumed"):
             raise TimeoutError("the session is gone")
@@ -207,7 +207,7 @@ class Operator:
         begun = time.monotonic()
         while time.monotonic() < begun + 4 * BACK:
             try:
-                other = await Operator.join(self.port, self.session)
+                other = await Operator.join(self.port, self.session, wait=1.0)
                 other.epoch, other.number, other.state = self.epoch, self.number, self.state
                 await other.command(settled=False)
                 await other.until("outcome")

@@ -20,6 +20,7 @@ from collections.abc import Callable
 
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
 
 HERE = "127.0.0.1"
 VIEWERS, WANTS = 30, 450
@@ -49,7 +50,7 @@ def on() -> None:
 
 
 async def _view(port: int, until: float) -> None:
-    async with connect(f"ws://{HERE}:{port}/ws", subprotocols=["vrs.1.json"], proxy=None) as peer:  # type: ignore[list-item]
+    async with connect(f"ws://{HERE}:{port}/ws", subprotocols=[Subprotocol("vrs.1.json")], proxy=None) as peer:
         await peer.send('{"type":"hello","protocol":1,"role":"viewer","name":"load"}')
         await peer.send('{"type":"follow","number":1,"form":"segments"}')
         reading = asyncio.create_task(_drop(peer))

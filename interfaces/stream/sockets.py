@@ -34,6 +34,9 @@ KERNEL_BUFFER = 16384
 """Size of a socket's buffers [bytes]; Linux takes twice that."""
 HIGH, LOW = 16384, 4096
 """Bytes waiting in the process beyond which a sender waits, and down to which it does."""
+BACKLOG = 128
+"""Connections that wait to be accepted. Under a flood all wait as long as this queue is, and who finds it full asks
+again: a short one lets a newcomer in sooner."""
 FILES = 16384
 """Open files that a server asks the system for; it does with fewer."""
 _FILES = resource.RLIMIT_NOFILE
@@ -365,7 +368,7 @@ def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KERNEL_BUFFER)
         listening.setblocking(False)
         listening.bind(address)
-        listening.listen(256)
+        listening.listen(BACKLOG)
     except OSError as error:
         listening.close()
         raise FormatError(f"{host}:{port}", error.strerror or "can't be listened on") from None
@@ -400,6 +403,7 @@ async def serve(
         server_header=False,
         date_header=False,
         timeout_graceful_shutdown=1,
+        backlog=BACKLOG,
     )
     server = _Server(config)
     server.server_state = state = _State(SocketLimits() if limits is None else limits)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 from typing import Generic, TypeVar
 
 from vrs.checks import number_in
@@ -32,6 +32,9 @@ class Strangers(Generic[C]):
         self._until: dict[C, float] = {}
         self.gave_way = 0
         """Strangers that gave way to newer ones."""
+
+    def __iter__(self) -> Iterator[C]:
+        return iter(tuple(self._addresses))
 
     def __len__(self) -> int:
         return len(self._addresses)
@@ -85,10 +88,6 @@ class Strangers(Generic[C]):
             self._each[address] -= 1
             if not self._each[address]:
                 del self._each[address]
-
-    def next_deadline(self) -> float:
-        """When the next connection is overdue [s]; infinity for never."""
-        return min(self._until.values(), default=math.inf)
 
     def overdue(self, now: float) -> list[C]:
         """The connections that haven't done their step in time; they are to be cut off.

@@ -82,6 +82,11 @@ class TcpTerminal:
         self.room.set()
         self._send(_TOKEN)
 
+    def unlock(self, data: bytes, *, now: float) -> bool:
+        """Take bytes, none at the end of the input, until a token was accepted; whether it was."""
+        self.feed(data)
+        return self._unlock(now)
+
     def feed(self, data: bytes) -> None:
         """Take bytes; none at the end of the input."""
         self._lines.extend(self._input.feed(data) if data else self._input.end())
@@ -94,10 +99,9 @@ class TcpTerminal:
         if self._writer.transport.is_closing():
             self.leave(now=now)
             return
-        if self.over.is_set() or (self.monitor is None and not self._unlock(now)):
-            return
         monitor = self.monitor
-        assert monitor is not None
+        if monitor is None or self.over.is_set():
+            return
         monitor.advance(now=now)
         self._give()
         for _ in range(min(SLICE, len(self._lines))):
@@ -137,7 +141,6 @@ class TcpTerminal:
         begun = self._input.begun.lstrip()
         if self._ended or len(begun) > BEFORE or _OTHER_PROTOCOL.match(begun):
             self.over.set()
-        self.room.set()
         return False
 
     def _type(self, monitor: Monitor, text: str, now: float) -> None:
@@ -171,11 +174,6 @@ class TcpTerminal:
             data = f"{_NEWLINE}*Output lost* it wasn't read{_NEWLINE}".encode() + data
         self._writer.write(data)
 
-    def cut_off(self) -> None:
-        """End it at once."""
-        self._writer.transport.abort()
-        self.over.set()
-
     def leave(self, *, now: float) -> None:
         """The connection is gone: what it ran is stopped."""
         if self.monitor is not None:
@@ -205,7 +203,7 @@ class ValDoor:
         """
         self._board, self._clock, self._terminal = board, clock, terminal
         self._connections: set[TcpTerminal] = set()
-        self._strangers: Strangers[TcpTerminal] = Strangers(STRANGERS)
+        self._strangers: Strangers[asyncio.StreamWriter] = Strangers(STRANGERS)
         self._turning = Turning(clock, self._turn)
         self.port = 0
         """Where it listens."""
@@ -224,35 +222,32 @@ class ValDoor:
             yield self
         finally:
             server.close()
+            for writer in self._strangers:
+                writer.transport.abort()
             for connection in self._connections:
                 connection.leave(now=self._clock.now())
             self._turning.stop()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(2.0):
-                    while self._connections:
+                    while self._connections or len(self._strangers):
                         await asyncio.sleep(0.01)
 
     def _turn(self, now: float) -> float:
         self._board.advance(now=now)
-        for connection in self._strangers.overdue(now):
-            connection.cut_off()
         for connection in tuple(self._connections):
             connection.advance(now=now)
-            if connection.monitor is not None:
-                self._strangers.know(connection)
         deadlines = [connection.next_deadline() for connection in self._connections]
-        return min([self._board.next_deadline(), self._strangers.next_deadline(), *deadlines])
+        return min([self._board.next_deadline(), *deadlines])
 
     def _full(self) -> bool:
-        return sum(connection.monitor is not None for connection in self._connections) >= MOST
+        return len(self._connections) >= MOST
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         connection = TcpTerminal(writer, self._terminal, self._full)
+        if not await self._let_in(connection, reader, writer):
+            await _close(writer)
+            return
         self._connections.add(connection)
-        address = str(writer.get_extra_info("peername", ("",))[0])
-        oldest = self._strangers.add(connection, address, until=self._clock.now() + PATIENCE)
-        if oldest is not None:
-            oldest.cut_off()
         self._turning.soon()
         reading = asyncio.create_task(self._read(connection, reader))
         try:
@@ -261,8 +256,28 @@ class ValDoor:
             reading.cancel()
             connection.leave(now=self._clock.now())
             self._connections.discard(connection)
-            self._strangers.discard(connection)
             await _close(writer)
+
+    async def _let_in(
+        self, connection: TcpTerminal, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> bool:
+        """Wait for a token; whether one was accepted. Another stranger may be cut off for this one."""
+        address = str(writer.get_extra_info("peername", ("",))[0])
+        oldest = self._strangers.add(writer, address, until=math.inf)
+        if oldest is not None:
+            oldest.transport.abort()
+        try:
+            async with asyncio.timeout(PATIENCE):
+                while not connection.over.is_set():
+                    data = await reader.read(_READ)
+                    if connection.unlock(data, now=self._clock.now()):
+                        return True
+                    await asyncio.sleep(0)
+        except (OSError, TimeoutError):
+            pass
+        finally:
+            self._strangers.discard(writer)
+        return False
 
     async def _read(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> None:
         data = _NUL

@@ -221,6 +221,9 @@ def test_who_reads_nothing_loses_output_and_holds_up_nobody(tmp_path):
             reader, writer = client.reader, client.writer
             writer.write(b'edit flood\nwhile true do\ntype "0123456789012345678901234567890123456789"\nend\ne\n')
             writer.write(b"execute flood\n")
+            async with asyncio.timeout(WAIT):
+                while not door._connections:
+                    await asyncio.sleep(0.01)
             (connection,) = door._connections
             waiting = connection._writer.transport.get_write_buffer_size
             async with asyncio.timeout(WAIT):
@@ -351,6 +354,7 @@ def test_idle_connections_keep_nobody_out_and_end(tmp_path, monkeypatch):
                         client.writer.write(b"\r\n")
                         assert await client.reader.read() == b""
             assert len(door._connections) == 1
+            assert len(door._strangers) == 0
 
     live(scenario())
 
