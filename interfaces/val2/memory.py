@@ -151,6 +151,13 @@ class Memory:
 
     # By names, for the monitor and for files.
 
+    def found(self, variable: Variable) -> Value | None:
+        """The value of a variable; None where it's unset."""
+        slot, key = self._slots.get(variable.name), _key(variable)
+        if slot is not None and key is not None:
+            slot = (slot.elements or {}).get(key)
+        return None if slot is None else slot.value
+
     def get(self, variable: Variable) -> Value:
         """The value of a variable.
 
@@ -160,12 +167,10 @@ class Memory:
         Raises:
             ValError: If it's unset.
         """
-        slot, key = self._slots.get(variable.name), _key(variable)
-        if slot is not None and key is not None:
-            slot = (slot.elements or {}).get(key)
-        if slot is None or slot.value is None:
-            raise undefined(variable, key)
-        return slot.value
+        value = self.found(variable)
+        if value is None:
+            raise undefined(variable, _key(variable))
+        return value
 
     def set(self, variable: Variable, value: Value) -> None:
         """Give a variable a value; the name's prefix must allow it.

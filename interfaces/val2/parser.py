@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from functools import lru_cache
-from typing import Final
+from typing import Final, TypeAlias, TypeVar
 
 from interfaces.val2 import forms, grammar, statements
 from interfaces.val2.errors import Place, ValError
@@ -18,6 +18,10 @@ LONGEST_LINE: Final = 1000
 MOST_LINES: Final = 100_000
 DIRECTIVES: Final = (".PROGRAM", ".END", ".LOCATIONS", ".REALS", ".STRINGS", ".SIGNALS")
 """What lines of a file may begin with, beside what programs hold."""
+
+_Result = TypeVar("_Result")
+Reading: TypeAlias = Generator[int, None, _Result]
+"""Reads a text in steps: yields how many characters each took, and returns what the text holds."""
 
 _SURELY_SHORT: Final = 120
 """Characters of a line that can't come to too many when they're printed."""
@@ -40,7 +44,8 @@ def lines_of(text: str) -> list[str]:
     Raises:
         ValError: If there are too many of them.
     """
-    lines = _BREAK.split(text.removeprefix("\ufeff").rstrip("\x1a\x00"))
+    text = text.removeprefix("\ufeff").rstrip("\x1a\x00")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if len(lines) > MOST_LINES:
         raise ValError("Text too long", f"{MOST_LINES} lines at most")
     return lines
@@ -147,7 +152,7 @@ def parse_program(text: str) -> Program:
     """
     lines = lines_of(text)
     begin = next((i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(";")), 0)
-    program, end = read_program(lines, begin)
+    program, end = whole(read_program(lines, begin))
     for i in range(end, len(lines)):
         if lines[i].strip() and not lines[i].lstrip().startswith(";"):
             raise ValError("Syntax error", "one program is allowed", place=Place(i + 1, 1))
@@ -162,18 +167,28 @@ def directive(line: str) -> str:
     return found[1].upper() if found else "."
 
 
-def read_program(lines: Sequence[str], begin: int) -> tuple[Program, int]:
+def whole(reading: Reading[_Result]) -> _Result:
+    """What a reading comes to, without a pause."""
+    while True:
+        try:
+            next(reading)
+        except StopIteration as stop:
+            result: _Result = stop.value
+            return result
+
+
+def read_program(lines: Sequence[str], begin: int) -> Reading[tuple[Program, int]]:
     """The program whose header is a line, counted from 0, and the line behind it.
 
     Raises:
         ValError: If there's no such program; its place is in the lines.
     """
     name, parameters, comment = _header(lines[begin], begin + 1)
-    steps, end = read_steps(lines, begin + 1, name)
+    steps, end = yield from read_steps(lines, begin + 1, name)
     return Program(name, parameters, steps, comment, Place(begin + 1, 1)), end
 
 
-def read_steps(lines: Sequence[str], begin: int, name: str) -> tuple[tuple[Step, ...], int]:
+def read_steps(lines: Sequence[str], begin: int, name: str) -> Reading[tuple[tuple[Step, ...], int]]:
     """The steps from a line, counted from 0, to `.END`, and the line behind it.
 
     Raises:
@@ -181,6 +196,7 @@ def read_steps(lines: Sequence[str], begin: int, name: str) -> tuple[tuple[Step,
     """
     steps: list[Step] = []
     for i in range(begin, len(lines)):
+        yield len(lines[i])
         match directive(lines[i]):
             case "":
                 try:

@@ -17,6 +17,7 @@ from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import Monitor
 from interfaces.val2.monitor.switchboard import Person, Switchboard
 from interfaces.val2.pages import TerminalRoom
+from interfaces.val2.parser import parse_expression
 from interfaces.val2.tcp import ValDoor
 from vrs.errors import VrsError
 
@@ -84,6 +85,7 @@ class ServedVal:
         from interfaces import connect
         from interfaces.val2.motion import arm_for
 
+        parse_expression("1")  # Makes the grammar's tables, which takes a second, beside the loop.
         connection = connect(self._url, token=self._token, name="VAL-II terminals")
         try:
             return connection, arm_for(connection)

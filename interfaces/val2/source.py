@@ -13,12 +13,14 @@ from interfaces.val2 import forms, geometry, grammar
 from interfaces.val2.errors import Place, ValError
 from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import (
+    Reading,
     directive,
     lines_of,
     read_program,
     read_steps,
     split_comment,
     unknown_directive,
+    whole,
 )
 from interfaces.val2.printer import number, print_expression, print_program
 from interfaces.val2.syntax import NOWHERE, Apply, Binary, Expression, Number, Program, Text, Variable
@@ -79,7 +81,12 @@ def parse_file(text: str, name: str) -> SourceFile:
     Raises:
         ValError: If it can't be read; its place is in the file.
     """
-    return _Reader(lines_of(text), name).run()
+    return whole(read_file(text, name))
+
+
+def read_file(text: str, name: str) -> Reading[SourceFile]:
+    """Read a file in steps, as `parse_file` does at once."""
+    return (yield from _Reader(lines_of(text), name).run())
 
 
 class _Reader:
@@ -89,21 +96,22 @@ class _Reader:
         self._entries: dict[str, dict[Variable, Value]] = {".LOCATIONS": {}, ".REALS": {}, ".STRINGS": {}}
         self._rules: list[SignalRule] = []
 
-    def run(self) -> SourceFile:
+    def run(self) -> Reading[SourceFile]:
         i = 0
         while i < len(self._lines):
+            yield len(self._lines[i])
             line = self._lines[i]
             match directive(line):
                 case ".PROGRAM":
-                    program, i = read_program(self._lines, i)
+                    program, i = yield from read_program(self._lines, i)
                     self._add(program)
                 case ".LOCATIONS" | ".REALS" | ".STRINGS" | ".SIGNALS" as section:
                     _see_alone(line, section, i + 1)
-                    i = self._section(section, i + 1)
+                    i = yield from self._section(section, i + 1)
                 case ".END":
                     i += 1
                 case "":
-                    i = self._outside(i)
+                    i = yield from self._outside(i)
                 case _:
                     raise unknown_directive(line, i + 1)
         locations, reals, strings = (
@@ -117,7 +125,7 @@ class _Reader:
             raise ValError("Duplicate program", program.name, place=program.at)
         self._programs.append(program)
 
-    def _outside(self, i: int) -> int:
+    def _outside(self, i: int) -> Reading[int]:
         """Blank lines and comments between programs; else a program that has no header."""
         if not split_comment(self._lines[i], i + 1)[0].strip():
             return i + 1
@@ -126,12 +134,13 @@ class _Reader:
             raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(i + 1, column))
         stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(self._name).stem)
         name = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
-        steps, end = read_steps(self._lines, i, name)
+        steps, end = yield from read_steps(self._lines, i, name)
         self._add(Program(name, (), steps, None, Place(i + 1, 1)))
         return end
 
-    def _section(self, section: str, begin: int) -> int:
+    def _section(self, section: str, begin: int) -> Reading[int]:
         for i in range(begin, len(self._lines)):
+            yield len(self._lines[i])
             word = directive(self._lines[i])
             if word:
                 return i + (word == ".END")

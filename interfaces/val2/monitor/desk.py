@@ -5,9 +5,9 @@ from __future__ import annotations
 import enum
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Final, Protocol
 
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
@@ -15,6 +15,9 @@ from interfaces.val2.monitor.files import Files
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.syntax import Expression, Number, Step, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
+
+SLICE: Final = 80
+"""Work that is done at once for a command that takes long: about as many characters of a file are read, in 1 ms."""
 
 
 class Style(enum.StrEnum):
@@ -73,6 +76,8 @@ class Desk:
     last_edit: str = ""
     scheduling: bool = False
     """Whether the next motion is one for later, and isn't waited for."""
+    work: Generator[int, None, None] | None = None
+    """What a command does in slices: yields how many characters, or as much work, each took."""
     steps: int = 0
     """Steps that NEXT has still to do."""
 
@@ -93,6 +98,27 @@ class Desk:
         if not error.program and error.step is None and error.place is not None:
             text = re.sub(r"line \d+, column", "column", text)
         self.say(text, style=Style.ERROR)
+
+    def work_on(self, *, allowed: bool) -> None:
+        """Do a slice of what a command does; it's dropped where that isn't allowed any more."""
+        done = 0
+        if self.work is not None and not allowed:
+            self.drop_work()
+            self.fail(ValError("No control", "what was begun isn't done"))
+        try:
+            while self.work is not None and done < SLICE:
+                done += next(self.work) + 1
+        except StopIteration:
+            self.work = None
+        except ValError as error:
+            self.work = None
+            self.fail(error)
+
+    def drop_work(self) -> None:
+        """Leave what a command does; then nothing of it has happened."""
+        if self.work is not None:
+            self.work.close()
+        self.work = None
 
     def in_use(self) -> set[str]:
         """The programs that run."""

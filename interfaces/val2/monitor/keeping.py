@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Final
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import Memory
@@ -13,10 +14,14 @@ from interfaces.val2.monitor.desk import Desk, Dialogue, Style
 from interfaces.val2.monitor.dialogues import Confirm
 from interfaces.val2.monitor.listing import chosen
 from interfaces.val2.monitor.text import halves, named, nothing
-from interfaces.val2.source import Entry, SourceFile, parse_file, print_file
+from interfaces.val2.source import Entry, SourceFile, print_file, read_file
 from interfaces.val2.syntax import Call, Program, React, Variable
-from interfaces.val2.values import PrecisionPoint, Transformation
+from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
+MOST_MEANWHILE: Final = 200
+"""Values that may be loaded while a program runs: they're set at once."""
+_VALUE_WORK: Final = 4
+"""How much work setting a value is: as much as reading so many characters."""
 _PARTS = {"P": "programs", "L": "locations", "R": "reals", "S": "strings"}
 
 
@@ -29,35 +34,44 @@ def flist(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - comma
 def load(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """LOAD file: programs and values; all of it or nothing."""
     path = desk.files.found(rest)
-    source = parse_file(desk.files.read(path), path.name)
+    desk.work = _loading(desk, path.name, desk.files.read(path))
+
+
+def _loading(desk: Desk, name: str, text: str) -> Generator[int, None, None]:
+    """Read a file and take what it holds, in slices."""
+    source = yield from read_file(text, name)
+    entries = [*source.locations, *source.reals, *source.strings]
+    if len(entries) > MOST_MEANWHILE and desk.controller.running:
+        raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
     running = desk.in_use()
     for program in source.programs:
         if program.name in running:
             raise ValError("Program in use", program.name)
     memory = desk.controller.memory
-    entries = [*source.locations, *source.reals, *source.strings]
-    _set_all(memory, entries)
+    yield from _set_all(memory, entries)
     memory.programs.update({program.name: program for program in source.programs})
     if source.signals:
         desk.controller.cell = source.signals
     counts = [(len(source.programs), "program"), (len(entries), "value"), (len(source.signals), "signal rule")]
     said = [f"{many} {what}{'s' * (many != 1)}" for many, what in counts if many]
-    desk.say(f"{path.name}: {', '.join(said) or 'nothing'}")
+    desk.say(f"{name}: {', '.join(said) or 'nothing'}")
 
 
-def _set_all(memory: Memory, entries: Iterable[Entry]) -> None:
-    """Set variables; where one can't be, none is."""
-    known = {layout.variable(variable): value for variable, value in memory.variables()}
-    done: list[Variable] = []
+def _set_all(memory: Memory, entries: Sequence[Entry]) -> Generator[int, None, None]:
+    """Set variables; where one can't be, none is. Few are set at once, and no program runs while many are."""
+    done: list[tuple[Variable, Value | None]] = []
     try:
         for entry in entries:
+            before = memory.found(entry.variable)
             memory.set(entry.variable, entry.value)
-            done.append(entry.variable)
-    except ValError:
-        for variable in done:
+            done.append((entry.variable, before))
+            if len(entries) > MOST_MEANWHILE:
+                yield _VALUE_WORK
+    except (ValError, GeneratorExit):
+        for variable, before in reversed(done):
             memory.delete(variable)
-            if layout.variable(variable) in known:
-                memory.set(variable, known[layout.variable(variable)])
+            if before is not None:
+                memory.set(variable, before)
         raise
 
 

@@ -92,7 +92,8 @@ class Monitor:
     @property
     def _busy(self) -> bool:
         """Whether lines wait: for an instruction, or for control."""
-        return self._greeting or self._due < math.inf or (self._mine and self.desk.controller.doing)
+        works = self.desk.work is not None or (self._mine and self.desk.controller.doing)
+        return self._greeting or self._due < math.inf or works
 
     @property
     def busy(self) -> bool:
@@ -240,6 +241,7 @@ class Monitor:
     def interrupt(self, *, now: float) -> None:
         """Ctrl-C: what is asked is dropped, else what this terminal runs is aborted."""
         self._waiting.clear()
+        self.desk.drop_work()
         if self._dialogue is not None:
             self._drop(now=now, kept=False)
         elif self._mine and (self.desk.controller.running or self.desk.controller.doing):
@@ -264,6 +266,7 @@ class Monitor:
 
     def _end(self, now: float) -> None:
         self._drop(now=now, kept=True)
+        self.desk.drop_work()
         self.done = True
         self._waiting.clear()
         self._board.leave(self, now=now)
@@ -300,6 +303,7 @@ class Monitor:
         self._look(now)
         if isinstance(self._dialogue, Watch):
             self._dialogue.advance(now=now)
+        self.desk.work_on(allowed=self._mine)
         self._step_on(now)
         self._schedule(now)
         while self._waiting and not self.done:
@@ -374,5 +378,7 @@ class Monitor:
 
     def next_deadline(self) -> float:
         """When to call `advance` next [s]; infinity for not before a line comes."""
+        if self.desk.work is not None:
+            return self._looked
         watched = self._dialogue.due if isinstance(self._dialogue, Watch) else math.inf
         return min(self._board.next_deadline(), self._due, watched, self._looked + self._board.looks)

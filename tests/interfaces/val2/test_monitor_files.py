@@ -6,9 +6,11 @@ import re
 
 import pytest
 
+from interfaces.val2 import parser
+from interfaces.val2.monitor.desk import SLICE
 from interfaces.val2.syntax import Variable
 
-from .sitting import HELLO
+from .sitting import HELLO, LOOP
 
 
 def test_delete_and_zero_ask_and_only_y_does_it(sitting):
@@ -107,3 +109,59 @@ def test_a_link_leads_nowhere_either_and_a_broken_file_changes_nothing(sitting, 
     assert sitting.type("LOAD half").startswith("*Variable type mismatch*")
     assert sitting.type("LISTR") == "x = 1\n"
     assert [name for name, _ in sitting.controller.memory.listing("location")] == ["p"]
+
+
+def big(count):
+    lines = [f"  MOVE TRANS({i},{i % 300},50,90,90,0) ;step" for i in range(count)]
+    values = [f"p[{i}] {i} 300 50 90 90 0" for i in range(count)]
+    return "\n".join([".PROGRAM big()", *lines, ".END", ".LOCATIONS", *values, ".END", ".REALS", "n 7", ".END"])
+
+
+def test_a_large_file_is_loaded_in_slices(sitting, tmp_path, monkeypatch):
+    (tmp_path / "big.v2").write_text(big(1000))
+    read = []
+    step = parser._step
+    monkeypatch.setattr(parser, "_step", lambda text, line: (read.append(text), step(text, line))[1])
+    sitting.line("LOAD big")
+    sitting.line("LISTR n")
+    slices = 0
+    while "big" not in sitting.controller.memory.programs:
+        assert sitting.monitor.next_deadline() <= sitting.now
+        read.clear()
+        sitting.monitor.advance(now=sitting.now)
+        assert sum(map(len, read)) < SLICE + parser.LONGEST_LINE
+        assert len(read) <= 4
+        slices += 1
+        assert slices < 5000
+    assert slices > 400
+    sitting.pass_time(0.1)
+    assert sitting.shown == "big.v2: 1 program, 1001 values\nn = 7\n"
+
+
+@pytest.mark.parametrize("how", ["interrupt", "leave"])
+def test_a_load_that_is_left_has_loaded_nothing(sitting, tmp_path, how):
+    sitting.type("DO SET p[0] = TRANS(1, 2, 3)")
+    (tmp_path / "big.v2").write_text(big(300))
+    sitting.line("LOAD big")
+    for _ in range(100_000):
+        if len(sitting.controller.memory.listing("location")) > 50:
+            break
+        sitting.monitor.advance(now=sitting.now)
+    getattr(sitting.monitor, how)(now=sitting.now)
+    memory = sitting.controller.memory
+    assert (memory.programs, memory.listing("real")) == ({}, [])
+    ((name, value),) = memory.listing("location")
+    assert (name, value.X[0, 3]) == ("p[0]", 1.0)
+
+
+def test_many_values_arent_loaded_while_a_program_runs(sitting, tmp_path):
+    (tmp_path / "big.v2").write_text(big(300))
+    (tmp_path / "few.v2").write_text(big(3))
+    sitting.type(*LOOP, "EXECUTE loop")
+    assert sitting.type("LOAD few") == "few.v2: 1 program, 4 values\n"
+    assert sitting.type("LOAD big") == "*Program running* LOAD of more than 200 values must wait, or ABORT it\n"
+
+
+def test_a_file_that_is_too_long_is_refused(sitting, tmp_path):
+    (tmp_path / "big.v2").write_text(";" * 4_000_001)
+    assert sitting.type("LOAD big") == "*File error* big.v2: longer than 4000000 bytes\n"
