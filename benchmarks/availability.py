@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -76,8 +76,8 @@ def served(directory: Path) -> Iterator[Ports]:
                 process.kill()
 
 
-@contextlib.contextmanager
-def load(kind: str, ports: Ports) -> Iterator[None]:
+@contextlib.asynccontextmanager
+async def load(kind: str, ports: Ports) -> AsyncIterator[None]:
     """Put a load on; nothing where its name is empty."""
     if not kind:
         yield
@@ -85,15 +85,15 @@ def load(kind: str, ports: Ports) -> Iterator[None]:
     port = ports.val if kind == "terminals" else ports.page
     command = [sys.executable, str(LOADS), kind, str(port), str(SECONDS + BACK + 8.0), ports.token]
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
-        assert process.stdin is not None
+    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
+    try:
         assert process.stdout is not None
-        try:
-            assert process.stdout.readline() == "on\n"
-            yield
-        finally:
-            process.stdin.close()
+        assert await process.stdout.readline() == b"on\n"
+        yield
+    finally:
+        with contextlib.suppress(ProcessLookupError):
             process.terminate()
+        await process.wait()
 
 
 @dataclass
@@ -167,12 +167,11 @@ class Operator:
             self.sent[self.number] = now
         await self.send({"type": "order", "number": self.number, "epoch": self.epoch, "command": command})
 
-    async def steer(self, seconds: float) -> None:
-        """Steer for so long, and wait for the answers."""
+    async def steer(self, enough: asyncio.Event) -> None:
+        """Steer until it's enough, and wait for the answers."""
         reading = asyncio.create_task(self._read())
-        until = time.monotonic() + seconds
         with contextlib.suppress(WebSocketException):
-            while time.monotonic() < until:
+            while not enough.is_set():
                 await self.command()
                 await asyncio.sleep(PERIOD)
             end = time.monotonic() + ANSWER
@@ -223,11 +222,15 @@ async def _measure(ports: Ports) -> list[Result]:
     for name, kind in SCENARIOS.items():
         operator = await Operator.join(ports.page)
         await operator.ready()
-        await operator.steer(1.0)
-        operator.took.clear()
+        enough = asyncio.Event()
+        steering = asyncio.create_task(operator.steer(enough))
+        await asyncio.sleep(1.0)
         operator.halted.clear()
-        with load(kind, ports):
-            await operator.steer(SECONDS)
+        async with load(kind, ports):
+            operator.took.clear()
+            await asyncio.sleep(SECONDS)
+            enough.set()
+            await steering
             took = np.array(operator.took) * 1e3
             halted = operator.halted
             operator, back = await operator.cut_off_and_back()
