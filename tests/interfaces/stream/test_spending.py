@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import random
+import time
 
 import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from interfaces.link import LinkConditions
 from interfaces.messages import Follow, Form, Order, Want
@@ -16,7 +19,7 @@ from interfaces.stream.limits import Allowance, Allowances, ClientLimits
 from interfaces.stream.network import Impair, Network, Survey, Way
 from interfaces.stream.server import Slices
 from interfaces.teleop import Report
-from tests.interfaces.stream.served import HOME, make_hub
+from tests.interfaces.stream.served import HOME, make_hub, served
 from tests.interfaces.stream.test_network import emulated
 from tests.interfaces.stream.test_session import Peer, holder, to
 
@@ -192,3 +195,52 @@ def test_no_way_that_is_taken_ever_fails_and_others_say_what_is_allowed() -> Non
     assert refused > 200
     assert isinstance(line.link.conditions, LinkConditions)
     assert decode(encode(Survey(1), Encoding.JSON), Encoding.JSON, allowed=Survey, largest=LARGEST) == Survey(1)
+
+
+def test_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
+    """By sockets alone; the bar is wide, for other tests share the processor."""
+
+    async def viewer(url: str, stop: asyncio.Event, edit: int) -> int:
+        async with connect(url, subprotocols=[Subprotocol(Encoding.JSON)], max_size=None) as socket:
+            reader = asyncio.create_task(_passed_over(socket))
+            await socket.send(encode(control.Hello(Role.VIEWER, "viewer"), Encoding.JSON).decode())
+            await socket.send(encode(Follow(1, Form.SEGMENTS), Encoding.JSON).decode())
+            sent = 0
+            while not stop.is_set():
+                for message in (Want(edit, 0), Want(0, None)):
+                    await socket.send(encode(message, Encoding.JSON).decode())
+                sent += 2
+                await asyncio.sleep(1 / 220)
+            reader.cancel()
+            return sent
+
+    async def session(url: str, edit: int) -> list[float]:
+        trips: list[float] = []
+        stop = asyncio.Event()
+        async with connect(url, subprotocols=[Subprotocol(Encoding.JSON)], max_size=None) as socket:
+            await socket.send(encode(control.Hello(Role.OPERATOR, "operator"), Encoding.JSON).decode())
+            await socket.send(encode(control.Acquire(1), Encoding.JSON).decode())
+            crowd = [asyncio.create_task(viewer(url, stop, edit)) for _ in range(5)]
+            for number in range(1, 101):
+                sent = time.perf_counter()
+                await socket.send(encode(control.Ping(number, 0.0), Encoding.JSON).decode())
+                while '"pong"' not in str(await socket.recv())[:20]:
+                    pass
+                trips.append(time.perf_counter() - sent)
+                await asyncio.sleep(0.02)
+            stop.set()
+            await asyncio.gather(*crowd)
+        return trips
+
+    with served() as serving:
+        for k in range(150):
+            serving.call(serving.hub.site.engine.execute, to(k, execute_at=1000.0 + 3 * k))
+        edit = serving.call(serving.hub.site.journal.look)
+        trips = asyncio.run(session(f"ws://127.0.0.1:{serving.port}/ws", edit))
+    assert sorted(trips)[len(trips) // 2] < 0.3
+    assert max(trips) < 1.5
+
+
+async def _passed_over(socket: ClientConnection) -> None:
+    async for _ in socket:
+        pass
