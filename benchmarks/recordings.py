@@ -189,7 +189,7 @@ def measure(delay: str, loss: str, seconds: float, folder: Path) -> list[str]:
         there = figures_there(kept, float(t[0]), float(t[-1]), value["path"])
         halted = str(kept["halted"])
     if halted:
-        # Its own timeline is another then than what the commands alone make, which is what the recording is compared with.
+        # Its timeline is another then than what the commands alone make, with which the recording is compared.
         return [f"{delay}, loss {loss}: nothing to compare, as the robot stopped by itself: {halted}"]
     here, gap = figures_here(value), value["gap_s"]
     length = float(t[-1] - t[0])

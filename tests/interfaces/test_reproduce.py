@@ -229,7 +229,7 @@ class TestDoulgeri:
         level = result._replace(adaptive=pair, fixed=(one._replace(mean=1.5, time_difference=1.5),) * 2)
         found = jitter.conclude(study, (level,) * len(jitter.CASES))
         less = [claim for claim in found.claims if "adaptive less fixed" in claim.claim]
-        # Two seeds, half of the resamples of which are of one of them alone.
+        # Of two seeds it's the range: each counts once.
         assert [claim.interval for claim in less] == [pytest.approx((-1.5, -0.5))] * 2
 
     def test_encoding_is_read_again(self):

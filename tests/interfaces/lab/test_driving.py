@@ -145,8 +145,9 @@ def test_a_paired_difference_has_a_verdict() -> None:
         assert found is not None
         return found.verdict
 
-    low, high = [0.01, 0.012, 0.011, 0.013], [0.03, 0.05, 0.04, 0.06]
+    low, high = [0.01, 0.012, 0.011, 0.013, 0.01], [0.03, 0.05, 0.04, 0.06, 0.05]
     assert verdict(low, high) == "below"
+    assert verdict(low[:4], high[:4]) == "unclear"
     assert verdict(high, low) == "above"
     assert verdict(low, [x * 1.01 for x in low]) == "equal"
     assert verdict([0.01, 0.05], [0.04, 0.01]) == "unclear"

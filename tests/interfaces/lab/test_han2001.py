@@ -149,7 +149,7 @@ def test_a_run_is_summed_up_with_what_it_broke() -> None:
 def test_a_seed_counts_once_however_many_networks_it_ran_under() -> None:
     found = concluded(GOOD, GOOD | {"III": made(0.3, 3.0)})
     claim = next(one for text, one in found.items() if text.startswith("III's path error stays small"))
-    # Of two seeds a quarter of the resamples are of the worse one alone.
+    # Of two seeds it's the range: each counts once.
     assert claim.interval == pytest.approx((6.0, 30.0))
     assert not claim.holds
 
