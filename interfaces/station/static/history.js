@@ -1,7 +1,7 @@
 // Where the real robot was, as far as this page has heard: the newest quarter of an hour.
 
-/** Measurements that are kept [number]; twenty a second come at most. */
-const KEPT = 18000;
+/** Measurements that are kept [number]; twenty a second come at most, and as many that are late. */
+const KEPT = 36000;
 /** A measurement stands for so long [s]. */
 const LASTS = 1;
 

@@ -152,6 +152,26 @@ MADE = """async ({ states, past }) => {
 }"""
 
 
+LOOKED_BACK = """async (states) => {
+    const { History } = await import("/station/history.js");
+    const listeners = {};
+    const history = new History({ on: (type, f) => { listeners[type] = f; } });
+    states.forEach((state) => listeners.state(state));
+    const at = [0.5, 1.6, 2.7, 3.6, 4.2, 5.5, 6.2].map((t) => history.at(t)?.[0] ?? null);
+    return { at, kept: history.rows.length };
+}"""
+
+
+def test_a_look_back_finds_what_was_measured_late(page: Page) -> None:
+    states = [
+        {"t": 1.0, "q": [1.0]}, {"t": 5.0, "q": [5.0]},
+        {"t": 6.0, "q": [6.0], "late": [[2.5, [2.5]], [1.5, [1.5]], [3.5, [3.5]]]},
+        {"t": 6.1, "q": [6.1], "late": [[3.5, [3.5]]]},
+    ]  # fmt: skip
+    found = page.page.evaluate(LOOKED_BACK, states)
+    assert found == {"at": [None, 1.5, 2.5, 3.5, 3.5, 5.0, 6.1], "kept": 7}
+
+
 def test_errors_and_their_parts_of_any_states(page: Page, server: Child) -> None:
     with connect(station(server).rstrip("/").replace("http", "ws") + "/ws", role="viewer") as client:
         viewer = client.viewer()
