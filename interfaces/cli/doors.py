@@ -145,10 +145,32 @@ def end_on_signal(ended: asyncio.Event) -> None:
         loop.add_signal_handler(number, ended.set)
 
 
+ROUNDS = 2000
+"""The collector looks at old objects after so many passes over young ones, each after some 7,000 new objects."""
+LEISURE = 10.0
+"""Time between two looks at whether old garbage may be collected [s]."""
+
+
 def keep_quiet() -> None:
-    """Let the garbage collector pass over all that is loaded: its long passes would stop a robot for 20 ms."""
+    """Let the garbage collector pass over all that is old: its long passes would stop a robot for 20 to 500 ms."""
     gc.collect()
     gc.freeze()
+    young, middle, _ = gc.get_threshold()
+    gc.set_threshold(young, middle, ROUNDS)
+
+
+async def collect_at_leisure(free: Callable[[], bool]) -> None:
+    """Collect old garbage whenever it's convenient, until it's cancelled.
+
+    Args:
+        free: Whether a moment's pause matters to nobody.
+    """
+    import asyncio
+
+    while True:
+        await asyncio.sleep(LEISURE)
+        if gc.get_count()[2] and free():
+            gc.collect()
 
 
 async def start_robot(

@@ -15,6 +15,7 @@ from interfaces.cli.doors import (
     abandon,
     access_for,
     asked_for,
+    collect_at_leisure,
     end_on_signal,
     end_with_input,
     keep_quiet,
@@ -178,6 +179,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         from interfaces.station.panels import MOBILE_PANELS
         from interfaces.stream.server import application
         from robots import ipr
+        from robots.onboard.lease import LeaseState
 
         model = ipr.model()
         config = LiveMobileOperatorConfig(
@@ -194,6 +196,8 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())
         keep_quiet()
+        tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
+        stack.callback(tidying.cancel)
         shown = Address(host, port)
         typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")

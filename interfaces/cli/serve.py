@@ -17,6 +17,7 @@ from interfaces.cli.doors import (
     abandon,
     access_for,
     asked_for,
+    collect_at_leisure,
     end_on_signal,
     end_with_input,
     keep_quiet,
@@ -323,6 +324,7 @@ async def _serve(
         from interfaces.val2.pages import PageDoor
         from interfaces.val2.served import HOST, ServedVal
         from robots import puma560
+        from robots.onboard.lease import LeaseState
 
         model = puma560.model()
         config = LiveOperatorConfig(
@@ -346,6 +348,8 @@ async def _serve(
         await stack.enter_async_context(recordings.running())
         await stack.enter_async_context(val.running())
         keep_quiet()
+        tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
+        stack.callback(tidying.cancel)
         typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")
         if val_listening is not None:

@@ -7,7 +7,8 @@ import contextlib
 import resource
 import socket
 from asyncio.transports import BaseTransport, Transport
-from collections.abc import AsyncIterator, Iterable, Iterator
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Any, cast
@@ -42,6 +43,10 @@ FILES = 16384
 _FILES = resource.RLIMIT_NOFILE
 FAREWELL = 2.0
 """Time for a closing handshake, and for what waits to be sent [s]."""
+TURNS = 4
+"""Connections with HTTP that are served in one round of the loop."""
+CUT_OFF = 8
+"""Connections that are cut off in one round of the loop."""
 _LOOK = 0.1
 """Time between two looks at deadlines [s]."""
 CHUNK = 512
@@ -56,7 +61,7 @@ _GRACE = 1.0
 class SocketLimits:
     """Deadlines of every phase of a connection, and how many there may be that haven't shown who they are."""
 
-    strangers: int = 1024
+    strangers: int = 512
     """Most unauthenticated connections, 1 to 100,000; the oldest gives way to a new one. They never take more than
     a quarter of the files that may be open."""
     request: float = 5.0
@@ -85,12 +90,39 @@ class _Phase(Enum):
     """It's answered."""
 
 
+class Turns:
+    """Lets few connections of many be served in each round of the loop: many may have sent at once."""
+
+    def __init__(self) -> None:
+        self._left = TURNS
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._armed = False
+
+    def take(self, serve: Callable[[], None]) -> None:
+        """Serve a connection, now or in one of the next rounds, in the order of coming."""
+        self._waiting.append(serve)
+        self._serve()
+
+    def _serve(self) -> None:
+        while self._waiting and self._left:
+            self._left -= 1
+            self._waiting.popleft()()
+        if not self._armed and self._left < TURNS:
+            self._armed = True
+            asyncio.get_running_loop().call_soon(self._renew)
+
+    def _renew(self) -> None:
+        self._armed, self._left = False, TURNS
+        self._serve()
+
+
 class _State(ServerState):
     """What the connections of a server share."""
 
     def __init__(self, limits: SocketLimits) -> None:
         super().__init__()
         self.limits = limits
+        self.turns = Turns()
         self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, _files() // 4)))
 
 
@@ -153,6 +185,7 @@ class BoundedHttp(_Bounded, H11Protocol):
         H11Protocol.__init__(self, config, server_state, app_state, _loop)
         self._share(server_state)
         self._phase = _Phase.HEADER
+        self._unread = b""
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
         """Take a connection."""
@@ -164,6 +197,21 @@ class BoundedHttp(_Bounded, H11Protocol):
         """Let it go, and leave no timer that would keep it."""
         super().connection_lost(exc)
         self._unset_keepalive_if_required()
+
+    def data_received(self, data: bytes) -> None:
+        """Wait for one's turn with what has come; no more is read meanwhile."""
+        waits, self._unread = bool(self._unread), self._unread + data
+        if not waits:
+            self.transport.pause_reading()
+            self._state.turns.take(self._take)
+
+    def _take(self) -> None:
+        data, self._unread = self._unread, b""
+        if self.transport.is_closing():
+            return
+        if not self.flow.read_paused:
+            self.transport.resume_reading()
+        super().data_received(data)
 
     def handle_events(self) -> None:
         """Take what has come."""
@@ -426,8 +474,12 @@ async def _cut_off_overdue(state: _State) -> None:
     clock = asyncio.get_running_loop().time
     while True:
         await asyncio.sleep(_LOOK)
-        for connection in state.strangers.overdue(clock()):
-            connection.transport.abort()
+        while overdue := state.strangers.overdue(clock())[:CUT_OFF]:
+            for connection in overdue:
+                state.strangers.discard(connection)
+                connection.transport.abort()
+            # A thousand may be overdue at once: others have their turn in between.
+            await asyncio.sleep(0)
 
 
 def _files() -> int:

@@ -194,6 +194,26 @@ def test_idle_connections_lock_nobody_out(upgraded: bool) -> None:
         assert pongs(there)
 
 
+def test_of_many_connections_that_send_at_once_few_are_served_in_a_round_of_the_loop() -> None:
+    served_in: list[tuple[int, int]] = []
+
+    async def main() -> None:
+        turns, rounds = sockets.Turns(), 0
+        for number in range(50):
+            turns.take(lambda number=number: served_in.append((rounds, number)))
+        while len(served_in) < 50:
+            await asyncio.sleep(0)
+            rounds += 1
+            assert rounds < 100
+        turns.take(lambda: served_in.append((rounds, 50)))
+        assert served_in[-1] == (rounds, 50)
+
+    asyncio.run(main())
+    assert [number for _, number in served_in] == list(range(51))
+    each = [sum(when == one for when, _ in served_in) for one in {when for when, _ in served_in}]
+    assert max(each) <= 2 * sockets.TURNS
+
+
 def test_a_server_asks_for_files_and_leaves_room_for_others() -> None:
     assert sockets._State(SocketLimits(strangers=100_000)).strangers._most <= sockets._files() // 4
 
