@@ -19,12 +19,12 @@ SMALLEST = sys.float_info.min
 
 
 def finite(name: str, value: object, allowed: str = "a finite number") -> float:
-    """Return value as a float; a subnormal number counts as 0.
+    """Return value as a float.
 
     Raises:
         InvalidValueError: If value is not a real number, or NaN or infinite.
     """
-    if type(value) is float and SMALLEST <= abs(value) < math.inf:
+    if type(value) is float and math.isfinite(value):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidValueError(name, value, allowed)
@@ -34,7 +34,12 @@ def finite(name: str, value: object, allowed: str = "a finite number") -> float:
         raise InvalidValueError(name, value, allowed) from None
     if not math.isfinite(number):
         raise InvalidValueError(name, value, allowed)
-    return 0.0 if 0.0 < abs(number) < SMALLEST else number
+    return number
+
+
+def normal(value: float) -> float:
+    """The same number; 0 where it's subnormal."""
+    return 0.0 if 0.0 < abs(value) < SMALLEST else value
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...] | None, allowed: str) -> Array:

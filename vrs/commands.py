@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import LARGEST, finite, finite_array, number_in, sized_array
+from vrs.checks import LARGEST, finite, finite_array, normal, number_in, sized_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -160,7 +160,7 @@ class MotionCommand:
             raise InvalidValueError("target", self.target, "a JointTarget or a PoseTarget")
         _check_stamps(self)
         for name, least in (("speed", 1e-3), ("pace", 1e-3), ("acceleration", 1e-2)):
-            share = finite(name, getattr(self, name), "a number in (0, 1]")
+            share = normal(finite(name, getattr(self, name), "a number in (0, 1]"))
             if not least <= share <= 1:
                 raise InvalidValueError(name, share, f"a number in (0, 1], at least {least:g} so that it arrives")
             object.__setattr__(self, name, share)
@@ -190,7 +190,7 @@ class PositionQuery:
 
     def __post_init__(self) -> None:
         if self.t is not None:
-            object.__setattr__(self, "t", finite("t", self.t, "None or finite seconds"))
+            object.__setattr__(self, "t", normal(finite("t", self.t, "None or finite seconds")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +218,7 @@ class DriveCommand:
 
     def __post_init__(self) -> None:
         for name in ("v", "w", "duration"):
-            object.__setattr__(self, name, number_in(name, getattr(self, name), -LARGEST, LARGEST))
+            object.__setattr__(self, name, normal(number_in(name, getattr(self, name), -LARGEST, LARGEST)))
         if self.duration <= 0:
             raise InvalidValueError("duration", self.duration, "positive seconds")
         _check_stamps(self)
@@ -264,7 +264,7 @@ class Retime:
 
     def __post_init__(self) -> None:
         _check_id(self.command_id)
-        object.__setattr__(self, "execute_at", finite("execute_at", self.execute_at, "finite seconds"))
+        object.__setattr__(self, "execute_at", normal(finite("execute_at", self.execute_at, "finite seconds")))
         _check_stamps(self)
 
 
@@ -353,7 +353,7 @@ def _check_id(command_id: object) -> None:
 def _deviation(value: object, *, endless: bool = False) -> float:
     if endless and isinstance(value, float) and value == inf:
         return inf
-    return number_in("deviation", value, 0.0, _FARTHEST, unit=" m")
+    return normal(number_in("deviation", value, 0.0, _FARTHEST, unit=" m"))
 
 
 def _transform(name: str, value: ArrayLike) -> Array:
@@ -377,7 +377,7 @@ def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdi
     for name in ("issued_at", "execute_at"):
         value = getattr(command, name)
         if value is not None:
-            stamp = finite(name, value, "None or finite seconds")
+            stamp = normal(finite(name, value, "None or finite seconds"))
             if abs(stamp) > LARGEST:
                 raise InvalidValueError(name, value, "within ±1e9 s: times count from the session's origin")
             object.__setattr__(command, name, stamp)

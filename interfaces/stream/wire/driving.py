@@ -23,7 +23,6 @@ from interfaces.stream.wire.fields import (
     Word,
     digits,
     epoch,
-    normal,
     text,
 )
 from interfaces.stream.wire.tasks import ErrandForm, SightForm, TaskReportForm
@@ -33,6 +32,7 @@ from interfaces.teleop.architectures.segments import MOST_REPEATED
 from interfaces.teleop.tasks import Doing
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.supervisor import CellChange
+from vrs.checks import normal
 from vrs.mobile import DriveLimits
 from vrs.segment import ArcSegment
 

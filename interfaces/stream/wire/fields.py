@@ -93,11 +93,6 @@ def check_normal(value: object, name: str) -> None:
             check_normal(item, f"{name}[{key!r}]")
 
 
-def normal(value: float) -> float:
-    """A number as a site may send it: 0 where it's subnormal."""
-    return 0.0 if 0.0 < abs(value) < SMALLEST else value
-
-
 def numbers(q: Array) -> list[float]:
     """An array as a list of Python's floats."""
     values: list[float] = q.tolist()
