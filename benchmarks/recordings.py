@@ -187,13 +187,15 @@ def measure(delay: str, loss: str, seconds: float, folder: Path) -> list[str]:
         t = recording.track(REAL).t
     with np.load(log) as kept:
         there = figures_there(kept, float(t[0]), float(t[-1]), value["path"])
-        halted = str(kept["halted"])
+        halted, parted = str(kept["halted"]), bool(kept["parted"])
     if halted:
         # Its timeline is another then than what the commands alone make, with which the recording is compared.
         return [f"{delay}, loss {loss}: nothing to compare, as the robot stopped by itself: {halted}"]
     here, gap = figures_here(value), value["gap_s"]
     length = float(t[-1] - t[0])
     lines = [f"{delay}, loss {loss}: {length:.0f} s, gap_s {gap:.2f} ({gap / length:.2%})"]
+    if parted:
+        lines.append("  a command was late: the recording is beside the commands' plan, the robot beside its own")
     for name, expected in there.items():
         apart = here[name] / expected - 1 if expected else 0.0
         verdict = "" if abs(apart) <= BAR else "  TOO FAR"
