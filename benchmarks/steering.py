@@ -29,7 +29,7 @@ def give(timeline: Timeline, t: float, rates: object, twist: object, frame: Fram
     """The timeline after an input, what planning it took [s], and the segments of the plan."""
     state = timeline.state_before(t)
     start = time.perf_counter()
-    plan, _ = steer(state, rates, twist, frame, HOLD, MODEL, LIMITS)
+    plan, *_ = steer(state, rates, twist, frame, HOLD, MODEL, LIMITS)
     cost = time.perf_counter() - start
     return timeline.edited(t, [Piece(plan.durations.tolist(), plan.rows(), 1)]), cost, len(plan)
 

@@ -167,7 +167,7 @@ class Scheduler(Agenda[Timeline]):
             if hold <= 0:
                 raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
             state = self.timeline.state_before(t)
-            plan, note, hindrance = steering.steered(
+            plan, note, hindrance = steering.steer(
                 state, command.rates, command.twist, command.frame, hold, self.model, self.limits
             )
         except REFUSALS as error:

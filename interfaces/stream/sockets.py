@@ -133,8 +133,15 @@ class _Bounded(asyncio.Protocol):
     client: tuple[str, int] | None
     transport: asyncio.Transport
 
-    def _share(self, state: ServerState) -> None:
-        self._state = cast("_State", state)
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, app_state, _loop)  # type: ignore[call-arg]
+        self._state = cast("_State", server_state)
         self._phase_until = self._sent_until = float("inf")
 
     def _enter(self, seconds: float) -> None:
@@ -175,22 +182,12 @@ class _Bounded(asyncio.Protocol):
 class BoundedHttp(_Bounded, H11Protocol):
     """HTTP on a connection, each phase of which has a deadline."""
 
-    def __init__(
-        self,
-        config: uvicorn.Config,
-        server_state: ServerState,
-        app_state: dict[str, Any],
-        _loop: asyncio.AbstractEventLoop | None = None,
-    ) -> None:
-        H11Protocol.__init__(self, config, server_state, app_state, _loop)
-        self._share(server_state)
-        self._phase = _Phase.HEADER
-        self._unread = b""
-
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
         """Take a connection."""
         super().connection_made(transport)
         transport.set_write_buffer_limits(HIGH, LOW)
+        self._phase = _Phase.HEADER
+        self._unread = b""
         self._enter(self._state.limits.request)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -253,21 +250,11 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
     The application says `let_stay` when the other side has shown who it is.
     """
 
-    def __init__(
-        self,
-        config: uvicorn.Config,
-        server_state: ServerState,
-        app_state: dict[str, Any],
-        _loop: asyncio.AbstractEventLoop | None = None,
-    ) -> None:
-        WebSocketsSansIOProtocol.__init__(self, config, server_state, app_state, _loop)
-        self._share(server_state)
-        self.conn.max_message_size = min(config.ws_max_size, LARGEST_MESSAGE)
-
     def connection_made(self, transport: BaseTransport) -> None:
         """Take over a connection."""
         super().connection_made(transport)
         cast("Transport", transport).set_write_buffer_limits(HIGH, LOW)
+        self.conn.max_message_size = min(self.config.ws_max_size, LARGEST_MESSAGE)
         self._enter(self._state.limits.hello)
         self._unread = b""
         self.work = 0.0

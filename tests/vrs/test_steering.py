@@ -42,7 +42,7 @@ class Hand:
 
     def give(self, t: float, *, rates=None, twist=None, frame=Frame.BASE, hold=HOLD) -> Plan:
         state = self.timeline.state_before(t)
-        plan, note = steer(state, rates, twist, frame, hold, MODEL, LIMITS)
+        plan, note, _ = steer(state, rates, twist, frame, hold, MODEL, LIMITS)
         assert violation(plan, LIMITS, jerk=True) is None
         if len(plan):
             c = plan.coefficients[0]
@@ -119,7 +119,7 @@ def test_it_takes_over_from_any_state_of_a_move(profile: Profile):
         asked = {"rates": rng.uniform(-1, 1, 6) * LIMITS.qd_max, "twist": None}
         if rng.random() < 0.5:
             asked = {"rates": None, "twist": rng.uniform(-0.3, 0.3, 6)}
-        made, note = steer(state, asked["rates"], asked["twist"], Frame.BASE, HOLD, MODEL, LIMITS)
+        made, note, _ = steer(state, asked["rates"], asked["twist"], Frame.BASE, HOLD, MODEL, LIMITS)
         assert violation(made, LIMITS, jerk=True) is None
         end = end_state(made)
         assert max(np.abs(end.qd).max(), np.abs(end.qdd).max() if not note else 0.0) < 1e-9
@@ -136,7 +136,7 @@ def test_where_no_bounded_jerk_can_stop_it_brakes_with_parabolas_and_says_so():
     q[0] = LIMITS.q_max[0] - 0.5 * V * V / A - 1e-6
     qd = np.array([V, 0, 0, 0, 0, 0])
     state = State(q, qd, ZERO)
-    plan, note = steer(state, qd, None, Frame.BASE, HOLD, MODEL, LIMITS)
+    plan, note, _ = steer(state, qd, None, Frame.BASE, HOLD, MODEL, LIMITS)
     assert note == BRAKED_ONLY
     assert np.array_equal(plan.durations, brake(state, LIMITS).durations)
     assert violation(plan, LIMITS, jerk=False) is None
@@ -145,7 +145,7 @@ def test_where_no_bounded_jerk_can_stop_it_brakes_with_parabolas_and_says_so():
 def test_rates_are_reached_in_the_least_time_and_the_stop_begins_with_the_hold():
     J, A = LIMITS.qddd_max[0], LIMITS.qdd_max[0]
     u = 0.5 * A * A / J
-    plan, _ = steer(State(ZERO, ZERO, ZERO), [u, 0, 0, 0, 0, 0], None, Frame.BASE, 0.5, MODEL, LIMITS)
+    plan, *_ = steer(State(ZERO, ZERO, ZERO), [u, 0, 0, 0, 0, 0], None, Frame.BASE, 0.5, MODEL, LIMITS)
     ramp = 2.0 * (u / J) ** 0.5
     assert np.cumsum(plan.durations) == pytest.approx([ramp / 2, ramp, 0.5, 0.5 + ramp / 2, 0.5 + ramp])
     assert end_state(plan).q[0] == pytest.approx(0.5 * u, rel=1e-12)
@@ -235,7 +235,7 @@ def test_huge_and_tiny_inputs_make_finite_plans():
     state = State(MODEL.poses["nominal"], ZERO, ZERO)
     for size in (1e-310, 1e-12, 1e12, 1e308):
         for asked in ((np.full(6, size), None), (None, np.full(6, size))):
-            plan, _ = steer(state, *asked, Frame.TOOL, HOLD, MODEL, LIMITS)
+            plan, *_ = steer(state, *asked, Frame.TOOL, HOLD, MODEL, LIMITS)
             assert violation(plan, LIMITS, jerk=True) is None
 
 

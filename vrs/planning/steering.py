@@ -57,19 +57,6 @@ def steer(
     hold: float,
     model: RobotModel,
     limits: Limits,
-) -> tuple[Plan, str]:
-    """Return the plan and the note of `steered`."""
-    return steered(state, rates, twist, frame, hold, model, limits)[:2]
-
-
-def steered(
-    state: State,
-    rates: ArrayLike | None,
-    twist: ArrayLike | None,
-    frame: Frame,
-    hold: float,
-    model: RobotModel,
-    limits: Limits,
 ) -> Steered:
     """Plan what a hand asks for now, for as long as the input is fresh, and the stop after that.
 
