@@ -46,8 +46,8 @@ R_co = TypeVar("R_co", covariant=True)
 class Follower(Protocol[O_contra, R_co]):
     """A robot's site: what carries out the orders of one operator. Times are the operator's [s]."""
 
-    def join(self, epoch: int, reason: str, *, now: float) -> None:
-        """Meet an operator in the midst of an epoch: wait for the next one."""
+    def join(self, orders: O_contra, reason: str, *, now: float) -> None:
+        """Meet an operator in the midst of the epoch of these orders: wait for the next one."""
 
     def receive(self, orders: O_contra, *, now: float, correction: float, uncertainty: float) -> None:
         """Take in orders; what they were stamped is to be corrected, and the clocks are so uncertain [s]."""
@@ -225,9 +225,9 @@ class Host(ABC, Generic[S, O, R]):
         if self.site is not None or not self._waiting or not enough or estimate is None:
             return
         self.offset = estimate.offset
-        t, epoch = self.site_time(now), self._waiting[-1].epoch
+        t = self.site_time(now)
         self.site = self._make(t)
-        self.site.join(epoch, MET, now=t)
+        self.site.join(self._waiting[-1], MET, now=t)
         for orders in self._waiting:
             self._hear(orders, now)
         self._waiting.clear()

@@ -149,19 +149,20 @@ class RobotSite:
         """Up to where its timeline is known to be complete [s]."""
         return self._log.complete_until
 
-    def join(self, epoch: int, reason: str, *, now: float) -> None:
+    def join(self, orders: Orders, reason: str, *, now: float) -> None:
         """Meet an operator whose timeline isn't known here: as after a stop by itself, in the operator's epoch.
 
         Args:
-            epoch: The operator's.
+            orders: Of that epoch.
             reason: What to report.
             now: By the robot's clock [s].
         """
-        timeline = Timeline(self.engine.timeline.initial, now).edited(now, [hold(_SETTLE, self._measured)])
-        self.engine = Engine(self._model, timeline=timeline)
-        self._play = EvenPlay(0.0, end=timeline.end)
-        self._plays.append((now, self._play))
-        self.epoch, self.halted, self.parted = epoch, reason, True
+        fixed = self.config.fixed_offset
+        self.engine = Engine(self._model, timeline=Timeline(self._measured, orders.sent_at))
+        # The next epoch begins after that by the operator's own clock, perhaps before now by what is known of it.
+        self._play = EvenPlay(0.0, end=orders.sent_at) if fixed is None else EvenPlay(fixed)
+        self._plays = deque([(now, self._play)], maxlen=_PLAYS)
+        self.epoch, self.halted, self.parted = orders.epoch, reason, True
         self._due = now
 
     def receive(self, orders: Orders, *, now: float, correction: float = 0.0, uncertainty: float = 0.0) -> None:
@@ -227,7 +228,9 @@ class RobotSite:
                 return
         fixed, stood = self.config.fixed_offset, self.engine.timeline
         began = orders.epoch_began if fixed is None else engine_time(now, fixed)
-        self._clock = ManualClock(max(began, stood.end) if len(stood) else began)
+        # Play never goes back.
+        began = max(began, self._play_at(now))
+        self._clock = ManualClock(began)
         if len(stood):
             self.engine = Engine(self._model, timeline=stood, clock=self._clock)
         else:

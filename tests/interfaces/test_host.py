@@ -25,10 +25,14 @@ class Ends:
     """An operator's and a robot's end, and what the body was asked to do, tick by tick."""
 
     def __init__(
-        self, delay: str = "constant:0.05", site: RobotSiteConfig | None = None, q: Array = NOMINAL
+        self,
+        delay: str = "constant:0.05",
+        site: RobotSiteConfig | None = None,
+        q: Array = NOMINAL,
+        lead: float = RobotHostConfig().lead,
     ) -> None:
         self.conditions = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-        self.config = RobotHostConfig(site=RobotSiteConfig() if site is None else site)
+        self.config = RobotHostConfig(site=RobotSiteConfig() if site is None else site, lead=lead)
         self.t = 0.0
         self.asked: list[Array] = []
         self.host = self.robot(q)
@@ -105,6 +109,22 @@ def test_they_meet_move_and_agree() -> None:
     assert np.array_equal(site.engine.timeline.sample(t), ends.operator.engine.timeline.sample(t))
     assert not ends.operator.corrections
     assert ends.host.uncertainty <= 0.06
+    ends.check()
+
+
+@pytest.mark.parametrize("delay", ["constant:0.02", "mon", "wed"])
+@pytest.mark.parametrize("lead", [0.0, 0.3])
+def test_a_command_at_the_very_first_moment_is_carried_out_as_planned(delay: str, lead: float) -> None:
+    ends = Ends(delay, lead=lead)
+    while ends.operator.resume(now=ends.now):
+        ends.run(STEP)
+        assert ends.t < 30.0
+    answer = ends.operator.execute(to(READY), now=ends.now)
+    ends.run(20.0)
+    assert ends.operator.receipts[1].execute_at == answer.execute_at
+    assert ends.host.site is not None
+    assert not ends.host.site.parted
+    assert not ends.operator.corrections
     ends.check()
 
 

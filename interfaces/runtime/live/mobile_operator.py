@@ -241,7 +241,8 @@ class LiveMobileOperator:
     @property
     def connected(self) -> bool:
         """Whether the robot's site is heard of."""
-        return self.line.connected and self.clock.now() - self.robot.heard < UNHEARD
+        heard = self.clock.now() - self.robot.heard < UNHEARD
+        return heard and self.line.connected and not self.robot.lost
 
     def _show(self, now: float) -> None:
         """Tell clients where both robots are."""

@@ -268,7 +268,8 @@ class LiveOperator:
     @property
     def connected(self) -> bool:
         """Whether the robot's site is heard of."""
-        return self.line.connected and self.clock.now() - self.robot.heard < UNHEARD
+        heard = self.clock.now() - self.robot.heard < UNHEARD
+        return heard and self.line.connected and not self.robot.lost
 
     def _show(self, now: float) -> None:
         """Tell clients where the real robot is, when that's news."""

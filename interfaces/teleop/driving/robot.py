@@ -100,9 +100,9 @@ class DrivenRobot:
         self._verdict = Verdict.FRESH
         self._reports = max(0, math.floor(1000.0 * now))
 
-    def join(self, epoch: int, reason: str, *, now: float) -> None:
-        """Meet an operator in the midst of an epoch: wait for the next one, and report why."""
-        self.epoch, self.halted, self._site = epoch, reason, None
+    def join(self, orders: DriveOrders, reason: str, *, now: float) -> None:
+        """Meet an operator in the midst of the epoch of these orders: wait for the next one, and report why."""
+        self.epoch, self.halted, self._site = orders.epoch, reason, None
         self._due = now
 
     def receive(
