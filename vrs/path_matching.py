@@ -15,6 +15,8 @@ _BEAM = 0.25
 """How much more than the best a cell may cost in the search for a match to compare with [m²]."""
 _PRUNED = 8
 """After so many steps cells are given up."""
+_POINTS = 50
+"""Points of the leader that are kept in a cell, at most, beside its ends."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,8 +103,7 @@ def match_paths(
         return PathMatch(grid, distance, s, t_leader, t_leader[:1], moving)
     moving[1:-1] = 2 * cell > v_min * (t_leader[2:] - t_leader[:-2])
     match = _match(grid, follower, t_leader, path, max(1, round(2 * v_max * dt / cell)))
-    s_all = np.append(s, s_of_t[-1])
-    distance, s_follower = _project(follower, np.vstack((path, leader[-1])), s_all, match)
+    distance, s_follower = _project(follower, *_polyline(s, path, s_of_t, leader), s, match)
     window = (-dt, dt + 0.5 * cell / v_min)
     if seen.all():
         t_follower = _arrivals(grid, match, s_follower, s[: match[-1] + 1], window)
@@ -211,22 +212,41 @@ def _least_of_window(cost: Array, advance: int) -> Array:
     return np.minimum(least[: len(least) - rest], least[rest:]) if rest else least
 
 
-def _project(follower: Array, path: Array, s_path: Array, match: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Distance to the polyline beside each matched cell, and the path length of the nearest point."""
-    distance, s = np.full(len(follower), np.inf), np.zeros(len(follower))
+def _polyline(s: Array, path: Array, s_of_t: Array, leader: Array) -> tuple[Array, Array]:
+    """The leader's path with what was recorded between its cells: lengths (m,), ascending, and points (m, d)."""
+    _, first = np.unique(np.floor(s_of_t * (_POINTS / s[1])), return_index=True)
+    recorded = np.append(first, len(leader) - 1)
+    along, place = np.unique(np.concatenate((s, s_of_t[recorded])), return_index=True)
+    return along, np.vstack((path, leader[recorded]))[place]
+
+
+def _project(
+    follower: Array, along: Array, points: Array, s: Array, match: NDArray[np.intp]
+) -> tuple[Array, Array]:
+    """Distance to the path between the neighbours of each matched cell, and the length up to the nearest point.
+
+    Args:
+        follower: Points of the follower [m], (k, d).
+        along: Lengths of the path up to its points [m], (m,), ascending.
+        points: Its points [m], (m, d).
+        s: Lengths up to its cells [m], (n,), all of them in `along`.
+        match: The matched cells, (k,).
+    """
+    distance, nearest = np.full(len(follower), np.inf), np.zeros(len(follower))
     distance[~measured_rows(follower)] = np.nan
-    for start in (match - 1, match):
-        low = np.clip(start, 0, len(path) - 2)
-        along = path[low + 1] - path[low]
-        squared = np.maximum(np.sum(along**2, axis=1), 1e-300)
-        share = np.clip(np.sum((follower - path[low]) * along, axis=1) / squared, 0.0, 1.0)
-        gap = np.linalg.norm(follower - path[low] - share[:, None] * along, axis=1)
+    ends = np.append(s, along[-1])
+    first = np.searchsorted(along, ends[np.maximum(match - 1, 0)])
+    last = np.maximum(np.searchsorted(along, ends[match + 1]) - 1, first)
+    for step in range(int((last - first).max()) + 1):
+        low = np.minimum(first + step, last)
+        piece = points[low + 1] - points[low]
+        squared = np.maximum(np.sum(piece**2, axis=1), 1e-300)
+        share = np.clip(np.sum((follower - points[low]) * piece, axis=1) / squared, 0.0, 1.0)
+        gap = np.linalg.norm(follower - points[low] - share[:, None] * piece, axis=1)
         nearer = gap < distance
-        distance[nearer], s[nearer] = (
-            gap[nearer],
-            (s_path[low] + share * (s_path[low + 1] - s_path[low]))[nearer],
-        )
-    return distance, s
+        distance[nearer] = gap[nearer]
+        nearest[nearer] = (along[low] + share * (along[low + 1] - along[low]))[nearer]
+    return distance, nearest
 
 
 def _arrivals(t: Array, match: NDArray[np.intp], s_follower: Array, s: Array, window: tuple[float, float]) -> Array:

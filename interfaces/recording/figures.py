@@ -19,7 +19,7 @@ from interfaces.report.summary import Json, summarize
 from interfaces.runtime.attribution import Attribution, OffsetOutcome
 from interfaces.runtime.happenings import waits
 from interfaces.runtime.offset import ADAPTIVE
-from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.runtime.run import Event, Packet, Samples, TwinRun
 from interfaces.runtime.session import carried_out
 from interfaces.teleop import Correction
 from robots.onboard.playout import PlayoutConfig
@@ -181,12 +181,14 @@ class _Reading:
             raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
         return np.maximum.accumulate(play), q, reference
 
-    def _samples(self, track: Track, alone: Timeline, shown: Timeline) -> tuple[Array, Array, Array, Array] | None:
+    def _samples(self, track: Track, alone: Timeline, shown: Timeline) -> Samples | None:
         """See `TwinRun.samples`; of very many, some."""
         if self.begin.sampled is None:
             return None
-        t, play, q = (column[:: -(-len(track.t) // MOST_ROWS)] for column in (track.t, track.play, track.q))
-        return alone.sample(play), shown.sample(t), shown.sample(play), q
+        every = -(-len(track.t) // MOST_ROWS)
+        t, play, q, reference = (column[::every] for column in (track.t, track.play, track.q, track.reference))
+        reference = np.where(np.isfinite(reference), reference, shown.sample(play))
+        return Samples(t, alone.sample(t), shown.sample(t), alone.sample(play), q, reference)
 
     def _shown(self, again: Rerun) -> Timeline:
         """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""

@@ -226,7 +226,8 @@ class LiveRecorder:
         t = np.array([sample.t for sample in samples])
         q = np.array([sample.q for sample in samples])
         for now, joints, sample in zip(t.tolist(), q.tolist(), samples, strict=True):
-            capture.add(now, RealSample(now, sample.play, joints))
+            reference = None if sample.reference is None else sample.reference.tolist()
+            capture.add(now, RealSample(now, sample.play, joints, reference))
         capture.show(self._real, t, q, capture.model.forward, real_pose)
         capture.show_links("real", self._real_links, t, q)
 

@@ -43,14 +43,12 @@ def summarize(
     seen = run.measured
     lag, D = best_lag(run.t, run.q_matched, run.q_real), float(run.D[seen].mean())
     aligned = run.q_matched if lag is None else shifted(run.t, run.q_matched, -lag)
-    matched, shown, reference, real = run.samples or (
-        q[seen] for q in (run.q_matched, run.q_shown, run.q_reference, run.q_real)
-    )
+    samples = run.at_samples
     errors = {
-        "timeline_time": agreement(run.model, matched, real),
+        "timeline_time": agreement(run.model, samples.q_matched, samples.q_real),
         "lag_removed": agreement(run.model, aligned[seen], run.q_real[seen]),
-        "user_time": agreement(run.model, shown, real),
-        "servo": agreement(run.model, reference, real),
+        "user_time": agreement(run.model, samples.q_shown, samples.q_real),
+        "servo": agreement(run.model, samples.q_reference, samples.q_real),
     }
     value = {
         "schema": SCHEMA,
@@ -162,12 +160,17 @@ def _errors(value: Agreement) -> Json:
 
 def _path(run: TwinRun) -> Json:
     """Tool path and time difference in user time, in the metres and seconds of `docs/summary.md`."""
-    p_virtual, p_real = run.model.forward(run.q_virtual)[:, :3, 3], np.full((len(run.t), 3), np.nan)
-    p_real[run.measured] = run.model.forward(run.q_real[run.measured])[:, :3, 3]
+    samples, gaps = run.at_samples, ~run.measured
+    # The virtual robot's path goes on where the real one wasn't measured.
+    t = np.concatenate((samples.t, run.t[gaps]))
+    order = np.argsort(t, kind="stable")
+    p_virtual = run.model.forward(np.vstack((samples.q_virtual, run.q_virtual[gaps])))[order, :3, 3]
+    p_real = np.full((len(t), 3), np.nan)
+    p_real[: len(samples.t)] = run.model.forward(samples.q_real)[:, :3, 3]
     steps = np.linalg.norm(np.diff(p_virtual, axis=0), axis=1)
     cell = max(0.01, float(steps.sum()) / MOST_CELLS)
-    v_max = max(0.5, float(steps.max()) / run.dt)
-    result = compare_paths(run.t, p_virtual, p_real, v_max=v_max, cell=cell)
+    v_max = max(0.5, float((steps / np.diff(t[order])).max()))
+    result = compare_paths(t[order], p_virtual, p_real[order], v_max=v_max, cell=cell)
     names = PathComparison.__slots__
     return {"cell": cell, "v_max": v_max, **{name: getattr(result, name) for name in names}}
 

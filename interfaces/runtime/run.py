@@ -43,6 +43,19 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Where both robots were whenever the real one was measured; the joints as in `TwinRun`, (m, n)."""
+
+    t: Array
+    """User time [s], (m,), ascending."""
+    q_virtual: Array
+    q_shown: Array
+    q_matched: Array
+    q_real: Array
+    q_reference: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TwinRun:
     """Both twins over one run, sampled on a common grid of user time.
 
@@ -92,9 +105,8 @@ class TwinRun:
     """When the virtual robot was put where the real one was going."""
     events: tuple[Event, ...]
     """Everything else that happened, by time, kind and text."""
-    samples: tuple[Array, Array, Array, Array] | None = None
-    """q_matched, q_shown, q_reference and q_real when the real robot was measured, (m, n) each; None where
-    those are the grid's rows."""
+    samples: Samples | None = None
+    """Where both robots were whenever the real one was measured; None where that's on the grid."""
     gap_s: float = 0.0
     """For how long nothing was measured of the real robot, between its first and its last sample [s]."""
 
@@ -117,6 +129,14 @@ class TwinRun:
     def measured(self) -> NDArray[np.bool_]:
         """Whether the real robot was measured at user time t, (k,): figures are of those rows alone."""
         return measured_rows(self.q_real)
+
+    @property
+    def at_samples(self) -> Samples:
+        """Where both robots were whenever the real one was measured."""
+        if self.samples is not None:
+            return self.samples
+        joints = (self.q_virtual, self.q_shown, self.q_matched, self.q_real, self.q_reference)
+        return Samples(self.t[self.measured], *(q[self.measured] for q in joints))
 
     @property
     def dt(self) -> float:

@@ -49,6 +49,8 @@ class Sample(NamedTuple):
     """Time on the robot's timeline that it played then [s]."""
     q: Array
     """Measured joints [rad], (n,)."""
+    reference: Array | None = None
+    """What the robot's own timeline asked for at `play` [rad], (n,); None of a robot that doesn't say."""
 
 
 class SampleLog:
@@ -61,7 +63,8 @@ class SampleLog:
             dof: Joints.
             last: Number of the last sample of an earlier life, which the operator may know.
         """
-        self._rows: Array = np.empty((_MOST, 2 + dof))
+        self._dof = dof
+        self._rows: Array = np.empty((_MOST, 2 + 2 * dof))
         self._first = last + 1
         self.newest = self._told = last
         """Number of the newest one."""
@@ -73,13 +76,13 @@ class SampleLog:
         """Number of the oldest that is kept, or of the next one."""
         return max(self._first, self.newest + 1 - _MOST)
 
-    def add(self, t: float, play: float, q: Array) -> None:
+    def add(self, t: float, play: float, q: Array, reference: Array) -> None:
         """Take a measurement, if it's time for the next sample; see `Sample`."""
         if t - self._t < PERIOD - 1e-6:
             return
         self._t = t
         self.newest += 1
-        self._rows[self.newest % _MOST] = (t, play, *q)
+        self._rows[self.newest % _MOST] = (t, play, *q, *reference)
 
     def ask(self, wanted: Ranges) -> None:
         """Let samples be sent again."""
@@ -100,8 +103,9 @@ class SampleLog:
         return tuple(self._sample(number) for number in chosen)
 
     def _sample(self, number: int) -> Sample:
-        t, play, *q = self._rows[number % _MOST].tolist()
-        return Sample(number, t, play, frozen_array(q))
+        row = self._rows[number % _MOST]
+        q, reference = row[2:].reshape(2, self._dof)
+        return Sample(number, float(row[0]), float(row[1]), frozen_array(q), frozen_array(reference))
 
 
 class Gathering:

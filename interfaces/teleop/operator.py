@@ -217,8 +217,8 @@ class OperatorSite:
     def receive(self, report: Report, *, now: float) -> None:
         """Take in a report of the robot; where it was measured counts whatever the epoch, and however late."""
         self._clock.set(now)
-        samples = report.samples if report.oldest else (Sample(0, report.measured_at, report.q_at, report.q),)
-        found = self.gathering.take(samples, report.oldest, now=now)
+        alone = Sample(0, report.measured_at, report.q_at, report.q, report.reference)
+        found = self.gathering.take(report.samples if report.oldest else (alone,), report.oldest, now=now)
         if found and self.listener is not None:
             self.listener.measured(found, now=now)
         if report.epoch != self.epoch:

@@ -330,8 +330,9 @@ class RobotSite:
         at = now if at is None else at
         p = float(self.play_at(np.array([at])).p[0])
         self._measured, self._measured_at = np.array(q, float), (at, p)
-        self._samples.add(at, p, self._measured)
-        abort = too_far(self.engine.timeline.sample(p), self._measured, self.config.tolerance)
+        reference = self.engine.timeline.sample(p)
+        self._samples.add(at, p, self._measured, reference)
+        abort = too_far(reference, self._measured, self.config.tolerance)
         return self._violated(abort, now, measured=self._measured)
 
     def _violated(self, violation: Violation | None, now: float, measured: Array | None = None) -> bool:

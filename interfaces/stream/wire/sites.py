@@ -107,6 +107,18 @@ class SampleWire(Wire, frozen=True, array_like=True, gc=False):
     t: Stamp
     play: Time
     q: Joints
+    reference: Joints | None = None
+
+    @classmethod
+    def of(cls, value: Sample) -> SampleWire:
+        """The sample on the wire."""
+        reference = None if value.reference is None else numbers(value.reference)
+        return cls(value.number, value.t, value.play, numbers(value.q), reference)
+
+    def read(self) -> Sample:
+        """The sample."""
+        reference = None if self.reference is None else array(self.reference)
+        return Sample(self.number, self.t, self.play, array(self.q), reference)
 
 
 class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False, tag="report"):
@@ -149,7 +161,7 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             None if value.plan is None else PlanPartWire.of(value.plan, packed),
             None if value.reference is None else numbers(value.reference),
             value.uncertainty,
-            tuple(SampleWire(one.number, one.t, one.play, numbers(one.q)) for one in value.samples),
+            tuple(map(SampleWire.of, value.samples)),
             value.oldest,
         )
 
@@ -171,6 +183,6 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
             None if self.plan is None else self.plan.read(),
             None if self.reference is None else array(self.reference),
             self.uncertainty,
-            tuple(Sample(one.number, one.t, one.play, array(one.q)) for one in self.samples),
+            tuple(one.read() for one in self.samples),
             self.oldest,
         )

@@ -262,6 +262,10 @@ def values() -> dict[str, Any]:
             7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0,
             samples=(Sample(4, 2.1, 1.25, Q), Sample(146, 2.92, 2.0, 1.001 * Q)), oldest=3,
         ),
+        "report with samples and references": Report(
+            7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0,
+            samples=(Sample(5, 2.2, 1.3, Q, 1.001 * Q),), oldest=3,
+        ),
         "report of a halted robot": Report(
             7_730_941_132_801, 4, 2.85, None, 1, 2.0, 0.0, Q, 2.82, 2.0, "link lost"
         ),
