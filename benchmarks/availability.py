@@ -77,10 +77,11 @@ def served(directory: Path) -> Iterator[Ports]:
 
 
 @contextlib.asynccontextmanager
-async def load(kind: str, ports: Ports) -> AsyncIterator[None]:
-    """Put a load on; nothing where its name is empty."""
+async def load(kind: str, ports: Ports) -> AsyncIterator[list[str]]:
+    """Put a load on, nothing where its name is empty; how much it was is in the list afterwards."""
+    found: list[str] = []
     if not kind:
-        yield
+        yield found
         return
     port = ports.val if kind == "terminals" else ports.page
     command = [sys.executable, str(LOADS), kind, str(port), str(SECONDS + BACK + 8.0), ports.token]
@@ -88,8 +89,12 @@ async def load(kind: str, ports: Ports) -> AsyncIterator[None]:
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
     try:
         assert process.stdout is not None
+        assert process.stdin is not None
         assert await process.stdout.readline() == b"on\n"
-        yield
+        yield found
+        process.stdin.close()
+        async with asyncio.timeout(10.0):
+            found.append((await process.stdout.read()).decode().strip())
     finally:
         with contextlib.suppress(ProcessLookupError):
             process.terminate()
@@ -226,7 +231,7 @@ async def _measure(ports: Ports) -> list[Result]:
         steering = asyncio.create_task(operator.steer(enough))
         await asyncio.sleep(1.0)
         operator.halted.clear()
-        async with load(kind, ports):
+        async with load(kind, ports) as load_was:
             operator.took.clear()
             await asyncio.sleep(SECONDS)
             enough.set()
@@ -237,7 +242,7 @@ async def _measure(ports: Ports) -> list[Result]:
         p50, p99, worst = np.quantile(took, [0.5, 0.99, 1.0]).tolist()
         results += [
             Result(f"a command's round trip, {name}", Cost(p50, p99), "ms", Bar(p99=P99),
-                   note=f"{len(took)} commands, worst {worst:.0f} ms"),
+                   note="; ".join([f"{len(took)} commands, worst {worst:.0f} ms", *load_was])),
             Result(f"halts, {name}", Cost(float(len(halted))), "", Bar(median=0.0), note="; ".join(halted)),
             Result(f"back after the connection was lost, {name}", Cost(back), "s", Bar(median=BACK)),
         ]  # fmt: skip

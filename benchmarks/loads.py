@@ -1,6 +1,7 @@
 """Loads on a server of this machine, each a process of its own, bounded in number and time.
 
-`python benchmarks/loads.py KIND PORT SECONDS [TOKEN]` says `on` when it's on, and ends with its time or its input.
+`python benchmarks/loads.py KIND PORT SECONDS [TOKEN]` says `on` when it's on, ends with its time or its input, and
+says then how much it was.
 It knows the server from docs/protocol.md and docs/console.md alone.
 """
 
@@ -16,6 +17,7 @@ import socket
 import struct
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -31,6 +33,8 @@ REOPENED = 500
 """Sockets a second that are opened again where the server closed them."""
 CONNECTIONS = 4000
 """Connections a second that come and go."""
+LINGERING = 64
+"""So many of them are open at once."""
 TERMINALS = 64
 """Sockets at the VAL-II port that show no token."""
 LOADED = "flood.v2"
@@ -39,9 +43,8 @@ _TICK = 0.02
 
 
 def ended() -> bool:
-    """Whether standard input has."""
-    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
-    return bool(ready) and not sys.stdin.read(1)
+    """Whether standard input has: nothing is ever written there."""
+    return bool(select.select([sys.stdin], [], [], 0.0)[0])
 
 
 def on() -> None:
@@ -49,7 +52,9 @@ def on() -> None:
     print("on", flush=True)
 
 
-async def _view(port: int, until: float) -> None:
+async def _view(port: int, sent: list[int], viewer: int) -> None:
+    """One viewer, and how many messages it has sent."""
+    begun = time.monotonic()
     async with connect(f"ws://{HERE}:{port}/ws", subprotocols=[Subprotocol("vrs.1.json")], proxy=None) as peer:
         await peer.send('{"type":"hello","protocol":1,"role":"viewer","name":"load"}')
         await peer.send('{"type":"follow","number":1,"form":"segments"}')
@@ -61,13 +66,13 @@ async def _view(port: int, until: float) -> None:
             {"type": "ask", "number": 1},
             {"type": "ping", "number": 1, "t": 0.0},
         )
-        texts, sent, begun = [json.dumps(kind) for kind in kinds], 0, time.monotonic()
+        texts = [json.dumps(kind) for kind in kinds]
         with contextlib.suppress(ConnectionClosed):
-            while time.monotonic() < until:
-                while sent < WANTS * (time.monotonic() - begun):
+            while True:
+                while (count := sent[viewer]) < WANTS * (time.monotonic() - begun):
                     # Mostly what costs most.
-                    await peer.send(texts[0 if sent % 2 else sent // 2 % len(texts)])
-                    sent += 1
+                    await peer.send(texts[0 if count % 2 else count // 2 % len(texts)])
+                    sent[viewer] += 1
                 await asyncio.sleep(_TICK)
         reading.cancel()
 
@@ -81,9 +86,16 @@ async def _drop(peer: ClientConnection) -> None:
 async def view(port: int, seconds: float) -> None:
     """Viewers at all that they may send."""
     until = time.monotonic() + seconds
-    tasks = [asyncio.create_task(_view(port, until)) for _ in range(VIEWERS)]
+    sent = VIEWERS * [0]
+    tasks = [asyncio.create_task(_view(port, sent, viewer)) for viewer in range(VIEWERS)]
     await asyncio.sleep(1.0)
     on()
+    begun, before = time.monotonic(), sum(sent)
+    while time.monotonic() < until and not ended():
+        await asyncio.sleep(0.1)
+    print(f"{(sum(sent) - before) / (time.monotonic() - begun):.0f} messages a second", flush=True)
+    for task in tasks:
+        task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
@@ -116,6 +128,7 @@ def idle(port: int, seconds: float) -> None:
     until = time.monotonic() + seconds
     peers = [_idle(port, number) for number in range(IDLE)]
     on()
+    opened = 0
     while time.monotonic() < until and not ended():
         again = 0
         for number, peer in enumerate(peers):
@@ -124,31 +137,40 @@ def idle(port: int, seconds: float) -> None:
                 with contextlib.suppress(OSError):
                     peers[number] = _idle(port, number)
                 again += 1
+        opened += again
         time.sleep(0.1)
     for peer in peers:
         peer.close()
+    print(f"{opened} opened again", flush=True)
 
 
 def come_and_go(port: int, seconds: float) -> None:
-    """Connections that come, say nothing or half of something, and go."""
-    begun, made = time.monotonic(), 0
+    """Connections that come, say nothing or half of something, and go; nobody waits for the server."""
+    begun, made, answered = time.monotonic(), 0, 0
     on()
     # Closed by a reset: what was closed otherwise keeps its port for a minute.
     linger = struct.pack("ii", 1, 0)
+    under_way: deque[socket.socket] = deque()
     while (passed := time.monotonic() - begun) < seconds:
         if made % 256 == 0 and ended():
             break
         if made >= CONNECTIONS * passed:
             time.sleep(0.002)
             continue
-        with socket.socket() as peer, contextlib.suppress(OSError):
-            peer.settimeout(1.0)
-            peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
-            peer.connect((HERE, port))
-            if made % 2:
-                peer.send(b"GET / HTTP/1.1\r\nHost")
+        peer = socket.socket()
+        peer.setblocking(False)
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+        peer.connect_ex((HERE, port))
+        under_way.append(peer)
         made += 1
-    print(f"{made / (time.monotonic() - begun):.0f} a second", flush=True)
+        if len(under_way) > LINGERING:
+            with under_way.popleft() as oldest, contextlib.suppress(OSError):
+                oldest.send(b"GET / HTTP/1.1\r\nHost" if made % 2 else b"G")
+                answered += 1
+    for peer in under_way:
+        peer.close()
+    passed = time.monotonic() - begun
+    print(f"{made / passed:.0f} connections a second, {answered / passed:.0f} of them made", flush=True)
 
 
 def type_on(port: int, seconds: float, token: str) -> None:
@@ -174,7 +196,7 @@ def type_on(port: int, seconds: float, token: str) -> None:
             time.sleep(0.002)
     for other in others:
         other.close()
-    print(f"{sent} bytes", flush=True)
+    print(f"{sent} bytes of lines", flush=True)
 
 
 def main(words: list[str]) -> None:
