@@ -94,7 +94,7 @@ async def load(kind: str, ports: Ports) -> AsyncIterator[list[str]]:
         yield found
         process.stdin.close()
         async with asyncio.timeout(10.0):
-            found.append((await process.stdout.read()).decode().strip())
+            found.append((await process.stdout.readline()).decode().strip())
     finally:
         with contextlib.suppress(ProcessLookupError):
             process.terminate()
