@@ -6,13 +6,17 @@ DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test contract lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
 
 test: $(DEV_STAMP) lint types
 	$(PY) -m pytest -n 2 --durations=5
+
+# What must not change, through doors alone: commands, sockets, files, public packages; the slow papers, too.
+contract: $(DEV_STAMP)
+	VRS_CONTRACT_SLOW=1 $(PY) -m pytest -n 2 --no-loadscope-reorder --durations=5 tests/contract
 
 lint: $(DEV_STAMP)
 	.venv/bin/ruff check .
