@@ -19,9 +19,10 @@ from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
-from websockets.frames import Opcode
+from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
+from interfaces.stream.limits import Bucket
 from interfaces.stream.strangers import Strangers
 from vrs.checks import number_in
 from vrs.errors import FormatError
@@ -53,6 +54,11 @@ CHUNK = 512
 """Bytes of which frames are read at once: many may be in few."""
 MOMENT = 1e-3
 """Longest that reading frames of one connection goes on [s], but for one chunk."""
+PARTS, PARTS_BURST = 5.0, 100.0
+"""Frames that are no whole message, pings and parts of messages, a second for long, and at once: they cost what
+messages cost, and no client's limits count them."""
+AFTERWARDS = 1000.0
+"""Messages that may come after a farewell."""
 _GRACE = 1.0
 """Time for handlers to end when a server stops [s]."""
 
@@ -257,6 +263,8 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         self.conn.max_message_size = min(self.config.ws_max_size, LARGEST_MESSAGE)
         self._enter(self._state.limits.hello)
         self._unread = b""
+        self._parts = Bucket(PARTS, PARTS_BURST, self.loop.time())
+        self._afterwards = Bucket(1.0, AFTERWARDS, self.loop.time())
         self.work = 0.0
         """Processor time that reading frames has taken, until somebody sets it back [s]."""
 
@@ -292,6 +300,40 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         elif self.read_paused and self.queue.empty():
             self.read_paused = False
             self.transport.resume_reading()
+
+    def handle_ping(self) -> None:
+        """Answer a ping."""
+        if self._may(self._parts):
+            super().handle_ping()
+
+    def handle_pong(self, event: Frame) -> None:
+        """Take the answer to one."""
+        if self._may(self._parts):
+            super().handle_pong(event)
+
+    def handle_cont(self, event: Frame) -> None:
+        """Take a part of a message."""
+        if self._may(self._parts):
+            super().handle_cont(event)
+
+    def send_receive_event_to_app(self) -> None:
+        """Take a whole message."""
+        if not self.close_sent or self._may(self._afterwards):
+            super().send_receive_event_to_app()
+
+    def _may(self, allowed: Bucket) -> bool:
+        """Whether one more frame may come; else the connection is closed."""
+        if self.transport.is_closing():
+            return False
+        if allowed.take(self.loop.time()):
+            return True
+        if not self.close_sent:
+            self.conn.fail(CloseCode.POLICY_VIOLATION, "too many pings and parts of messages")
+            self.transport.write(b"".join(self.conn.data_to_send()))
+            self.close_sent = True
+        self.transport.close()
+        self._begin_phase(FAREWELL)
+        return False
 
     async def receive(self) -> ASGIReceiveEvent:
         """Take the next message; more is read when all that were have been taken."""

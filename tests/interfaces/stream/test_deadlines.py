@@ -8,7 +8,7 @@ import json
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 import uvloop
@@ -20,8 +20,9 @@ from websockets.server import ServerProtocol
 from websockets.sync.client import connect
 
 from interfaces.stream import sockets
-from interfaces.stream.codec import Encoding
+from interfaces.stream.codec import Encoding, encode
 from interfaces.stream.control import Hello, Role
+from interfaces.stream.limits import ClientLimits
 from interfaces.stream.sockets import SocketLimits
 from tests.interfaces.stream import serving
 from tests.interfaces.stream.served import ServingHub, served
@@ -212,6 +213,42 @@ def test_of_many_connections_that_send_at_once_few_are_served_in_a_round_of_the_
     assert [number for _, number in served_in] == list(range(51))
     each = [sum(when == one for when, _ in served_in) for one in {when for when, _ in served_in}]
     assert max(each) <= 2 * sockets.TURNS
+
+
+PING, BEGIN, PART = (bytes((opcode, 0x80, 0, 0, 0, 0)) for opcode in (0x89, 0x01, 0x00))
+"""Empty frames of a client."""
+
+
+@pytest.mark.parametrize("greets", [False, True], ids=["a stranger", "a client"])
+@pytest.mark.parametrize(("first", "flood"), [(b"", PING), (BEGIN, PART)], ids=["pings", "parts"])
+def test_frames_that_are_no_messages_close_the_connection(first: bytes, flood: bytes, greets: bool) -> None:
+    """No limit of messages counts them: they'd take the processor's time, and what they leave would grow."""
+    # Its deadlines are far off: only the frames can end it.
+    limits = SocketLimits(hello=60.0)
+    with served(sockets=limits, limits=ClientLimits(hello=60.0)) as server, dialled(server.port) as connection:
+        connection.sendall(handshake(server, Encoding.JSON))
+        if greets:
+            connection.sendall(frame(Hello(Role.VIEWER, "floods"), Encoding.JSON))
+        heard = connection.recv(65536)
+        with suppress(OSError):
+            connection.sendall(first + flood * 2000)
+        with suppress(ConnectionResetError):
+            while more := connection.recv(65536):
+                heard += more
+        assert b"HTTP/1.1 101" in heard
+        end = time.monotonic() + 10.0
+        while server.hub.sessions and time.monotonic() < end:
+            time.sleep(0.01)
+        assert not server.hub.sessions
+
+
+def test_some_pings_and_a_message_in_parts_are_taken() -> None:
+    with served() as server, connect(f"ws://127.0.0.1:{server.port}/ws", subprotocols=["vrs.1.json"]) as connection:
+        text = encode(Hello(Role.VIEWER, "fragments"), Encoding.JSON).decode()
+        connection.send(text[k : k + 1] for k in range(len(text)))
+        assert json.loads(connection.recv(5.0))["type"] == "welcome"
+        for _ in range(20):
+            assert connection.ping().wait(5.0)
 
 
 def test_a_server_asks_for_files_and_leaves_room_for_others() -> None:
