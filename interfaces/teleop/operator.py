@@ -219,8 +219,8 @@ class OperatorSite:
         self._clock.set(now)
         alone = Sample(0, report.measured_at, report.q_at, report.q, report.reference)
         found = self.gathering.take(report.samples if report.oldest else (alone,), report.oldest, now=now)
-        if found and self.listener is not None:
-            self.listener.measured(found, now=now)
+        if found:
+            self._inform(lambda listener: listener.measured(found, now=now))
         if report.epoch != self.epoch:
             self._watch_begin(report, now)
             return

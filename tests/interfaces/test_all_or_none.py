@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from interfaces.messages import Order, Outcome
 from interfaces.ordering import FAILED
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.site import Site
-from interfaces.teleop import Correction, Deed, OperatorSite, Report, RobotSite
+from interfaces.teleop import Correction, Deed, OperatorSite, Report, RobotSite, Sample
 from robots import puma560
 from vrs import (
     Cancel,
@@ -76,6 +76,9 @@ class Notes:
         """Not of commands."""
 
     def reported(self, report: Report, *, now: float) -> None:
+        """Not of commands."""
+
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
         """Not of commands."""
 
     def failed(self, error: Exception) -> None:
@@ -306,10 +309,12 @@ def test_a_command_that_cant_be_sent_isnt_taken() -> None:
     sites.follows()
 
 
-def test_a_recording_that_fails_stops_no_command() -> None:
+@pytest.mark.parametrize("told", ["commanded", "answered", "reported", "measured"])
+def test_a_recording_that_fails_stops_no_command(told: str) -> None:
     sites = Sites()
-    sites.notes.commanded = lambda deed: 1 / 0  # type: ignore[method-assign]
+    setattr(sites.notes, told, lambda *_, **__: 1 / 0)
     assert sites.order(MotionCommand(JointTarget(READY), execute_at=1.5)).receipt is not None
+    sites.robot.measured(NOMINAL, now=NOW)
+    sites.follows()
     assert isinstance(sites.notes.failure, ZeroDivisionError)
     assert sites.operator.listener is None
-    sites.follows()
