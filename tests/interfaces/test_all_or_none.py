@@ -309,6 +309,16 @@ def test_a_command_that_cant_be_sent_isnt_taken() -> None:
     sites.follows()
 
 
+def test_a_command_that_no_robot_would_read_isnt_taken() -> None:
+    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
+    limits = operator.engine.limits
+    for value in (1e-320, [1.0, 1.0, 1.0, 1.0, 1.0, 1e-320]):
+        with pytest.raises(InvalidValueError, match=r"at least 2\.23e-308"):
+            operator.engine.execute(ParameterChange("qd_max", value))
+    assert operator.engine.limits is limits
+    assert operator._entries == 0
+
+
 @pytest.mark.parametrize("told", ["commanded", "answered", "reported", "measured"])
 def test_a_recording_that_fails_stops_no_command(told: str) -> None:
     sites = Sites()

@@ -24,6 +24,7 @@ from interfaces.stream.wire.fields import (
     Wire,
     Word,
     array,
+    check_normal,
     numbers,
     plain,
     text,
@@ -349,7 +350,9 @@ def check_crosses(command: Command) -> None:
         InvalidValueError: If it can't be written, or a reader would refuse it.
     """
     try:
-        _reader()(_encode(command_wire(command, packed=True))).read()
+        wire = _reader()(_encode(command_wire(command, packed=True)))
+        check_normal(wire, "command")
+        wire.read()
     except (msgspec.MsgspecError, OverflowError, TypeError) as error:
         raise InvalidValueError("command", command, f"one that can cross a connection: {error}") from None
 
