@@ -119,8 +119,11 @@ class OperatorSite:
         """After how long without an answer an entry counts as lost [s]."""
         self.gathering = Gathering()
         """Where the robot was measured."""
-        self._waits_since: float | None = None
-        """When the first report came [s] of those that say that the same entry is still to be carried out."""
+        self._waits: tuple[float, float, float] | None = None
+        """Of the reports that say that the same entry is still to be carried out: when the first came [s], when
+        what the newest has heard was sent [s], and for how long the robot has been hearing meanwhile [s]."""
+        self._of_earlier: tuple[float, float] | None = None
+        """When reports of an earlier epoch began to come [s] since the newest resume or silence, and the newest."""
         self._compared: tuple[int, ...] = ()
         """Versions of the plans, and entries under way, that were found to lead the same way."""
 
@@ -269,14 +272,16 @@ class OperatorSite:
             self._under_way.pop(number, None)
         self._acknowledged = max(self._acknowledged, report.executed)
         if self.halted or self._acknowledged >= self._entries:
-            self._waits_since = None
-        elif progressed or self._waits_since is None:
-            self._waits_since = now
-        elif report.echo is not None and report.echo[1] > self._waits_since + self._stuck_after(STUCK):
-            waited = report.echo[1] - self._waits_since
-            self._give_up(
-                f"it hears the operator, but hasn't carried out a command that it was sent {waited:.1f} s before"
-            )
+            self._waits = None
+        elif progressed or self._waits is None:
+            self._waits = now, now, 0.0
+        elif report.echo is not None and report.echo[1] > self._waits[1]:
+            (since, before, hearing), heard = self._waits, report.echo[1]
+            # What got lost in an outage wasn't heard.
+            self._waits = since, heard, hearing + min(heard - before, self._patience)
+            if self._waits[2] > self._stuck_after(STUCK):
+                waited = f"{heard - since:.1f} s before"
+                self._give_up(f"it hears the operator, but hasn't carried out a command that it was sent {waited}")
 
     def _watch_begin(self, report: Report, now: float) -> None:
         """Count a robot as halted that goes on saying that it follows an earlier epoch."""
@@ -289,7 +294,12 @@ class OperatorSite:
             or report.number <= known.number
         ):
             return
-        if now > self._began + self._stuck_after(TAKES_UP) + 2.0 * longest:
+        since, heard = self._of_earlier or (now, now)
+        if now - heard > self._stuck_after(STUCK):
+            # Nothing came meanwhile: the link was down, and it may not have heard anything either.
+            since = now
+        self._of_earlier = since, now
+        if now > since + self._stuck_after(TAKES_UP) + 2.0 * longest:
             self._give_up("it hears nothing of being resumed, or can't take it up")
 
     def _stuck_after(self, least: float) -> float:
@@ -301,7 +311,7 @@ class OperatorSite:
         self.halted, self.stuck = reason, stuck
         self._under_way.clear()
         self._new = []
-        self._waits_since = None
+        self._waits = None
         self._due = self._clock.now()
 
     def measure_anew(self, *, now: float) -> None:
@@ -361,7 +371,7 @@ class OperatorSite:
         self._recent.clear()
         self._under_way.clear()
         self._ids.clear()
-        self._waits_since = None
+        self._waits = self._of_earlier = None
         return ""
 
 

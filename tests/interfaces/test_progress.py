@@ -12,7 +12,7 @@ from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, Orders, RobotSite, RobotSiteConfig
 from robots import puma560
 from robots.onboard import WatchdogConfig
-from vrs import JointTarget, MotionCommand
+from vrs import JointTarget, MotionCommand, SteerCommand
 
 MODEL = puma560.model()
 NOMINAL, READY = MODEL.poses["nominal"], MODEL.poses["ready"]
@@ -98,3 +98,47 @@ def test_a_robot_that_doesnt_take_up_a_new_epoch_is_halted_again():
     lab.run(lab.now + 3.0)
     assert not lab.operator.halted
     assert lab.robot.epoch == lab.operator.epoch
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_an_outage_right_after_resuming_is_no_halt(service):
+    lab = sites("constant:0.05", service=service)
+    lab.run(2.0)
+    lab.robot.halt("for a reason", now=lab.now)
+    lab.run(4.0)
+    assert lab.operator.resume(now=lab.now) == ""
+    before = lab.link.conditions
+    down = replace(before.forward, loss=BernoulliLoss(1.0), service=Service.DATAGRAM)
+    lab.link.change(LinkConditions.symmetric(down), lab.now)
+    lab.run(lab.now + 30.0)
+    lab.link.change(before, lab.now)
+    lab.run(lab.now + 3.0)
+    assert not lab.operator.halted
+    assert not lab.robot.halted
+    assert lab.robot.epoch == lab.operator.epoch
+
+
+@pytest.mark.parametrize("service", SERVICES)
+@pytest.mark.parametrize("delay", ["constant:0.05", "mon"])
+def test_an_outage_while_somebody_steers_is_no_halt(delay, service):
+    """The robot hears again before all that got lost has been sent again: it needs a moment for that."""
+    lab = sites(delay, service=service)
+    lab.run(5.0)
+    up, report = lab.link.conditions, None
+    down = replace(up.forward, loss=BernoulliLoss(1.0), service=Service.DATAGRAM)
+    for k in range(5):
+        for j in range(50):
+            lab.schedule(lab.now + 0.02 * j, lambda t: lab.operator.execute(SteerCommand(rates=[0.1] * 6), now=t))
+        # Reports still come at first.
+        lab.link.change(LinkConditions(down, up.backward), lab.now)
+        lab.run(lab.now + 1.0)
+        lab.link.change(LinkConditions.symmetric(down), lab.now)
+        lab.run(lab.now + 3.0 + 0.213 * k)
+        lab.link.change(up, lab.now)
+        end = lab.now + 60.0
+        while lab.now < end and (report is None or report.executed < lab.operator._entries):
+            lab.run(lab.now + 1.0)
+            report = lab.operator.report
+        assert not lab.operator.halted
+        assert report is not None
+        assert report.executed == lab.operator._entries == 50 * (k + 1)
