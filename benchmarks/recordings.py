@@ -23,9 +23,9 @@ import numpy as np
 import uvloop
 
 from interfaces import connect
+from interfaces.children import module_process
 from interfaces.recording.recording import open_recording
 from interfaces.recording.track import REAL
-from interfaces.runtime.children import module_process
 from interfaces.runtime.feeder import Feeder
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST

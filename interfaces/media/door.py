@@ -24,9 +24,9 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.media.camera import CameraError
-from interfaces.station.files import HEADERS
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
+from interfaces.stream.kept_files import HEADERS
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.viewers import (
     PATIENCE,

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
+from interfaces.link.round_trip import Ping
 from interfaces.runtime.physics import TICK, References
 from interfaces.runtime.physics_messages import Fault
-from interfaces.stream.control import Ping
 from interfaces.teleop import Reference, Report, RobotHost
 
 FEED = 0.1

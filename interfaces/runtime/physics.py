@@ -14,7 +14,7 @@ from typing import Self, TypeAlias
 
 import numpy as np
 
-from interfaces.runtime.children import module_process
+from interfaces.children import module_process
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     ROWS_MOST,

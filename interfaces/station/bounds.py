@@ -14,7 +14,7 @@ from typing import Any, Final
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from interfaces.station.files import HEADERS, POLICY
+from interfaces.stream.kept_files import HEADERS, POLICY
 from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
 from interfaces.stream.strangers import Strangers

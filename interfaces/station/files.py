@@ -10,19 +10,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from interfaces.stream.kept_files import KeptFile
+from interfaces.stream.kept_files import HEADERS, KeptFile
 
-POLICY: Final = (
-    "default-src 'none'; script-src 'self'{scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
-    "font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-"""Nothing from elsewhere, and no script in the page but those that the server put there."""
-HEADERS: Final = {
-    "Content-Security-Policy": POLICY.format(scripts=""),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cache-Control": "no-cache",
-}
 _TYPES: Final = {"css": "text/css", "js": "text/javascript"}
 _READER: Final = "vrs.js"
 _TERMINAL: Final = {"xterm.js": "index.js", "xterm.css": "xterm.css"}

@@ -20,11 +20,11 @@ from starlette.types import Receive, Scope, Send
 
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import LiveRecording
-from interfaces.station.files import HEADERS
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
+from interfaces.stream.kept_files import HEADERS
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.viewers import Viewers

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias
 
 from interfaces.link.clock_sync import ClockSync
-from interfaces.link.round_trip import RoundTrip
+from interfaces.link.round_trip import Ping, Pong, RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request
 from interfaces.ports import RemotePort, earliest
 from interfaces.stream import control
@@ -208,10 +208,10 @@ class ClientCore:
         elif isinstance(message, MobileWelcome):
             text = f"the mobile robot {message.robot} is driven here, not an arm; docs/protocol.md says how"
             self._complain(control.Problem(ProblemCode.REFUSED, text, fatal=True))
-        elif isinstance(message, control.Ping):
+        elif isinstance(message, Ping):
             t = self.time(now)
-            self._send(control.Pong(message.number, message.t, now if t is None else t, now if t is None else t))
-        elif isinstance(message, control.Pong):
+            self._send(Pong(message.number, message.t, now if t is None else t, now if t is None else t))
+        elif isinstance(message, Pong):
             self._measure(message, now)
         elif isinstance(message, control.Lease):
             self._note(message, now)
@@ -240,7 +240,7 @@ class ClientCore:
         self._trips.clear()
         self._note(welcome.lease, now)
 
-    def _measure(self, pong: control.Pong, now: float) -> None:
+    def _measure(self, pong: Pong, now: float) -> None:
         if not (pong.t <= now and pong.received <= pong.answered):
             return
         trip = RoundTrip(pong.t, pong.received, pong.answered, now)
@@ -301,7 +301,7 @@ class ClientCore:
                     self._stamped(request)
         if self.phase is not Phase.LOST and now >= self._ping_due:
             self._pings += 1
-            self._send(control.Ping(self._pings, now))
+            self._send(Ping(self._pings, now))
             self._ping_due = now + (QUICK if self._pings < FIRST_PINGS else SLOW)
         out, self._out = tuple(self._out), []
         return out

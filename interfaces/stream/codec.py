@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeAlias, TypeVar, get_args
 import msgspec
 
 from interfaces import messages
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.messages import Reply, Request
 from interfaces.stream import control, mobile, network, tasks
 from interfaces.stream.control import Notice, ProblemCode, Question
@@ -64,8 +65,8 @@ WIRES: dict[type, type[Wire]] = {
     control.Hello: controls.HelloWire,
     control.Welcome: controls.WelcomeWire,
     control.Attached: controls.AttachedWire,
-    control.Ping: controls.PingWire,
-    control.Pong: controls.PongWire,
+    Ping: controls.PingWire,
+    Pong: controls.PongWire,
     control.Acquire: controls.AcquireWire,
     control.TakeOver: controls.TakeOverWire,
     control.Share: controls.ShareWire,
@@ -91,8 +92,7 @@ WIRES: dict[type, type[Wire]] = {
 }
 """The wire form of each message."""
 ASKED = frozenset(
-    WIRES[kind]
-    for kind in (*get_args(Request), *get_args(Question), tasks.TaskOrder, control.Pong, Orders, DriveOrders)
+    WIRES[kind] for kind in (*get_args(Request), *get_args(Question), tasks.TaskOrder, Pong, Orders, DriveOrders)
 )
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}
@@ -192,7 +192,7 @@ def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
     return reader
 
 
-FOR_ONE = (messages.Outcome, messages.Answer, messages.Scene, messages.Pulse, control.Pong, control.Problem)
+FOR_ONE = (messages.Outcome, messages.Answer, messages.Scene, messages.Pulse, Pong, control.Problem)
 """What one client alone gets: remembering it would push out what others are still to get."""
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, TypeAlias
 
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream.network import Impair, Network, Survey
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.model import Array, Limits
@@ -173,32 +174,6 @@ class Attached:
     """Of a mobile robot: what it does with the operator's path, by name."""
     room: str = ""
     """Of a mobile robot: name of the room that it drives in."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ping:
-    """Either side: an answer at once, please; it also measures the round trip."""
-
-    kind: ClassVar[str] = "ping"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
-    """When it left, by the sender's clock [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pong:
-    """Either side: the answer to a `Ping`."""
-
-    kind: ClassVar[str] = "pong"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
-    """The ping's."""
-    received: float
-    """When that arrived, by the answerer's clock [s]."""
-    answered: float
-    """When this left, by the answerer's clock [s]."""
 
 
 @dataclass(frozen=True, slots=True)

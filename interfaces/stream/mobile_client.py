@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.messages import Outcome
 from interfaces.stream import control
 from interfaces.stream.client import ClientCore
@@ -18,7 +19,7 @@ class MobileCore(ClientCore):
     """See `ClientCore`; what it's told of the robot is kept here, the newest of each kind."""
 
     coming: ClassVar[Any] = (
-        Outcome | control.Welcome | control.Lease | control.Ping | control.Pong | control.Problem | Network
+        Outcome | control.Welcome | control.Lease | Ping | Pong | control.Problem | Network
         | MobileWelcome | Postures | Tasks | Seen | Plan
     )  # fmt: skip
     postures: Postures | None = None

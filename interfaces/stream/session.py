@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Protocol, TypeAlias
 
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want
 from interfaces.stream import control
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
@@ -30,9 +31,7 @@ Closing = tuple[int, str]
 """Close code and reason."""
 Wish = control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | control.Beat
 """What a client asks of the lease."""
-_ALLOWED = (
-    control.Ping | control.Pong | control.Problem | Wish | Survey | Impair | TaskOrder | Order | Ask | Follow | Want
-)
+_ALLOWED = Ping | Pong | control.Problem | Wish | Survey | Impair | TaskOrder | Order | Ask | Follow | Want
 """What may come once the client is welcome."""
 
 
@@ -228,8 +227,8 @@ class Session:
             self._take(self.seat, message, now)
 
     def _take(self, seat: Seat, message: Value, now: float) -> None:
-        if isinstance(message, control.Ping):
-            self._put(control.Pong(message.number, message.t, now, now))
+        if isinstance(message, Ping):
+            self._put(Pong(message.number, message.t, now, now))
         elif isinstance(message, Order | Ask | Follow | Want):
             self._serve(seat, message, now)
         elif isinstance(message, Wish):

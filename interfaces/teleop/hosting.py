@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
 from interfaces.link.clock_sync import ClockSync
-from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
-from interfaces.stream.control import Ping, Pong
+from interfaces.link.round_trip import Echo, Ping, Pong, ProbeConfig, RoundTrip, RoundTripEstimator
 from robots.onboard import LossPolicy, Verdict, WatchdogConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError

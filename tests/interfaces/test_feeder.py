@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.link.round_trip import Pong
 from interfaces.runtime.feeder import Feeder
 from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import TickLoop
-from interfaces.stream.control import Pong
 from interfaces.teleop import OperatorSite, Orders, Reference, RobotHost, RobotHostConfig, RobotLine
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
 from vrs import JointTarget, MotionCommand

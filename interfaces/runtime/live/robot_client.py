@@ -13,8 +13,9 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
 
+from interfaces.link.round_trip import Ping
 from interfaces.stream.codec import Encoding, Value, decode, encode
-from interfaces.stream.control import Attached, Hello, Ping, Problem, Role
+from interfaces.stream.control import Attached, Hello, Problem, Role
 from interfaces.stream.dialling import dial
 from interfaces.stream.errors import ProtocolError
 from interfaces.teleop import Report

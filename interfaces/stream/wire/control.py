@@ -6,6 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control
 from interfaces.stream.control import ProblemCode, Role
 from interfaces.stream.wire.fields import (
@@ -187,9 +188,9 @@ class PingWire(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
     number: Number
     t: Stamp
 
-    def read(self) -> control.Ping:
+    def read(self) -> Ping:
         """The probe."""
-        return control.Ping(self.number, self.t)
+        return Ping(self.number, self.t)
 
 
 class PongWire(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
@@ -200,9 +201,9 @@ class PongWire(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
     received: Stamp
     answered: Stamp
 
-    def read(self) -> control.Pong:
+    def read(self) -> Pong:
         """The echo."""
-        return control.Pong(self.number, self.t, self.received, self.answered)
+        return Pong(self.number, self.t, self.received, self.answered)
 
 
 class AcquireWire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):

@@ -25,6 +25,7 @@ from interfaces.jobs import (
     Wait,
 )
 from interfaces.link import Measured
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.stream import network as n
@@ -225,8 +226,8 @@ messages = {
         c.Attached, words, arrays, words, floats(0.1, 60), stamps, words, words, numbers,
         st.none() | floats(0.01, 2), words, words,
     ),
-    c.Ping: st.builds(c.Ping, numbers, times),
-    c.Pong: st.builds(c.Pong, numbers, times, times, times),
+    Ping: st.builds(Ping, numbers, times),
+    Pong: st.builds(Pong, numbers, times, times, times),
     c.Acquire: st.builds(c.Acquire, numbers),
     c.TakeOver: st.builds(c.TakeOver, numbers),
     c.Share: st.builds(c.Share, numbers, words),

@@ -31,6 +31,7 @@ from interfaces.jobs import (
     digest,
 )
 from interfaces.link import ClockSync, Measured, RoundTrip
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.site import Site
 from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
@@ -193,8 +194,8 @@ def values() -> dict[str, Any]:
         "drive report of a halted robot": DriveReport(
             3, 14, 3.05, 3.04, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0), halted="link loss", refused="too old",
         ),
-        "ping": c.Ping(1, 123.456),
-        "pong": c.Pong(1, 123.456, 2.5, 2.5001),
+        "ping": Ping(1, 123.456),
+        "pong": Pong(1, 123.456, 2.5, 2.5001),
         "acquire": c.Acquire(3),
         "take over": c.TakeOver(4),
         "share": c.Share(5, "abc"),

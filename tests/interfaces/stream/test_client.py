@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from interfaces.designer import Designer
+from interfaces.link.round_trip import Pong
 from interfaces.messages import Form, Order
 from interfaces.observer import Observer
 from interfaces.stream import control
@@ -80,7 +81,7 @@ def test_of_the_first_round_trips_the_shortest_tells_session_time():
         assert core.time(sent) is None
         # The way there takes all of it, but for the shortest.
         there = 100.0 + sent + (0.25 if trip == 0.5 else trip)
-        core.receive(encode(control.Pong(1 + number, sent, there, there), Encoding.MSGPACK), now=sent + trip)
+        core.receive(encode(Pong(1 + number, sent, there, there), Encoding.MSGPACK), now=sent + trip)
     assert core.phase is Phase.OPEN
     assert core.time(50.0) == pytest.approx(150.0, abs=1e-3)
 
@@ -90,7 +91,7 @@ def test_an_answer_to_what_has_not_been_asked_yet_tells_no_time():
     core, _ = operator(joined)
     local = joined.now + joined.ahead[core]
     before = core.time(local)
-    for pong in (control.Pong(9, local + 1.0, 3.0, 3.0), control.Pong(9, local - 0.01, 7.0, 6.0)):
+    for pong in (Pong(9, local + 1.0, 3.0, 3.0), Pong(9, local - 0.01, 7.0, 6.0)):
         core.receive(encode(pong, Encoding.MSGPACK), now=local)
         assert core.time(local) == before
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
+from interfaces.link.round_trip import Ping
 from interfaces.recording.marks import OF_EVENTS, MarkKind
 from interfaces.runtime.ages import late_often
 from interfaces.runtime.live.emulation import LiveEmulation
@@ -129,7 +130,7 @@ def test_the_way_is_measured_since_it_changed():
     hub, line, _ = emulated()
     mine, epoch = holder(hub)
     for k in range(200):
-        line.link.backward.send(control.Ping(k + 1, 0.0), 0.01 * k)
+        line.link.backward.send(Ping(k + 1, 0.0), 0.01 * k)
         line.advance(now=0.01 * k)
     mine.tell(control.Beat(epoch), now=1.5)
     found = mine.tell(Survey(1), now=2.0)[-1]
@@ -139,7 +140,7 @@ def test_the_way_is_measured_since_it_changed():
     changed = mine.tell(Impair(2, epoch, None, Way("constant:0.02")), now=2.0)[-1]
     assert changed.back.packets == 0
     for k in range(200, 220):
-        line.link.backward.send(control.Ping(k + 1, 0.0), 0.01 * k)
+        line.link.backward.send(Ping(k + 1, 0.0), 0.01 * k)
         line.advance(now=0.01 * k)
     found = mine.tell(Survey(3), now=2.2)[-1]
     assert (found.back.median, found.back.lost) == (pytest.approx(0.02), 0.0)
@@ -152,7 +153,7 @@ def test_packets_under_way_are_not_lost():
     found, shown = {}, []
     for k in range(1200):
         now = 0.02 * k
-        line.link.backward.send(control.Ping(k + 1, 0.0), now)
+        line.link.backward.send(Ping(k + 1, 0.0), now)
         line.advance(now=now)
         measured = line.back.measured(now=now)
         assert measured.packets <= k + 1

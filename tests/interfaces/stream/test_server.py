@@ -14,6 +14,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from interfaces.link.round_trip import Ping
 from interfaces.messages import Follow, Form
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
@@ -104,7 +105,7 @@ def test_too_large_a_message_closes_the_connection_before_it_is_read():
         with pytest.raises(ConnectionClosed) as caught:
             await ended(connection, b"\xc1" * 65537)
         assert caught.value.rcvd.code == 1009
-        await other.send(encode(control.Ping(1, 0.0), Encoding.MSGPACK))
+        await other.send(encode(Ping(1, 0.0), Encoding.MSGPACK))
         assert (await wait(other, "pong")).number == 1
         await other.close()
 
@@ -213,7 +214,7 @@ def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
         connection, other = await greeted(serving), await greeted(serving)
         with pytest.raises(ConnectionClosed):
             await ended(connection, b"\xc1")
-        await other.send(encode(control.Ping(1, 0.0), Encoding.MSGPACK))
+        await other.send(encode(Ping(1, 0.0), Encoding.MSGPACK))
         await wait(other, "pong")
         await other.close()
 

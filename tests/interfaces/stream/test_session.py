@@ -5,6 +5,7 @@ import random
 import msgspec
 import pytest
 
+from interfaces.link.round_trip import Ping, Pong
 from interfaces.messages import Ask, Follow, Form, Order, Pulse, Reply, Want
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
@@ -59,7 +60,7 @@ def test_it_is_greeted(encoding):
     assert (welcome.limits.q_min == hub.site.engine.model.limits.q_min).all()
     assert welcome.poses["nominal"].tolist() == HOME.tolist()
     assert not welcome.lease.yours
-    assert peer.tell(control.Ping(7, 3.25), now=2.0) == [control.Pong(7, 3.25, 2.0, 2.0)]
+    assert peer.tell(Ping(7, 3.25), now=2.0) == [Pong(7, 3.25, 2.0, 2.0)]
 
 
 def closed(peer, code, problem, *, now):
@@ -78,7 +79,7 @@ def test_hello_must_come_in_time():
 @pytest.mark.parametrize(
     ("message", "problem"),
     [
-        (control.Ping(1, 0.0), ProblemCode.HELLO_EXPECTED),
+        (Ping(1, 0.0), ProblemCode.HELLO_EXPECTED),
         (Order(1, to(1)), ProblemCode.HELLO_EXPECTED),
         (control.Hello(Role.ADMIN, "x"), ProblemCode.REFUSED),
         (control.Hello(Role.ADMIN, "x", "b" * 43), ProblemCode.REFUSED),
@@ -152,7 +153,7 @@ def test_rubbish_is_answered_executes_nothing_and_ends_by_closing(encoding):
     assert peer.session.closing[0] == 1008
     assert hub.site.engine.timeline is before
     assert other.session.closing is None
-    assert other.tell(control.Ping(1, 0.0), now=0.1) == [control.Pong(1, 0.0, 0.1, 0.1)]
+    assert other.tell(Ping(1, 0.0), now=0.1) == [Pong(1, 0.0, 0.1, 0.1)]
 
 
 def test_a_little_rubbish_now_and_then_is_forgiven():
@@ -164,7 +165,7 @@ def test_a_little_rubbish_now_and_then_is_forgiven():
 
 def test_text_and_bytes_are_not_mixed_up():
     hub = make_hub()
-    ping = control.Ping(1, 0.0)
+    ping = Ping(1, 0.0)
     found = Peer(hub).raw(encode(ping, Encoding.JSON).decode(), now=0.0)
     found += Peer(hub, encoding=Encoding.JSON).raw(encode(ping, Encoding.MSGPACK), now=0.0)
     assert [message.code for message in found] == [ProblemCode.MALFORMED] * 2
@@ -179,7 +180,7 @@ def test_the_largest_message():
 
 def test_too_fast_is_passed_over_told_once_a_second_and_closed():
     hub = make_hub(limits=ClientLimits(rate=100, burst=50, excess=20))
-    peer, ping = Peer(hub), encode(control.Ping(1, 0.0), Encoding.MSGPACK)
+    peer, ping = Peer(hub), encode(Ping(1, 0.0), Encoding.MSGPACK)
     for _ in range(49):
         peer.session.receive(ping, now=0.0)
     assert kinds(peer.got(now=0.0)) == ["pong"] * 49
@@ -195,7 +196,7 @@ def test_at_the_rate_nothing_is_passed_over():
     hub = make_hub(limits=ClientLimits(rate=100, burst=5, excess=20))
     peer = Peer(hub)
     for k in range(1, 1000):
-        assert kinds(peer.tell(control.Ping(k, 0.0), now=0.01001 * k)) == ["pong"]
+        assert kinds(peer.tell(Ping(k, 0.0), now=0.01001 * k)) == ["pong"]
 
 
 def test_a_viewer_commands_nothing():
@@ -309,7 +310,7 @@ def test_random_bytes_never_do_anything_else():
     rng = random.Random(5)
     hub = make_hub(limits=ClientLimits(bad=1000, rate=1e5, burst=1e5))
     other, epoch = holder(hub)
-    valid = [encode(m, Encoding.MSGPACK) for m in (Order(1, to(1), epoch), Ask(1, 0.0), control.Ping(1, 0.0),
+    valid = [encode(m, Encoding.MSGPACK) for m in (Order(1, to(1), epoch), Ask(1, 0.0), Ping(1, 0.0),
              control.Acquire(1), control.Beat(epoch), Follow(1, Form.SEGMENTS), Want(1, 0))]  # fmt: skip
     peer = Peer(hub)
     for _ in range(900):
@@ -321,7 +322,7 @@ def test_random_bytes_never_do_anything_else():
     assert peer.session.closing is None
     assert hub.site.engine.newest == 0
     assert hub.robot.log == [("began", epoch)]
-    assert other.tell(control.Ping(1, 0.0), now=0.1)[-1].kind == "pong"
+    assert other.tell(Ping(1, 0.0), now=0.1)[-1].kind == "pong"
 
 
 def test_what_many_get_is_written_once(monkeypatch):

@@ -11,6 +11,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from interfaces.link import LinkConditions
+from interfaces.link.round_trip import Ping
 from interfaces.messages import Follow, Form, Order, Want
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
@@ -223,7 +224,7 @@ def test_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
             crowd = [asyncio.create_task(viewer(url, stop, edit)) for _ in range(5)]
             for number in range(1, 101):
                 sent = time.perf_counter()
-                await socket.send(encode(control.Ping(number, 0.0), Encoding.JSON).decode())
+                await socket.send(encode(Ping(number, 0.0), Encoding.JSON).decode())
                 while '"pong"' not in str(await socket.recv())[:20]:
                     pass
                 trips.append(time.perf_counter() - sent)
