@@ -31,9 +31,9 @@ from interfaces.recording.messages import (
     segment_entries,
 )
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.stream.wire.commands import command_wire
-from interfaces.stream.wire.fields import text
 from interfaces.teleop import Correction, Deed, OperatorSite, Report, Sample
+from interfaces.wire.commands import command_wire
+from interfaces.wire.fields import text
 from vrs.commands import Profile
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status

@@ -19,9 +19,9 @@ from interfaces.recording.recorder import Recorder
 from interfaces.recording.sink import Sink
 from interfaces.runtime.happenings import correction_events
 from interfaces.software import software
-from interfaces.stream.wire import fields
 from interfaces.teleop import Correction, Deed, Report, RobotLine, Sample
 from interfaces.teleop.measured import PERIOD
+from interfaces.wire import fields
 from vrs.model import Array, RobotModel
 from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline

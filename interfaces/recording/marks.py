@@ -12,7 +12,7 @@ import numpy as np
 
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
 from interfaces.runtime.happenings import correction_text
-from interfaces.stream.wire.commands import DriveWire, MoveWire
+from interfaces.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
 from vrs.model import Array
 from vrs.receipt import Status

@@ -13,8 +13,9 @@ import numpy as np
 from msgspec import Meta
 
 from interfaces.recording.driving.messages import DriveFacts
-from interfaces.stream.wire.commands import CommandWire, ReceiptWire, command_wire
-from interfaces.stream.wire.fields import (
+from interfaces.stream.wire.segments import MOST_POWERS
+from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.wire.fields import (
     MOST_JOINTS,
     CommandId,
     Count,
@@ -28,7 +29,6 @@ from interfaces.stream.wire.fields import (
     Wire,
     Word,
 )
-from interfaces.stream.wire.segments import MOST_POWERS
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array

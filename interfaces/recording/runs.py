@@ -21,8 +21,8 @@ from interfaces.runtime.attribution import CAUSES, Attribution, Measures, Offset
 from interfaces.runtime.keeping import RunFacts, Turn
 from interfaces.runtime.run import Event, Packet, TwinRun
 from interfaces.software import software
-from interfaces.stream.wire.fields import text
 from interfaces.teleop import OperatorSite
+from interfaces.wire.fields import text
 from vrs.commands import Lateness
 from vrs.errors import FormatError
 from vrs.model import Array

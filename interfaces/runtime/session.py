@@ -20,8 +20,8 @@ from interfaces.runtime.laboratory import Body, Laboratory
 from interfaces.runtime.offset import spelled
 from interfaces.runtime.plan import PlannedCommand
 from interfaces.runtime.run import Event, Packet, TwinRun
-from interfaces.stream.wire.fields import text
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.wire.fields import text
 from vrs import Engine, Lateness, ManualClock, Receipt, Status
 from vrs.commands import Cancel, Command, InsertVia, Retime
 from vrs.errors import VrsError

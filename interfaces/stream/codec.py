@@ -17,15 +17,15 @@ from interfaces.messages import Reply, Request
 from interfaces.stream import control, mobile, network, tasks
 from interfaces.stream.control import Notice, ProblemCode, Question
 from interfaces.stream.errors import ProtocolError
-from interfaces.stream.wire import Message as Wire
 from interfaces.stream.wire import control as controls
 from interfaces.stream.wire import driving, replies, requests, sites
 from interfaces.stream.wire import network as networks
 from interfaces.stream.wire import tasks as works
-from interfaces.stream.wire.fields import check_normal, plain
 from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
+from interfaces.wire.fields import Message as Wire
+from interfaces.wire.fields import check_normal, plain
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536

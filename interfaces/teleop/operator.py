@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
-from interfaces.stream.wire.commands import check_crosses
 from interfaces.teleop.listening import Correction, Deed, Listener
 from interfaces.teleop.logged_engine import LoggedEngine, resolved
 from interfaces.teleop.measured import Gathering, Sample
 from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.wire.commands import check_crosses
 from vrs.checks import number_in
 from vrs.clock import ManualClock
 from vrs.commands import Command, Lateness, Position

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from msgspec import Meta
 
-from interfaces.stream.wire.fields import CommandId, Count, Finite, Number, Seconds, Time, Wire, Word
+from interfaces.wire.fields import CommandId, Count, Finite, Number, Seconds, Time, Wire, Word
 
 Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
 """[m]."""

@@ -25,10 +25,10 @@ from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, plac
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
 from interfaces.software import software
-from interfaces.stream.wire.fields import text
 from interfaces.teleop import Deed
 from interfaces.teleop.architectures import OperatorSite
 from interfaces.teleop.architectures.equipment import CONTROL, grid_of
+from interfaces.wire.fields import text
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture

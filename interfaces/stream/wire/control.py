@@ -9,7 +9,8 @@ from msgspec import Meta
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control
 from interfaces.stream.control import ProblemCode, Role
-from interfaces.stream.wire.fields import (
+from interfaces.stream.wire.requests import Rate
+from interfaces.wire.fields import (
     Count,
     Epoch,
     Joints,
@@ -28,7 +29,6 @@ from interfaces.stream.wire.fields import (
     numbers,
     text,
 )
-from interfaces.stream.wire.requests import Rate
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import InvalidValueError
 from vrs.model import Limits

@@ -9,7 +9,12 @@ from msgspec import Meta
 from interfaces.stream import mobile
 from interfaces.stream.control import Role
 from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
-from interfaces.stream.wire.fields import (
+from interfaces.stream.wire.tasks import ErrandForm, SightForm, TaskReportForm
+from interfaces.teleop.architectures import CellChanges, Packet, Report
+from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
+from interfaces.teleop.architectures.segments import MOST_REPEATED
+from interfaces.teleop.tasks import Doing
+from interfaces.wire.fields import (
     Count,
     Epoch,
     Message,
@@ -25,11 +30,6 @@ from interfaces.stream.wire.fields import (
     epoch,
     text,
 )
-from interfaces.stream.wire.tasks import ErrandForm, SightForm, TaskReportForm
-from interfaces.teleop.architectures import CellChanges, Packet, Report
-from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
-from interfaces.teleop.architectures.segments import MOST_REPEATED
-from interfaces.teleop.tasks import Doing
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.supervisor import CellChange
 from vrs.checks import normal

@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from interfaces.link.gauge import Measured
 from interfaces.stream import network
-from interfaces.stream.wire.fields import Count, Epoch, Message, Number, Text, Time, Wire, Word, epoch, text
+from interfaces.wire.fields import Count, Epoch, Message, Number, Text, Time, Wire, Word, epoch, text
 
 Share = Annotated[float, Meta(ge=0, le=1)]
 Span = Annotated[float, Meta(ge=0, le=1e9)]

@@ -19,22 +19,10 @@ from interfaces.messages import (
     Scene,
     Verdicts,
 )
-from interfaces.stream.wire.commands import ReceiptWire
-from interfaces.stream.wire.fields import (
-    CommandId,
-    Count,
-    Joints,
-    Message,
-    Number,
-    Text,
-    Time,
-    Word,
-    array,
-    numbers,
-    text,
-)
 from interfaces.stream.wire.requests import Rate
 from interfaces.stream.wire.segments import C, Dof, Segments, rows, segments_of
+from interfaces.wire.commands import ReceiptWire
+from interfaces.wire.fields import CommandId, Count, Joints, Message, Number, Text, Time, Word, array, numbers, text
 
 
 class OutcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="outcome"):

@@ -7,8 +7,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from interfaces.messages import Ask, Follow, Form, Order, Want
-from interfaces.stream.wire.commands import CommandWire, command_wire
-from interfaces.stream.wire.fields import Count, Epoch, Message, Number, Time, digits, epoch
+from interfaces.wire.commands import CommandWire, command_wire
+from interfaces.wire.fields import Count, Epoch, Message, Number, Time, digits, epoch
 
 Rate = Annotated[float, Meta(gt=0, le=1e4)]
 

@@ -6,8 +6,11 @@ from typing import Annotated, Generic
 
 from msgspec import Meta
 
-from interfaces.stream.wire.commands import CommandWire, ReceiptWire, command_wire
-from interfaces.stream.wire.fields import (
+from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
+from interfaces.teleop.measured import AGAIN, NEW, RANGES, Sample
+from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.wire.fields import (
     Count,
     Epoch,
     Joints,
@@ -23,9 +26,6 @@ from interfaces.stream.wire.fields import (
     numbers,
     text,
 )
-from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
-from interfaces.teleop.measured import AGAIN, NEW, RANGES, Sample
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 
 MOST_ENTRIES = 4096
 """Entries or receipts in one message, at most."""

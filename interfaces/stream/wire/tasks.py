@@ -10,20 +10,8 @@ from interfaces.jobs import Command, Forecast, JobForecast, Load, OperatorLoss
 from interfaces.jobs.forms import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
 from interfaces.stream import tasks
-from interfaces.stream.wire.fields import (
-    Count,
-    Epoch,
-    Message,
-    Number,
-    Stamp,
-    Text,
-    Wire,
-    Word,
-    digits,
-    epoch,
-    text,
-)
 from interfaces.teleop.tasks import MOST_POINTS, Doing, Errand, Go, Halt, Sight, Task, TaskReport
+from interfaces.wire.fields import Count, Epoch, Message, Number, Stamp, Text, Wire, Word, digits, epoch, text
 from robots.onboard.journey import JourneyState
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError

@@ -21,10 +21,10 @@ from interfaces.stream import control as c
 from interfaces.stream.codec import TYPES, WIRES
 from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks
-from interfaces.stream.wire.commands import ReceiptWire
-from interfaces.stream.wire.fields import MOST_NAMES
 from interfaces.teleop.architectures import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
+from interfaces.wire.commands import ReceiptWire
+from interfaces.wire.fields import MOST_NAMES
 from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
 from vrs import JointTarget, MotionCommand, PolynomialSegment

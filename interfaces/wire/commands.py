@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from interfaces.stream.wire.fields import (
+from interfaces.wire.fields import (
     MOST_NAMES,
     Count,
     Joints,
