@@ -178,6 +178,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         from interfaces.station.page import Station
         from interfaces.station.panels import MOBILE_PANELS
         from interfaces.stream.server import application
+        from interfaces.val2.val_arm import lasts
         from robots import ipr
         from robots.onboard.lease import LeaseState
 
@@ -186,6 +187,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
             model, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
             None if serving.jobs is None else JobFile(serving.jobs),
             camera=CameraConfig(serving.camera) if serving.camera else None, link_loss=serving.link_loss,
+            arm=lasts,
         )  # fmt: skip
         operator = LiveMobileOperator(config, access)
         lost.add_done_callback(partial(say_lost, operator.lose))

@@ -28,7 +28,6 @@ from interfaces.jobs.messages import (
 )
 from interfaces.jobs.progress import POLICY_SAYS, JobProgress, OperatorLoss, Progress, Stage
 from interfaces.jobs.runner import JobRunner, RunnerConfig, carried_over
-from interfaces.jobs.val_arm import ValArm, lasts
 from interfaces.jobs.values import Arm, Entry, Job, JobList, Message, Move, Voice, Wait
 
 __all__ = [
@@ -67,13 +66,11 @@ __all__ = [
     "Speaker",
     "Stage",
     "TextScreen",
-    "ValArm",
     "Voice",
     "Wait",
     "carried_over",
     "digest",
     "dry_run",
-    "lasts",
     "read_jobs",
     "speaking_time",
     "written_jobs",

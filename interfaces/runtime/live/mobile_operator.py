@@ -6,14 +6,14 @@ import asyncio
 import contextlib
 import math
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from starlette.routing import BaseRoute
 
-from interfaces.jobs import JobFile, OperatorLoss
+from interfaces.jobs import Arm, JobFile, OperatorLoss
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia
 from interfaces.runtime.live.emulation import LiveEmulation
@@ -70,6 +70,8 @@ class LiveMobileOperatorConfig:
     """The robot's camera; None for none, nor voice and screen."""
     link_loss: LossPolicy | None = None
     """What the robot is to do when the link is lost; None leaves it to the robot."""
+    arm: Callable[[Arm], float | str | None] = lambda _: None
+    """Says of a program of the list how long it takes [s], why it'd fail, or None where nobody knows."""
 
 
 class LiveMobileOperator:
@@ -102,7 +104,7 @@ class LiveMobileOperator:
             workers=self,
         )  # fmt: skip
         body = chassis("ipr"), config.model.limits
-        self.desk = TaskDesk(self.operator, config.room, body, self.hub.tell, config.jobs)
+        self.desk = TaskDesk(self.operator, config.room, body, self.hub.tell, config.jobs, config.arm)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self.drawing = MobileDrawing(config.model, start, config.room, grid_of(config.room, start))
         self._view = view_routes(self.drawing.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))

@@ -17,8 +17,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
-from interfaces.jobs import RunnerConfig, ValArm
-from interfaces.jobs.val_arm import in_a_thread
+from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.runtime.live.mobile_senses import LaserSight, NavigatorPilot
 from interfaces.runtime.live.robot_server import RobotServer
@@ -58,8 +57,8 @@ class LiveMobileConfig:
     """How its site behaves."""
     jobs: RunnerConfig = field(default_factory=RunnerConfig)
     """How it does lists of jobs, and what follows when the operator is lost."""
-    hands: Hands = field(default_factory=lambda: Hands(arm=ValArm(beside=in_a_thread())))
-    """Who speaks, shows and lets an arm work; nobody aloud, and a virtual arm, unless given."""
+    hands: Hands = field(default_factory=Hands)
+    """Who speaks, shows and lets an arm work; nobody aloud, and no arm, unless given."""
     position: str = ""
     """What tells it where it is: a name of `interfaces.teleop.architectures.equipment.POSITIONS`. Unless given, its
     laser where the map has walls or other blocks for it to see, else the camera."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Final
 
 from interfaces.jobs import (
+    Arm,
     Command,
     Forecast,
     JobFile,
@@ -20,7 +21,6 @@ from interfaces.jobs import (
     carried_over,
     digest,
     dry_run,
-    lasts,
     written_jobs,
 )
 from interfaces.jobs.runner import EMPTY, RUNS
@@ -59,6 +59,7 @@ class TaskDesk:
         body: tuple[Chassis, DriveLimits],
         tell: Callable[[News], None],
         file: JobFile | None = None,
+        arm: Callable[[Arm], float | str | None] = lambda _: None,
     ) -> None:
         """Take up the list as it was saved.
 
@@ -68,9 +69,10 @@ class TaskDesk:
             body: What it is, and how fast it drives.
             tell: Lets every client know.
             file: Where the list is kept; nowhere unless given.
+            arm: Says how long a program takes [s], why it'd fail, or None where nobody knows; see `dry_run`.
         """
         self._operator, self._room, self._body, self._tell = operator, room, body, tell
-        self._file = file
+        self._file, self._arm = file, arm
         self.problem = ""
         """What is wrong with the file; empty if nothing is."""
         jobs, progress = self._loaded()
@@ -165,7 +167,7 @@ class TaskDesk:
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
         if self._roads is None:
             self._roads = route_map(self._room, self._body[0])
-        return dry_run(jobs, posture, self._roads, self._body[1], arm=lasts)
+        return dry_run(jobs, posture, self._roads, self._body[1], arm=self._arm)
 
     @property
     def _doing(self) -> Doing:

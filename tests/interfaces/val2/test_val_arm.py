@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from interfaces.jobs import Arm, Command, JobList, Load, Stage, ValArm, Wait, lasts
-from interfaces.jobs.val_arm import in_a_thread
+from interfaces.jobs import Arm, Command, JobList, Load, Stage, Wait
 from interfaces.teleop.tasks import Doing
+from interfaces.val2.val_arm import ValArm, in_a_thread, lasts
 from robots import puma560
 from tests.interfaces.teleop.driving.rig import Rig
 
