@@ -11,7 +11,7 @@ from interfaces.recording.export import tables, write_csv
 from interfaces.recording.figures import summary
 from interfaces.recording.rerun import rerun
 from interfaces.recording.runs import RunRecorder
-from interfaces.report.summary import summarize
+from interfaces.runs.summary import summarize
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins

@@ -56,7 +56,7 @@ def compare(
     from interfaces.recording.figures import differences
     from interfaces.recording.kinds import check_alike
     from interfaces.recording.recording import open_recording
-    from interfaces.report.summary import to_json
+    from interfaces.runs.summary import to_json
 
     with ExitStack() as stack:
         opened = [stack.enter_context(open_recording(path)) for path in (recording, other) if path is not None]

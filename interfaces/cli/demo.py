@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from interfaces.link import DelayProfile, Service
     from interfaces.recording.runs import RunRecorder
-    from interfaces.runtime import TwinRun
-    from interfaces.runtime.attribution import Attribution, OffsetOutcome
+    from interfaces.runs.attribution import Attribution, OffsetOutcome
+    from interfaces.runs.twin_run import TwinRun
     from interfaces.runtime.plan import Plan
     from vrs.model import RobotModel
 
@@ -48,8 +48,8 @@ def demo(
     """Run virtual and real robot on one plan across an emulated internet, and compare them."""
     from interfaces.link import Conditions, delay_profile
     from interfaces.recording.runs import RunRecorder
-    from interfaces.report.summary import summarize
-    from interfaces.runtime.offset import fixed_offset
+    from interfaces.runs.offset import fixed_offset
+    from interfaces.runs.summary import summarize
     from interfaces.runtime.plan import default_plan, read_plan
     from robots import puma560
 
@@ -120,9 +120,10 @@ def explained(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    from interfaces.runtime import TwinRun
-    from interfaces.runtime.attribution import CAUSES, attribute, measures, offset_outcome, run_without
-    from interfaces.runtime.offset import FIXED, fixed_offset, spelled
+    from interfaces.runs.attribution import CAUSES, attribute, measures
+    from interfaces.runs.offset import FIXED, fixed_offset, spelled
+    from interfaces.runs.twin_run import TwinRun
+    from interfaces.runtime.attribution import offset_outcome, run_without
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), redirect_stdout=False) as bar:
@@ -172,7 +173,7 @@ def write(summary: dict[str, Any], run: TwinRun, out: Path) -> str:
         FormatError: If they can't be written.
     """
     from interfaces.report.html import write_report
-    from interfaces.report.summary import to_json
+    from interfaces.runs.summary import to_json
 
     text = to_json(summary)
     try:

@@ -50,9 +50,9 @@ def run(
     """
     from interfaces.link import Conditions, delay_profile
     from interfaces.recording.runs import RunRecorder
-    from interfaces.report.summary import summarize
+    from interfaces.runs.offset import fixed_offset
+    from interfaces.runs.summary import summarize
     from interfaces.runtime.bodies import simulated_puma
-    from interfaces.runtime.offset import fixed_offset
     from interfaces.val2.playing import Listeners
     from interfaces.val2.twins import play
     from robots import puma560

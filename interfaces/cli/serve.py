@@ -156,8 +156,8 @@ def serve(
     from interfaces.recording.live import RATE, LiveRecording
     from interfaces.recording.messages import OWN
     from interfaces.recording.sink import Sink
+    from interfaces.runs.offset import fixed_offset, spelled
     from interfaces.runtime.ages import late_often, too_slow
-    from interfaces.runtime.offset import fixed_offset, spelled
     from interfaces.runtime.physics_messages import BodyKind
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role

@@ -119,7 +119,7 @@ class Arm(Kind):
         """See `Kind`."""
         from interfaces.recording.figures import figures
         from interfaces.report.html import render
-        from interfaces.report.summary import summarize
+        from interfaces.runs.summary import summarize
 
         found = figures(recording)
         return render(found.run, summarize(found.run, found.attributions, found.offsets)), found.missing

@@ -15,12 +15,11 @@ from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, rerun
 from interfaces.recording.runs import extras_of
 from interfaces.recording.track import GAP, REAL, Track, gap_lengths, not_measured
-from interfaces.report.summary import Json, summarize
-from interfaces.runtime.attribution import Attribution, OffsetOutcome
-from interfaces.runtime.happenings import waits
-from interfaces.runtime.offset import ADAPTIVE
-from interfaces.runtime.run import Event, Packet, Samples, TwinRun
-from interfaces.runtime.session import carried_out
+from interfaces.runs.attribution import Attribution, OffsetOutcome
+from interfaces.runs.events import waits
+from interfaces.runs.offset import ADAPTIVE
+from interfaces.runs.summary import Json, summarize
+from interfaces.runs.twin_run import Event, Packet, Samples, TwinRun, carried_out
 from interfaces.teleop import Correction
 from robots.onboard.playout import PlayoutConfig
 from vrs.errors import FormatError

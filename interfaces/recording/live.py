@@ -17,7 +17,7 @@ from interfaces.recording.messages import Begin, End, EventEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.recording.sink import Sink
-from interfaces.runtime.happenings import correction_events
+from interfaces.runs.events import correction_events
 from interfaces.software import software
 from interfaces.teleop import Correction, Deed, Report, RobotLine, Sample
 from interfaces.teleop.measured import PERIOD

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
-from interfaces.runtime.happenings import correction_text
+from interfaces.runs.events import correction_text
 from interfaces.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
 from vrs.model import Array
@@ -21,7 +21,7 @@ from vrs.timeline import Timeline
 if TYPE_CHECKING:
     from interfaces.recording.history import AnyTimeline, RecordedEdit
     from interfaces.recording.recording import Recording
-    from interfaces.runtime.run import Event
+    from interfaces.runs.twin_run import Event
 
 CHANGED: Final = 1e-9
 """A predicted position that is off by more [rad] was falsified."""

@@ -234,7 +234,7 @@ class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receip
 
 
 class PacketEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
-    """A command on its way across the link, as `interfaces.runtime.run.Packet`."""
+    """A command on its way across the link, as `interfaces.runs.twin_run.Packet`."""
 
     number: Number
     """Place in the order of sending, from 1."""
@@ -315,7 +315,7 @@ class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
 
 
 class EventEntry(Wire, frozen=True, omit_defaults=True, gc=False):
-    """Something that happened, as `interfaces.runtime.run.Event`."""
+    """Something that happened, as `interfaces.runs.twin_run.Event`."""
 
     t: Time
     kind: Word

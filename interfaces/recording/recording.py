@@ -32,7 +32,7 @@ from interfaces.recording.messages import (
 from interfaces.recording.scan import NUMBERS, Blocks
 from interfaces.recording.source import Source
 from interfaces.recording.track import Track, Tracks
-from interfaces.runtime.run import Event, Packet
+from interfaces.runs.twin_run import Event, Packet
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.receipt import Receipt

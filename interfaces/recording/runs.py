@@ -17,9 +17,9 @@ from interfaces.recording.messages import Begin, End, EventEntry, PacketEntry, R
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
-from interfaces.runtime.attribution import CAUSES, Attribution, Measures, OffsetOutcome
-from interfaces.runtime.keeping import RunFacts, Turn
-from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.runs.attribution import CAUSES, Attribution, Measures, OffsetOutcome
+from interfaces.runs.keeper import RunFacts, Turn
+from interfaces.runs.twin_run import Event, Packet, TwinRun
 from interfaces.software import software
 from interfaces.teleop import OperatorSite
 from interfaces.wire.fields import text

@@ -14,7 +14,7 @@ from interfaces.lab.driving.pictures import of_drives
 from interfaces.lab.driving.run import DriveRun
 from interfaces.report.driven import FIGURES, shown
 from interfaces.report.markup import card, table
-from interfaces.runtime.run import Event
+from interfaces.runs.twin_run import Event
 
 FACTS: Final = ("architecture", "transport", "delay", "robot", "operator", "seed")
 """What a run is, of its summary."""

@@ -14,7 +14,7 @@ from typing import Any
 from interfaces.report.markup import card, figures, receipts, table, tiles, words
 from interfaces.report.plots import Plot, plots
 from interfaces.report.scene import scene
-from interfaces.runtime.run import TwinRun
+from interfaces.runs.twin_run import TwinRun
 from interfaces.view_parts import viewer_bundle
 
 
@@ -24,7 +24,7 @@ def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> 
     Args:
         path: The file to write.
         run: Both twins.
-        summary: Its figures, as `interfaces.report.summary.summarize` gives them.
+        summary: Its figures, as `interfaces.runs.summary.summarize` gives them.
 
     Raises:
         FormatError: If the installed MeshCat has no viewer bundle.

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from interfaces.lab.driving.run import DriveRun
-from interfaces.runtime.run import TwinRun
+from interfaces.runs.twin_run import TwinRun
 
 MOST_SAMPLES: Final = 1200
 """Of each robot, in the picture of a drive."""
@@ -39,7 +39,7 @@ def inline_report(run: TwinRun, *, height: int = 760) -> Framed:
         height: Of the frame [px].
     """
     from interfaces.report.html import render
-    from interfaces.report.summary import summarize
+    from interfaces.runs.summary import summarize
 
     return Framed(render(run, summarize(run)), height)
 

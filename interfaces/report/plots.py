@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.runtime.run import TwinRun
+from interfaces.runs.twin_run import TwinRun
 from vrs.model import Array
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.runtime.run import TwinRun
+from interfaces.runs.twin_run import TwinRun
 from interfaces.view_parts import link_shapes
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel

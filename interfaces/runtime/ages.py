@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from interfaces.link import LinkConditions
-from interfaces.runtime.offset import QUANTILE
+from interfaces.runs.offset import QUANTILE
 
 
 def too_slow(conditions: LinkConditions, max_age: float) -> str:

@@ -7,24 +7,22 @@ and its body follows at 1 kHz.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from interfaces.link import LinkConditions, PacketRecord
-from interfaces.runtime.happenings import command_events, correction_events, waits
-from interfaces.runtime.keeping import RunFacts, RunKeeper, Turn
+from interfaces.runs.events import command_events, correction_events, waits
+from interfaces.runs.keeper import RunFacts, RunKeeper, Turn
+from interfaces.runs.offset import spelled
+from interfaces.runs.twin_run import Event, Packet, TwinRun, commands_alone
 from interfaces.runtime.laboratory import Body, Laboratory
-from interfaces.runtime.offset import spelled
 from interfaces.runtime.plan import PlannedCommand
-from interfaces.runtime.run import Event, Packet, TwinRun
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from interfaces.wire.fields import text
-from vrs import Engine, Lateness, ManualClock, Receipt, Status
-from vrs.commands import Cancel, Command, InsertVia, Retime
-from vrs.errors import VrsError
+from vrs import Lateness, Receipt
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
@@ -289,42 +287,3 @@ class TwinSession:
 
 def unheard(t: float) -> None:
     """Report no progress."""
-
-
-def commands_alone(
-    model: RobotModel,
-    start: Array,
-    sent: Iterable[tuple[float, Command | None, Receipt | None]],
-    *,
-    now: float = 0.0,
-) -> Timeline:
-    """What commands make of a virtual robot that nothing corrects.
-
-    Args:
-        model: The robot.
-        start: Joints at the start [rad], (n,).
-        sent: What the engine that was corrected took: when [s], the command (None for an undo), and its receipt.
-        now: When that engine began [s].
-    """
-    clock = ManualClock(now)
-    engine = Engine(model, q=start, clock=clock, lateness=Lateness.POSTPONE)
-    return carried_out(engine, clock, sent)
-
-
-def carried_out(
-    engine: Engine, clock: ManualClock, sent: Iterable[tuple[float, Command | None, Receipt | None]]
-) -> Timeline:
-    """What commands make of an engine; see `commands_alone`."""
-    for at, command, receipt in sent:
-        clock.set(at)
-        # Edits name commands by the ids that these got, and some ids were given to what was refused.
-        if command is not None and receipt is not None and not isinstance(command, Retime | Cancel | InsertVia):
-            engine.count_from(receipt.command_id - 1)
-        with suppress(VrsError):
-            engine.undo() if command is None else engine.execute(command)  # type: ignore[arg-type]
-    return engine.timeline
-
-
-def status_counts(receipts: tuple[Receipt, ...]) -> dict[str, int]:
-    """How many receipts there are of each status."""
-    return {str(status): sum(r.status is status for r in receipts) for status in Status}

@@ -8,10 +8,10 @@ Zikos, Delopoulos, section IV-A): commands that take longer are then postponed.
 from __future__ import annotations
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
-from interfaces.runtime.keeping import RunKeeper
-from interfaces.runtime.offset import QUANTILE
+from interfaces.runs.keeper import RunKeeper
+from interfaces.runs.offset import QUANTILE
+from interfaces.runs.twin_run import TwinRun
 from interfaces.runtime.plan import Plan, PlannedMotion
-from interfaces.runtime.run import TwinRun
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from vrs import Receipt, Status
 from vrs.model import RobotModel

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
-from interfaces.runtime.keeping import RunKeeper
-from interfaces.runtime.offset import QUANTILE
+from interfaces.runs.keeper import RunKeeper
+from interfaces.runs.offset import QUANTILE
+from interfaces.runs.twin_run import TwinRun
 from interfaces.runtime.plan import Plan, PlannedMotion, PlannedPayload
-from interfaces.runtime.run import TwinRun
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot

@@ -13,9 +13,9 @@ import pytest
 from interfaces.report.html import render, write_report
 from interfaces.report.plots import plots
 from interfaces.report.scene import revolute_chain, scene
-from interfaces.report.summary import summarize
 from interfaces.report.tables import time_lines
-from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.runs.summary import summarize
+from interfaces.runs.twin_run import Event, Packet, TwinRun
 from interfaces.teleop import Correction
 from robots import puma560
 from vrs.model import Array

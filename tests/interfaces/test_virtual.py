@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from interfaces.link import Service, delay_profile
-from interfaces.report.summary import summarize, to_json
-from interfaces.runtime.attribution import CAUSES, Measures, attribute, measures, run_without
+from interfaces.runs.attribution import CAUSES, Measures, attribute, measures
+from interfaces.runs.offset import fixed_offset
+from interfaces.runs.summary import summarize, to_json
+from interfaces.runtime.attribution import run_without
 from interfaces.runtime.bodies import exact_arm, simulated_puma
-from interfaces.runtime.offset import fixed_offset
 from interfaces.runtime.plan import default_plan, parse_plan
 from interfaces.runtime.virtual import run_twins
 from robots import puma560

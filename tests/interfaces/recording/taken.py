@@ -12,10 +12,10 @@ from interfaces.recording.capture import Capture
 from interfaces.recording.messages import Begin, End
 from interfaces.recording.runs import RunRecorder
 from interfaces.recording.writer import RecordingWriter
+from interfaces.runs.offset import fixed_offset
+from interfaces.runs.twin_run import TwinRun
 from interfaces.runtime.bodies import exact_arm
-from interfaces.runtime.offset import fixed_offset
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.run import TwinRun
 from interfaces.runtime.virtual import run_twins
 from interfaces.software import software
 from interfaces.teleop import OperatorSite, PlanPart, Report

@@ -18,11 +18,11 @@ from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.runs import RunRecorder
 from interfaces.recording.track import REAL, VIRTUAL
-from interfaces.report.summary import summarize, to_json
+from interfaces.runs.keeper import RunFacts, Turn
+from interfaces.runs.summary import summarize, to_json
+from interfaces.runs.twin_run import Event
 from interfaces.runtime.bodies import exact_arm
-from interfaces.runtime.keeping import RunFacts, Turn
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.run import Event
 from interfaces.runtime.virtual import run_twins
 from interfaces.teleop import OperatorSite
 from tests.interfaces.recording import shown

@@ -16,7 +16,7 @@ from interfaces.recording import messages as m
 from interfaces.recording.export import tables, write_csv, write_parquet
 from interfaces.recording.recording import open_recording
 from interfaces.report.html import render
-from interfaces.report.summary import summarize, to_json
+from interfaces.runs.summary import summarize, to_json
 from tests.interfaces.recording import recorded
 from tests.interfaces.recording.taken import MODEL, taken
 from vrs import JointTarget, MotionCommand

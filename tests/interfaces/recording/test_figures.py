@@ -14,11 +14,11 @@ from interfaces.recording.figures import differences, figures, summary, twin_run
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.runs import RunRecorder, extras_of
-from interfaces.report.summary import summarize, to_json
-from interfaces.runtime.attribution import Attribution, OffsetOutcome
+from interfaces.runs.attribution import Attribution, OffsetOutcome
+from interfaces.runs.summary import summarize, to_json
+from interfaces.runs.twin_run import commands_alone
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import commands_alone
 from interfaces.runtime.virtual import run_twins
 from interfaces.teleop import OperatorSite
 from interfaces.val2.source import parse_file

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from interfaces.link import PacketRecord
-from interfaces.runtime.run import Event, Packet, TwinRun
+from interfaces.runs.twin_run import Event, Packet, TwinRun
 from interfaces.teleop import OperatorSite
 from vrs.model import Array, RobotModel
 

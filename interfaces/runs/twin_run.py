@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.teleop import Correction
-from vrs.errors import InvalidValueError
+from vrs.clock import ManualClock
+from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
+from vrs.engine import Engine
+from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.path_matching import measured_rows
 from vrs.receipt import Receipt
+from vrs.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,3 +153,37 @@ class TwinRun:
     def D(self) -> Array:
         """Clock offset of the real robot, play time less user time [s], (k,)."""
         return self.play - self.t
+
+
+def commands_alone(
+    model: RobotModel,
+    start: Array,
+    sent: Iterable[tuple[float, Command | None, Receipt | None]],
+    *,
+    now: float = 0.0,
+) -> Timeline:
+    """What commands make of a virtual robot that nothing corrects.
+
+    Args:
+        model: The robot.
+        start: Joints at the start [rad], (n,).
+        sent: What the engine that was corrected took: when [s], the command (None for an undo), and its receipt.
+        now: When that engine began [s].
+    """
+    clock = ManualClock(now)
+    engine = Engine(model, q=start, clock=clock, lateness=Lateness.POSTPONE)
+    return carried_out(engine, clock, sent)
+
+
+def carried_out(
+    engine: Engine, clock: ManualClock, sent: Iterable[tuple[float, Command | None, Receipt | None]]
+) -> Timeline:
+    """What commands make of an engine; see `commands_alone`."""
+    for at, command, receipt in sent:
+        clock.set(at)
+        # Edits name commands by the ids that these got, and some ids were given to what was refused.
+        if command is not None and receipt is not None and not isinstance(command, Retime | Cancel | InsertVia):
+            engine.count_from(receipt.command_id - 1)
+        with suppress(VrsError):
+            engine.undo() if command is None else engine.execute(command)  # type: ignore[arg-type]
+    return engine.timeline

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from interfaces.runtime.run import Event, Packet
+from interfaces.runs.twin_run import Event, Packet
 from interfaces.teleop import Correction
 from vrs.model import Array
 from vrs.receipt import Receipt, Status

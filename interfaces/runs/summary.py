@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from interfaces.runtime.attribution import CAUSES, Attribution, OffsetOutcome
-from interfaces.runtime.run import TwinRun
-from interfaces.runtime.session import status_counts
+from interfaces.runs.attribution import CAUSES, Attribution, OffsetOutcome
+from interfaces.runs.twin_run import TwinRun
 from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
 from vrs.model import Array
-from vrs.receipt import Receipt
+from vrs.receipt import Receipt, Status
 
 SCHEMA = "vrs-summary/1"
 DIGITS = 9
@@ -103,6 +102,11 @@ def summarize(
 def to_json(summary: Json) -> str:
     """Write a summary: sorted keys, two spaces, a final newline; equal values give equal bytes."""
     return json.dumps(summary, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def status_counts(receipts: tuple[Receipt, ...]) -> dict[str, int]:
+    """How many receipts there are of each status."""
+    return {str(status): sum(r.status is status for r in receipts) for status in Status}
 
 
 def _commands(run: TwinRun) -> Json:
