@@ -76,7 +76,8 @@ def whole_runs(length: float = 60.0, rounds: int = 3) -> dict[str, float]:
 
     Of the time of the whole run: it goes on after the operator stopped.
     """
-    from interfaces.lab.driving.run import Case, run
+    from interfaces.lab.driving.run import run
+    from interfaces.runs.drive_run import Case
     from interfaces.teleop.architectures import ARCHITECTURES, Transport
 
     found: dict[str, list[float]] = {}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import Case
 
 for architecture, transport in (
     ("II", "stream"),

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
 from interfaces.recording import open_recording
 from interfaces.recording.driving.figures import summary
 from interfaces.recording.driving.recorder import DriveRecorder
 from interfaces.recording.playback import Playback
 from interfaces.recording.rerun import rerun
+from interfaces.runs.drive_run import Case
 from interfaces.teleop.architectures import Transport
 
 CASE = Case("timeline", Transport.DATAGRAMS, "wed@3.3", robot="bare", operator="slalom", length=20.0)

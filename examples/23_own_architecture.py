@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import Case
 from interfaces.teleop.architectures import Constants, Packet
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.mobile import wrapped

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import Case
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.mobile import clipped
 

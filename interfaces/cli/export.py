@@ -49,7 +49,9 @@ def export(
 
 
 def _report(recording: Recording, path: Path) -> None:
-    text, missing = recording.kind.report(recording)
+    from interfaces.report.recorded import render
+
+    text, missing = render(recording)
     for line in missing:
         typer.echo(f"vrs: {recording.path.name}: missing: {line}", err=True)
     try:

@@ -130,9 +130,9 @@ def lab(
     from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
     from interfaces.lab.driving.pictures import drawn, pictures
     from interfaces.lab.driving.recorded import Kept, measure_recorded, paths
-    from interfaces.lab.driving.run import ROBOTS
     from interfaces.lab.driving.sweep import cases
     from interfaces.link.profiles import delay_profile
+    from interfaces.runs.drive_run import ROBOTS
     from interfaces.teleop.architectures import Constants, Transport, controller
     from interfaces.teleop.architectures.equipment import POSITIONS
     from robots.onboard.driving import Posture

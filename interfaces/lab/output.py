@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from interfaces.lab.claims import Cell, Claim, Figure, Reproduction, interval_said, said
+from interfaces.runs.drive_row import DIGITS
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 SCHEMA = "vrs-reproduction/1"
-DIGITS = 6
-"""Significant digits of what was measured."""
 
 
 def to_json(reproduction: Reproduction) -> str:

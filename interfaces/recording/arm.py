@@ -115,15 +115,6 @@ class Arm(Kind):
 
         return summary(recording)
 
-    def report(self, recording: Recording) -> tuple[str, tuple[str, ...]]:
-        """See `Kind`."""
-        from interfaces.recording.figures import figures
-        from interfaces.report.html import render
-        from interfaces.runs.summary import summarize
-
-        found = figures(recording)
-        return render(found.run, summarize(found.run, found.attributions, found.offsets)), found.missing
-
     def tables(self, recording: Recording) -> tuple[Table, ...]:
         """See `Kind`."""
         from interfaces.recording.export import arm_tables

@@ -99,14 +99,6 @@ class Kind(ABC):
         """
 
     @abstractmethod
-    def report(self, recording: Recording) -> tuple[str, tuple[str, ...]]:
-        """The run's report as HTML from its recording alone, and what isn't in the recording.
-
-        Raises:
-            FormatError: If the recording has too little of it.
-        """
-
-    @abstractmethod
     def tables(self, recording: Recording) -> tuple[Table, ...]:
         """What is exported.
 

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.driving.pictures import of_drives
-from interfaces.lab.driving.run import DriveRun
 from interfaces.report.driven import FIGURES, shown
 from interfaces.report.markup import card, table
+from interfaces.runs.drive_run import DriveRun
 from interfaces.runs.twin_run import Event
 
 FACTS: Final = ("architecture", "transport", "delay", "robot", "operator", "seed")

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.driving.run import DriveRun
+from interfaces.runs.drive_run import DriveRun
 from interfaces.runs.twin_run import TwinRun
 
 MOST_SAMPLES: Final = 1200

@@ -9,8 +9,9 @@ from typer.testing import CliRunner
 
 from interfaces.cli.main import app
 from interfaces.lab.driving.operators import operator
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
 from interfaces.plugin import is_own
+from interfaces.runs.drive_run import Case
 from interfaces.teleop.architectures import Constants, controller
 from robots.onboard.driving import STAND, Posture
 from vrs.errors import FormatError, InvalidValueError

@@ -12,7 +12,8 @@ from itertools import pairwise
 from typing import Final
 
 from interfaces.lab.driving.operators import operator
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import Case
 from interfaces.teleop.architectures.equipment import SENSING
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import place

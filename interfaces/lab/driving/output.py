@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from interfaces.lab.driving.attribution import CAUSES, Attribution
-from interfaces.lab.driving.run import Case
-from interfaces.lab.driving.sweep import METRICS, Group, Row, grouped, paired
-from interfaces.lab.output import DIGITS, write_files
+from interfaces.lab.driving.sweep import Group, grouped, paired
+from interfaces.lab.output import write_files
 from interfaces.lab.statistics import LEVEL, RANGE, Estimate
+from interfaces.runs.drive_row import COLUMNS, KEYS, METRICS, Row, cell, values_of
+from interfaces.runs.drive_run import Case
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -23,41 +24,19 @@ if TYPE_CHECKING:
     from interfaces.lab.claims import Figure
 
 SCHEMA = "vrs-lab/1"
-KEYS = ("architecture", "transport", "delay", "robot", "operator")
-COLUMNS = (*KEYS, "seed", *METRICS, "collisions", "limits_passed", "sent_bytes", "longest_delay")
-"""Of runs.csv; lengths in metres, times in seconds, speeds in m/s. An empty cell is undefined."""
 HEADS = {"localization": "locali-\nzation", "environment": "environ-\nment"}
 COMPARED = ("path_error_max", "path_error_mean", "time_difference_mean", "speed_error")
 
 
-def _cell(value: float | int | str | None) -> str:
-    if value is None:
-        return ""
-    return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
-
-
 def _row(row: Row) -> list[str]:
-    return [_cell(value) for value in _values(row)]
-
-
-def _values(row: Row) -> list[Any]:
-    """What stands in the columns."""
-    metrics = (getattr(row.metrics, name) for name in METRICS)
-    rest = row.collisions, row.limits_passed, row.sent_bytes, row.longest_delay
-    return [*row.group, row.seed, *metrics, *rest]
-
-
-def facts_of(row: Row) -> dict[str, Any]:
-    """A row of runs.csv as JSON takes it, by the names of its columns: the very digits that stand there."""
-    shown = [float(_cell(value)) if isinstance(value, float) else value for value in _values(row)]
-    return dict(zip(COLUMNS, shown, strict=True))
+    return [cell(value) for value in values_of(row)]
 
 
 def _estimate(found: Estimate | None) -> dict[str, Any] | None:
     """A figure with its interval; `level` only where that isn't 95 %, null of a range."""
     if found is None:
         return None
-    value: dict[str, Any] = {name: float(_cell(getattr(found, name))) for name in ("value", "low", "high")}
+    value: dict[str, Any] = {name: float(cell(getattr(found, name))) for name in ("value", "low", "high")}
     return value if found.level == LEVEL else value | {"level": found.level}
 
 
@@ -80,7 +59,7 @@ def attributions(chosen: Sequence[Case], found: Sequence[tuple[Attribution, ...]
 
 
 def _mean(values: Sequence[float]) -> float:
-    return float(_cell(math.fsum(values) / len(values)))
+    return float(cell(math.fsum(values) / len(values)))
 
 
 def causes_table(causes: Sequence[dict[str, Any]]) -> RichTable:
@@ -135,7 +114,7 @@ def _group(group: Group) -> dict[str, Any]:
         "limits_passed": sum(row.limits_passed for row in group.rows),
         "mean": {name: _estimate(group.mean(name)) for name in METRICS},
         "median": {name: _estimate(group.median(name)) for name in METRICS},
-        "largest": {name: float(_cell(max(found))) if (found := group.values(name)) else None for name in METRICS},
+        "largest": {name: float(cell(max(found))) if (found := group.values(name)) else None for name in METRICS},
     }
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, REAL, VIRTUAL, draw, legend
-from interfaces.lab.driving.run import Case, DriveRun
+from interfaces.runs.drive_run import Case, DriveRun
 from vrs.path_matching import PathMatch
 
 if TYPE_CHECKING:

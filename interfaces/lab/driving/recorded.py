@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from interfaces.lab.driving.run import Case, DriveRun, run
-from interfaces.lab.driving.sweep import Row, row_of
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_row import Row, row_of
+from interfaces.runs.drive_run import Case, DriveRun
 
 FOLDER: Final = "runs"
 """Where recordings are, below the results."""

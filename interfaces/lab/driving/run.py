@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Protocol, TypeAlias
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,12 +11,10 @@ from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.link import Link
 from interfaces.link.profiles import delay_profile
+from interfaces.runs.drive_run import Case, DriveLink, DriveRun, Witness
 from interfaces.teleop.architectures import (
-    Constants,
     OperatorSite,
-    Packet,
     Player,
-    Report,
     RobotSite,
     Transport,
     controller,
@@ -34,14 +31,10 @@ from robots.bullet.rooms import Room
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.parameters import IPR_LIMITS
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import PLACES, Collision, MobileRobot
+from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import STAND, Posture
 from robots.onboard.laser import LaserModel
-from vrs.checks import number_in, one_of
-from vrs.comparison import PathComparison, summed_up
 from vrs.model import Array
-from vrs.path_matching import PathMatch, match_paths
 
 AFTER = 5.0
 """A run goes on for the largest delay and this after the operator stopped [s]."""
@@ -51,97 +44,6 @@ _LEARNED = round(0.5 / CONTROL)
 """The virtual environment is recorded each so many control periods."""
 LONGEST_WAIT = 600.0
 """But never longer than this [s]."""
-ROBOTS = ("ipr", "micro", "bare")
-"""Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""
-DriveLink: TypeAlias = Link[Packet, Report]
-"""What is between both sites."""
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """What is run."""
-
-    architecture: str = "timeline"
-    transport: Transport = Transport.DATAGRAMS
-    delay: str = "mon"
-    """Profile of either direction, as the command line spells it."""
-    robot: str = "ipr"
-    """`ipr`, `micro` (PyBullet) or `bare`."""
-    operator: str = "mixed"
-    seed: int = 0
-    length: float = 120.0
-    """For how long the operator drives [s], in [1, 3600]."""
-    constants: Constants = field(default_factory=Constants)
-    reality: MobileReality | None = None
-    """Of the real robot; all of it unless given."""
-    room: str | Room = ""
-    """Where it drives, a room or a name of `robots.ipr.robot.PLACES`; the operator's own unless given."""
-    position: str = "fused"
-    """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
-    of its room), `odometry`, or the `truth`."""
-
-    @property
-    def group(self) -> tuple[str, str, str, str, str]:
-        """Architecture, transport, delay, robot and operator: what it's one of several seeds of."""
-        return self.architecture, self.transport.value, self.delay, self.robot, self.operator
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
-        one_of("robot", self.robot, ROBOTS)
-        one_of("position", self.position, POSITIONS)
-        if isinstance(self.room, str):
-            one_of("room", self.room, ("", *PLACES))
-        number_in("length", self.length, 1.0, 3600.0, unit=" s")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DriveRun:
-    """What happened in a run."""
-
-    case: Case
-    t: Array
-    """Times [s], (k,)."""
-    virtual: Array
-    """Postures of the virtual robot, without corrections, (k, 3)."""
-    real: Array
-    """True postures of the real robot, (k, 3)."""
-    measured: Array
-    """Postures that the real robot took itself to be at, (k, 3)."""
-    estimated: Array
-    """Postures that the operator's site thought the real robot would come to, as of the last command, (k, 3)."""
-    drives: Array
-    """What the real robot was told, v and ω, (k, 2)."""
-    offset: Array
-    """D [s], (k,); NaN where the architecture has none."""
-    delays: Array
-    """When each packet was sent and how long it took [s], (p, 2)."""
-    touched: tuple[Collision, ...]
-    """What the real robot ran into, or who into it."""
-    sent_bytes: int
-    reported_bytes: int
-    """What the real robot sent back."""
-    learned: tuple[tuple[float, tuple[tuple[int, int], ...]], ...]
-    """Cells that the virtual environment had beside the known map, each half second; empty without one."""
-
-    @property
-    def collisions(self) -> int:
-        """How many there were."""
-        return len(self.touched)
-
-    def limits_passed(self) -> int:
-        """How many drives were beyond the robot's limits of speed and acceleration."""
-        limits, slack = IPR_LIMITS, 1 + 1e-9
-        v, w = self.drives.T
-        rise = np.abs(np.diff(v, prepend=0.0)) > limits.a_max * CONTROL * slack + 1e-12
-        return int(np.sum(rise | (np.abs(v) > limits.v_max * slack) | (np.abs(w) > limits.w_max * slack)))
-
-    def match(self) -> PathMatch:
-        """The real robot's path matched to the virtual one's."""
-        return match_paths(self.t, self.virtual[:, :2], self.real[:, :2])
-
-    def compare(self) -> PathComparison:
-        """How far the twins were apart."""
-        return summed_up(self.match())
 
 
 def make_robot(case: Case, start: Posture, room: str | Room) -> MobileRobot:
@@ -182,16 +84,6 @@ def run(case: Case, driver: Operator | None = None, witness: Witness | None = No
     )
     with make_robot(case, driver.start, case.room or driver.room) as body:
         return _Run(case, driver, link, body, witness).whole()
-
-
-class Witness(Protocol):
-    """Who notes what happens in a run, and changes nothing of it."""
-
-    def begun(self, case: Case, start: Posture, body: MobileRobot, site: OperatorSite, link: DriveLink) -> None:
-        """The run begins; the site and the link tell those who listen."""
-
-    def sent(self, direction: str, now: float, size: int) -> None:
-        """A packet of so many bytes goes `forward` or `backward` now [s]."""
 
 
 class _Run:

@@ -3,61 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from interfaces.lab.driving.run import Case, DriveRun, run
+from interfaces.lab.driving.run import run
 from interfaces.lab.pool import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
+from interfaces.runs.drive_row import Row, row_of
+from interfaces.runs.drive_run import Case
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 
-METRICS = tuple(item.name for item in fields(PathComparison))
-"""Names of the metrics, as in files."""
 LEAST_PROGRESS = 0.97
 """Below it the means of a run aren't compared: what a robot never reached has no delay."""
 EQUAL = 0.10
 """Figures nearer than this share are called equal."""
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A run, in figures."""
-
-    architecture: str
-    transport: str
-    delay: str
-    robot: str
-    operator: str
-    seed: int
-    metrics: PathComparison
-    collisions: int
-    limits_passed: int
-    """Drives beyond a limit."""
-    sent_bytes: int
-    longest_delay: float
-    """Of a packet that was sent while the operator drove [s]."""
-
-    @property
-    def group(self) -> tuple[str, ...]:
-        """What it's one of several seeds of."""
-        return self.architecture, self.transport, self.delay, self.robot, self.operator
-
-
 def measure(case: Case) -> Row:
     """Run a case and keep its figures."""
     return row_of(run(case))
-
-
-def row_of(drive: DriveRun) -> Row:
-    """The figures of a run."""
-    case = drive.case
-    return Row(
-        *case.group, case.seed, drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,
-        float(drive.delays[:, 1].max(initial=0.0)),
-    )  # fmt: skip
 
 
 def cases(

@@ -17,9 +17,10 @@ import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.driving.pictures import of_drives
-from interfaces.lab.driving.run import Case, DriveRun, run
+from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
 from interfaces.lab.statistics import Estimate, bootstrap, clustered, median
+from interfaces.runs.drive_run import Case, DriveRun
 from interfaces.teleop.architectures import Transport
 from robots.ipr.reality import MobileReality
 from vrs.comparison import PathComparison, summed_up

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from interfaces.lab.driving.output import facts_of
-from interfaces.lab.driving.run import Case, DriveRun
-from interfaces.lab.driving.sweep import row_of
 from interfaces.recording.driving.pursuit import FARTHEST, matchable
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import ESTIMATED, GAP, MEASURED, REAL_POSTURE, Track, gap_lengths, not_measured
+from interfaces.runs.drive_row import facts_of, row_of
+from interfaces.runs.drive_run import Case, DriveRun
 from interfaces.teleop.architectures import Transport
 from robots.ipr.robot import Collision
 from vrs.errors import FormatError, InvalidValueError

@@ -90,14 +90,6 @@ class Mobile(Kind):
 
         return summary(recording)
 
-    def report(self, recording: Recording) -> tuple[str, tuple[str, ...]]:
-        """See `Kind`."""
-        from interfaces.recording.driving.figures import driven, figures_of
-        from interfaces.report.drive import render
-
-        found = driven(recording)
-        return render(found.drive, figures_of(recording, found), recording.events), found.missing
-
     def tables(self, recording: Recording) -> tuple[Table, ...]:
         """See `Kind`."""
         from interfaces.recording.driving.tables import mobile_tables

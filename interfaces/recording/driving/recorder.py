@@ -12,7 +12,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from interfaces.lab.driving.run import Case, DriveLink, DriveRun
 from interfaces.link import PacketRecord
 from interfaces.recording.channels import Message
 from interfaces.recording.driving import messages as d
@@ -24,6 +23,7 @@ from interfaces.recording.messages import Begin, CommandEntry, End, EventEntry, 
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, placed_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
+from interfaces.runs.drive_run import Case, DriveLink, DriveRun
 from interfaces.software import software
 from interfaces.teleop import Deed
 from interfaces.teleop.architectures import OperatorSite

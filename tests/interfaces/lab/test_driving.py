@@ -14,8 +14,9 @@ from interfaces.cli.main import app
 from interfaces.lab.driving.attribution import attributed
 from interfaces.lab.driving.operators import STYLES, operator
 from interfaces.lab.driving.output import COMPARED, summary
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
+from interfaces.runs.drive_run import Case
 from interfaces.teleop.architectures import Transport
 from robots.ipr.bare import BareBody
 from robots.ipr.reality import MobileReality

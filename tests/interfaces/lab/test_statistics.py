@@ -13,9 +13,10 @@ import pytest
 from interfaces.lab.driving.legs import point_ahead, way_left
 from interfaces.lab.driving.output import rich_table, summary
 from interfaces.lab.driving.recorded import name_of, paths
-from interfaces.lab.driving.run import Case
-from interfaces.lab.driving.sweep import Row, comparable, grouped, paired
+from interfaces.lab.driving.sweep import comparable, grouped, paired
 from interfaces.lab.statistics import bootstrap, clustered, interval_name, median
+from interfaces.runs.drive_row import Row
+from interfaces.runs.drive_run import Case
 from vrs.comparison import PathComparison
 from vrs.errors import InvalidValueError
 

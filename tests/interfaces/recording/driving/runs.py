@@ -6,8 +6,9 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from interfaces.lab.driving.run import Case, DriveRun, run
+from interfaces.lab.driving.run import run
 from interfaces.recording.driving.recorder import DriveRecorder
+from interfaces.runs.drive_run import Case, DriveRun
 from interfaces.teleop.architectures import Transport
 
 SLALOM = Case("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 6.0)

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from interfaces.report.recorded import render
 from interfaces.cli.main import _status
-from interfaces.lab.driving.output import COLUMNS, facts_of
 from interfaces.lab.driving.recorded import measure_recorded, name_of
-from interfaces.lab.driving.run import Case
-from interfaces.lab.driving.sweep import METRICS, row_of
 from interfaces.recording import open_recording
 from interfaces.recording.driving.figures import driven, summary
 from interfaces.recording.playback import Playback
+from interfaces.runs.drive_row import COLUMNS, METRICS, facts_of, row_of
+from interfaces.runs.drive_run import Case
 from interfaces.station.shelf import checked_name
 from interfaces.teleop.architectures import Transport
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
@@ -117,7 +117,7 @@ def test_a_destroyed_block_is_left_out_and_told(tmp_path: Path) -> None:
         value = summary(recording)
         assert value["gap_s"] == pytest.approx(0.05 * (np.count_nonzero(~seen) + 1), abs=1e-9)
         assert value["path_error_max"] <= drive.compare().path_error_max + 1e-9
-        html, _ = recording.kind.report(recording)
+        html, _ = render(recording)
         assert "not measured" in html
         shown = Playback([recording])
         for t in np.linspace(0.0, drive.t[-1], 100):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from interfaces.lab.driving.run import Case, run
+from interfaces.lab.driving.run import run
 from interfaces.recording import Damage, open_recording
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.driving.recorder import DriveRecorder
@@ -21,6 +21,7 @@ from interfaces.recording.driving.rooms import room_entry, room_of
 from interfaces.recording.rerun import rerun
 from interfaces.recording.sink import Sink
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
+from interfaces.runs.drive_run import Case
 from robots.ipr.robot import PLACES, place
 from tests.interfaces.recording.disks import Failing
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded

@@ -10,7 +10,8 @@ import random
 import numpy as np
 import pytest
 
-from interfaces.lab.driving.run import Case, DriveRun, run
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import Case, DriveRun
 from interfaces.teleop.architectures import CellChanges, OperatorSurroundings, Report, RobotSurroundings
 from interfaces.teleop.architectures.equipment import BodySonar, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
