@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from robots.drive_limits import IPR_LIMITS
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.navigation import BodyNavigator
-from robots.ipr.parameters import IPR_LIMITS
 from robots.ipr.position import LaserPosition
 from robots.ipr.robot import place
 from robots.onboard import Goal, LaserModel

@@ -11,7 +11,7 @@ from interfaces.link.link import Link
 from interfaces.teleop.architectures import Constants, OperatorSite, Packet, Report, Transport
 from interfaces.teleop.architectures.equipment import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from robots.drive_limits import IPR_WHEEL_BASE, drive_limits
 from robots.ipr import parameters as p
 from robots.ipr.model import Kind
 from robots.onboard.laser import LaserModel
@@ -134,7 +135,7 @@ class Chassis:
     @property
     def limits(self) -> DriveLimits:
         """How fast the body lets itself be driven."""
-        return p.drive_limits(self.wheel_base)
+        return drive_limits(self.wheel_base)
 
     def rigid(self) -> tuple[float, Array, Array]:
         """Return mass [kg], centre (3,) [m] and inertia about it (3, 3) [kg m²] of all lumps together."""
@@ -165,7 +166,7 @@ IPR: Final = Chassis(
         Lump("display", (0.04, 0.30, 0.24), (0.11, 0.0, 0.55), 3.1),
     ),
     wheel_radius=p.IPR_WHEEL_RADIUS,
-    wheel_base=p.IPR_WHEEL_BASE,
+    wheel_base=IPR_WHEEL_BASE,
     wheel_width=0.05,
     wheel_mass=1.8,
     casters=((-0.25, 0.15), (-0.25, -0.15)),

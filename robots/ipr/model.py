@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import hypot
 
+from robots.drive_limits import IPR_WHEEL_BASE, drive_limits
 from robots.ipr import parameters as p
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
@@ -80,12 +81,12 @@ def model(kind: Kind | str = Kind.IPR, *, limits: DriveLimits | None = None, per
     except ValueError:
         raise InvalidValueError("kind", kind, f"one of {', '.join(Kind)}") from None
     if which is Kind.IPR:
-        wheels = Wheels(p.IPR_WHEEL_BASE, p.IPR_WHEEL_RADIUS)
+        wheels = Wheels(IPR_WHEEL_BASE, p.IPR_WHEEL_RADIUS)
         body = Body(p.IPR_LENGTH, p.IPR_WIDTH, p.IPR_HEIGHT, p.IPR_MASS, p.IPR_AXLE_OFFSET)
     else:
         wheels = Wheels(p.MICRO_WHEEL_BASE, p.MICRO_WHEEL_RADIUS)
         body = Body(p.MICRO_SIDE, p.MICRO_SIDE, p.MICRO_SIDE, p.MICRO_MASS, p.MICRO_AXLE_OFFSET)
     if limits is None:
-        limits = p.drive_limits(wheels.base)
+        limits = drive_limits(wheels.base)
     made = Ipr(limits, wheels, body, kind=which)
     return made if period is None else replace(made, period=period)

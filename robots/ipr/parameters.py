@@ -1,22 +1,13 @@
-"""Geometry and limits of the mobile robot IPR, and of the micro-robot that stood in for it in the experiment.
+"""Geometry of the mobile robot IPR, and of the micro-robot that stood in for it in the experiment.
 
-Sources: Han, Kim, Kim, Kim, 2001 [H]: section 2.1, 4.2. Kim, Han, Kim, Kim, 2002 [K]: sizes and safety limits of
-the same robot. What neither gives is an assumption; its reason stands beside it.
+Sources: Han, Kim, Kim, Kim, 2001 [H]: section 2.1, 4.2. Kim, Han, Kim, Kim, 2002 [K]: sizes of the
+same robot. What neither gives is an assumption; its reason stands beside it.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
-from vrs.mobile import DriveLimits
-
-V_MAX: Final = 0.5
-"""Largest linear speed [m/s]; safety limit of [K]."""
-W_MAX: Final = math.radians(45.0)
-"""Largest angular speed [rad/s]; safety limit of [K], 45 deg/s."""
-A_MAX: Final = 0.52
-"""Largest linear acceleration [m/s²]; safety limit of [K]."""
 PERIOD: Final = 0.1
 """T: time between commands [s], an assumption: [H] has 'every sampling time T' without a figure."""
 
@@ -33,8 +24,6 @@ IPR_HEIGHT: Final = 0.75
 """[m]."""
 IPR_MASS: Final = 75.0
 """[kg]; [K]."""
-IPR_WHEEL_BASE: Final = 0.40
-"""L [m], an assumption: as wide as the body allows, with wheels 5 cm thick inside its 45 cm."""
 IPR_WHEEL_RADIUS: Final = 0.10
 """[m], an assumption: passes the door sills of a house, and 0.5 m/s is a common gear motor's 48 turns/min."""
 IPR_AXLE_OFFSET: Final = 0.06
@@ -50,18 +39,3 @@ MICRO_WHEEL_RADIUS: Final = 0.022
 """[m], an assumption: usual for soccer robots of this size, on which it's built."""
 MICRO_AXLE_OFFSET: Final = 0.0
 """How far the driving axle is ahead of the body's centre [m], an assumption: they turn about their centre."""
-
-
-def drive_limits(wheel_base: float) -> DriveLimits:
-    """Limits of a robot's commands: the safety limits of [K], and one of the angular acceleration.
-
-    That's where each wheel's rim, on the spot, has the linear limit; an assumption.
-
-    Args:
-        wheel_base: L, distance between the wheels [m].
-    """
-    return DriveLimits(V_MAX, W_MAX, A_MAX, 2.0 * A_MAX / wheel_base)
-
-
-IPR_LIMITS: Final = drive_limits(IPR_WHEEL_BASE)
-"""Limits of the IPR's commands, and of what drives on board unless told otherwise."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.driving import STAND, Drive, kept
 from robots.onboard.free_ways import CREEP, ROUNDING, Outline, free_ways
 from vrs.checks import finite, number_in

@@ -25,7 +25,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.driving import STAND, Drive, kept
 from robots.onboard.path import MovingPath, Projection
 from vrs.checks import number_in

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.known_trajectory import SAME, KnownTrajectory
 from vrs.checks import finite, number_in

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.avoidance import ObstacleAvoidance
 from robots.onboard.driving import Drive
 from robots.onboard.free_ways import Outline

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.bullet.rooms import Room
+from robots.drive_limits import IPR_LIMITS
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.navigation import BodyNavigator, route_map
-from robots.ipr.parameters import IPR_LIMITS
 from robots.ipr.position import LaserPosition
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import Collision, MobileRobot

@@ -9,7 +9,7 @@ import random
 import numpy as np
 import pytest
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
 from robots.onboard.driving import Drive
 from robots.onboard.free_ways import Outline

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import ipr
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard import AvoidanceConfig, PathFollowingConfig, TrackingConfig
 from robots.onboard.driving import kept
 from tests.robots.onboard.rooms import IPR, ring

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.detours import way_out
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Goal, Journey, JourneyConfig, JourneyState

@@ -8,7 +8,7 @@ import random
 import numpy as np
 import pytest
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.driving import Posture
 from robots.onboard.known_trajectory import KnownTrajectory
 from robots.onboard.trajectory_tracking import TrackingConfig, TrajectoryTracker

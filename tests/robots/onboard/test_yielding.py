@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from robots.ipr.parameters import IPR_LIMITS
+from robots.drive_limits import IPR_LIMITS
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import STAND, Drive, kept
 from robots.onboard.movers import Mover

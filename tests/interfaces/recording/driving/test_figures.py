@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from interfaces.report.recorded import render
 from interfaces.cli.main import _status
 from interfaces.lab.driving.recorded import measure_recorded, name_of
 from interfaces.recording import open_recording
 from interfaces.recording.driving.figures import driven, summary
 from interfaces.recording.playback import Playback
+from interfaces.report.recorded import render
 from interfaces.runs.drive_row import COLUMNS, METRICS, facts_of, row_of
 from interfaces.runs.drive_run import Case
 from interfaces.station.shelf import checked_name
