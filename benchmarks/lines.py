@@ -22,9 +22,10 @@ from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array
 from vrs.planning.along import TOLERANCE
+from vrs.planning.certificate import violation
 from vrs.planning.course import Course, rotation_vector, rotations
 from vrs.planning.line import line
-from vrs.planning.plan import Plan, violation
+from vrs.planning.plan import Plan
 from vrs.segment import evaluate
 
 MODEL = puma560.model()

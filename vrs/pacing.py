@@ -17,8 +17,9 @@ import numpy as np
 from vrs.chunk import HOLD, Piece
 from vrs.insertion import piece, shifted
 from vrs.model import Array, Limits
+from vrs.planning.certificate import violation
 from vrs.planning.fit import fit
-from vrs.planning.plan import Plan, stacked, violation
+from vrs.planning.plan import Plan, stacked
 from vrs.segment import evaluate
 from vrs.timeline import Timeline
 

@@ -7,14 +7,14 @@ its kinds to say: `vrs.timeline.Timeline` for joints, `vrs.mobile.ArcTimeline` f
 
 from __future__ import annotations
 
-from typing import Any, Generic, Self, TypeVar
+from collections.abc import Iterator, Sequence
+from typing import Any, Generic, Self, TypeVar, overload
 
 import numpy as np
 
 from vrs.chunk import HOLD
 from vrs.model import Array
 from vrs.segment import Segment
-from vrs.segment_view import SegmentView
 from vrs.tree import Leaf, Node, Path, first_start, last_end, leaves, path_at, path_to
 
 S = TypeVar("S", bound=Segment)
@@ -180,3 +180,32 @@ def remade(
     result = kind.__new__(kind)
     result._set(initial, start, root, height, version)
     return result
+
+
+class SegmentView(Sequence[S]):
+    """A timeline's segments, made one by one as they're asked for."""
+
+    __slots__ = ("_timeline",)
+
+    def __init__(self, timeline: Track[S]) -> None:
+        self._timeline: Track[S] = timeline
+
+    def __len__(self) -> int:
+        return len(self._timeline)
+
+    @overload
+    def __getitem__(self, index: int) -> S: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[S, ...]: ...
+    def __getitem__(self, index: int | slice) -> S | tuple[S, ...]:
+        if isinstance(index, slice):
+            return tuple(self._timeline.segment(i) for i in range(*index.indices(len(self))))
+        if not -len(self) <= index < len(self):
+            raise IndexError(index)
+        return self._timeline.segment(index % len(self))
+
+    def __iter__(self) -> Iterator[S]:
+        return (self._timeline.segment(i) for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} segments>"

@@ -14,9 +14,10 @@ from vrs import Profile
 from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.planning import move
+from vrs.planning.certificate import violation
 from vrs.planning.course import rotation_vector, rotations
 from vrs.planning.line import line
-from vrs.planning.plan import Plan, end_state, violation
+from vrs.planning.plan import Plan, end_state
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

@@ -12,8 +12,9 @@ from vrs.chunk import Piece, State
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError
 from vrs.planning import Profile, move
+from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
-from vrs.planning.plan import Plan, end_state, violation
+from vrs.planning.plan import Plan, end_state
 from vrs.planning.steer_course import damped_rates, sliding_rates, weighted_jacobian
 from vrs.planning.steer_joint import change, one_joint, run
 from vrs.planning.steering import BRAKED_ONLY, steer

@@ -6,8 +6,9 @@ from vrs.chunk import State
 from vrs.commands import Profile
 from vrs.model import Array, Limits
 from vrs.planning import jerk_limited, parabolic
+from vrs.planning.certificate import violation
 from vrs.planning.overlap import overlapped
-from vrs.planning.plan import Plan, empty, violation
+from vrs.planning.plan import Plan, empty
 
 __all__ = ["Plan", "empty", "move", "overlapped", "run_up", "violation"]
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits, RobotModel
+from vrs.planning.certificate import violation
 from vrs.planning.fit import fit_parts
 from vrs.planning.path import Path
-from vrs.planning.plan import Plan, slowed, violation
+from vrs.planning.plan import Plan, slowed
 from vrs.planning.time_law import TimeLaw, fastest, few_knots, parabolas, smoothed
 
 TOLERANCE: Final = 1e-10

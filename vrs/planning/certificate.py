@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vrs.model import Array, Limits
 from vrs.planning.bounds import TOLERANCE
-
-if TYPE_CHECKING:
-    from vrs.planning.plan import Plan
+from vrs.planning.plan import Plan
 
 MAX_DEGREE = 31
 """Of a piece that can be certified."""

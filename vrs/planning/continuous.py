@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vrs.model import Array, Limits, RobotModel
+from vrs.planning.certificate import violation
 from vrs.planning.overlap import overlapped
-from vrs.planning.plan import Plan, violation
+from vrs.planning.plan import Plan
 
 _RISE = 1e-4
 """Relative growth of a speed from knot to knot that doesn't count: joints of a line at an even pace vary."""

@@ -7,10 +7,11 @@ import numpy as np
 from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits
+from vrs.planning.certificate import violation
 from vrs.planning.online import online
 from vrs.planning.parabolic import brake
 from vrs.planning.parabolic import from_rest as parabolic_from_rest
-from vrs.planning.plan import Plan, empty, end_state, violation
+from vrs.planning.plan import Plan, empty, end_state
 from vrs.planning.straight import follow, rates
 
 BRAKED_FIRST = "braked with parabolas first: no jerk-limited plan from this state keeps the limits"

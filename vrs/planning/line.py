@@ -18,12 +18,13 @@ from vrs.errors import PlanningError, UnresolvedError
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning import parabolic
 from vrs.planning.along import Samples, Traversal, sampled
+from vrs.planning.certificate import violation
 from vrs.planning.course import Course, rotation_vector
 from vrs.planning.jerk_limited import rest_to_rest as smooth_rest_to_rest
 from vrs.planning.joining import courses, smooth_stop
 from vrs.planning.obstacles import SINGULAR, condition, obstacle
 from vrs.planning.path import RESOLVED, Path, trace
-from vrs.planning.plan import Plan, empty, end_state, violation
+from vrs.planning.plan import Plan, empty, end_state
 from vrs.tooled import bare
 
 NEGLIGIBLE: Final = 1e-12

@@ -17,8 +17,9 @@ import numpy as np
 from vrs.chunk import State
 from vrs.model import Array, Limits
 from vrs.planning.bounds import Bounds, bounds
+from vrs.planning.certificate import violation
 from vrs.planning.cubics import Cubics, integrated
-from vrs.planning.plan import Plan, end_state, integrate, packed, violation
+from vrs.planning.plan import Plan, end_state, integrate, packed
 
 _idle: dict[tuple[int, int], list[tuple[Any, Any, Any]]] = {}
 """Planners, trajectories and problems for so many joints and an order: they take half as long to make as to use."""

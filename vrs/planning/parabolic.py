@@ -10,8 +10,9 @@ from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits
 from vrs.planning.blend import blend
+from vrs.planning.certificate import violation
 from vrs.planning.online import online
-from vrs.planning.plan import Plan, empty, end_state, integrate, violation
+from vrs.planning.plan import Plan, empty, end_state, integrate
 from vrs.planning.straight import NEGLIGIBLE, follow, rates
 
 __all__ = ["NEGLIGIBLE", "blend", "brake", "from_rest", "rest_to_rest", "to_rest"]

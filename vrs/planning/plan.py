@@ -11,25 +11,8 @@ import numpy as np
 
 from vrs.chunk import State
 from vrs.model import Array
-from vrs.planning.bounds import TOLERANCE
-from vrs.planning.certificate import violation
 from vrs.polynomials import state_of
 from vrs.segment import evaluate
-
-__all__ = [
-    "TAYLOR",
-    "TOLERANCE",
-    "Plan",
-    "empty",
-    "end_position",
-    "end_state",
-    "integrate",
-    "packed",
-    "parabolas",
-    "slowed",
-    "stacked",
-    "violation",
-]
 
 TAYLOR = np.array([[1.0], [1.0], [1.0 / 2.0], [1.0 / 6.0]])
 """What derivatives are multiplied by to be coefficients, (4, 1)."""

@@ -10,8 +10,9 @@ import numpy as np
 
 from vrs.commands import Profile
 from vrs.model import Array, Limits, RobotModel
+from vrs.planning.certificate import violation
 from vrs.planning.overlap import overlapped
-from vrs.planning.plan import Plan, end_state, violation
+from vrs.planning.plan import Plan, end_state
 from vrs.segment import evaluate
 
 Pair: TypeAlias = Callable[[Limits], tuple[Plan, Plan, str]]

@@ -12,7 +12,8 @@ import numpy as np
 
 from vrs.chunk import State
 from vrs.model import Array, Limits, RobotModel
-from vrs.planning.plan import Plan, violation
+from vrs.planning.certificate import violation
+from vrs.planning.plan import Plan
 from vrs.planning.steer_course import FREE, Twist, TwistCourse, course
 from vrs.planning.steer_joint import JerkProfile, change, cut, from_accelerations
 

@@ -17,8 +17,9 @@ from vrs.chunk import State
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.model import Array, Limits, RobotModel
+from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
-from vrs.planning.plan import Plan, violation
+from vrs.planning.plan import Plan
 from vrs.planning.steer_course import (
     SLOW_FROM,
     Twist,

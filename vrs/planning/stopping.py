@@ -7,8 +7,9 @@ import numpy as np
 from vrs.chunk import State
 from vrs.commands import Profile
 from vrs.model import Limits
+from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
-from vrs.planning.plan import Plan, integrate, violation
+from vrs.planning.plan import Plan, integrate
 from vrs.planning.steer_joint import change, rates_plan
 
 BRAKED = "braked with parabolas: no jerk-limited stop from this state keeps the limits"
