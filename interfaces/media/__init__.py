@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from interfaces.media.aloud import Aloud
 from interfaces.media.camera import CameraConfig, CameraError, LiveCamera
+from interfaces.media.door import MediaDoor
 from interfaces.media.live import LiveMedia
 from interfaces.media.presenter import Presenter
 from interfaces.media.speech import SpeechConfig, SpeechError
@@ -14,6 +15,7 @@ __all__ = [
     "CameraError",
     "LiveCamera",
     "LiveMedia",
+    "MediaDoor",
     "Presenter",
     "SpeechConfig",
     "SpeechError",

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import msgspec
 from starlette.requests import Request
@@ -24,6 +24,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.media.camera import CameraError
+from interfaces.media.live import LiveMedia
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
 from interfaces.stream.kept_files import HEADERS
@@ -39,9 +40,6 @@ from interfaces.stream.meshcat.viewers import (
 )
 from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError, VrsError
-
-if TYPE_CHECKING:
-    from interfaces.media.live import LiveMedia
 
 MOST_PAGES: Final = 256
 """Pages that are told how everything is."""
@@ -78,10 +76,11 @@ class MediaDoor:
         self._media, self._access = media, access
         self._pages: set[_Page] = set()
         self._stills = Bucket(STILLS, STILLS_BURST, media.clock.now())
+        media.changed = self.tell
 
     @property
     def routes(self) -> list[BaseRoute]:
-        """What it answers."""
+        """`/media` and `/media/still`."""
         return [WebSocketRoute("/media", self._serve), Route("/media/still", self._still)]
 
     def tell(self) -> None:

@@ -7,16 +7,12 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Hashable
 from typing import TYPE_CHECKING, Any, Final
 
-from starlette.routing import BaseRoute
-
 from interfaces.media.camera import CameraConfig, LiveCamera, Stand
 from interfaces.media.coding import missing
-from interfaces.media.door import MediaDoor
 from interfaces.media.offer import OfferError
 from interfaces.media.presenter import Presenter
 from interfaces.media.speech import PROGRAM, SpeechError, cleaned, program
 from interfaces.media.voice import Playout
-from interfaces.stream.access import Access
 from robots.bullet.rooms import Room
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
@@ -40,7 +36,6 @@ class LiveMedia:
         config: CameraConfig,
         room: Room,
         clock: Clock,
-        access: Access,
         *,
         stand: Stand,
         commands: Callable[[str, int], bool],
@@ -52,7 +47,6 @@ class LiveMedia:
             config: The camera.
             room: Where the robot is.
             clock: Session time.
-            access: Who may come in.
             stand: Where the robot is.
             commands: Whether a session has the lease, by its name and the epoch.
             screen: Shows a message on the robot in the 3D view; an empty one clears it.
@@ -68,16 +62,12 @@ class LiveMedia:
         """Says and shows what jobs, or people, want."""
         if video and not audible:
             self.presenter.problem = str(SpeechError(f"the program {PROGRAM} isn't installed"))
-        self._door = MediaDoor(self, access)
-        self.presenter.changed = self._door.tell
+        self.changed: Callable[[], None] = lambda: None
+        """Called when there's something new to tell pages."""
+        self.presenter.changed = self._note
         self._video = video
         self._peers: dict[Hashable, Peer] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-
-    @property
-    def routes(self) -> list[BaseRoute]:
-        """`/media` and `/media/still`."""
-        return self._door.routes
 
     @property
     def peers(self) -> int:
@@ -100,13 +90,17 @@ class LiveMedia:
             for key in tuple(self._peers):
                 await self.leave(key)
 
+    def _note(self) -> None:
+        """Something is new to tell pages."""
+        self.changed()
+
     async def _tell(self) -> None:
         before: dict[str, Any] = {}
         while True:
             facts = self.facts()
             if facts != before:
                 before = facts
-                self._door.tell()
+                self._note()
             await asyncio.sleep(TELL)
 
     def facts(self) -> dict[str, Any]:

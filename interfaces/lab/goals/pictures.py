@@ -10,13 +10,12 @@ import numpy as np
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, draw
+from interfaces.lab.goals.trial import Found
 from robots.bullet.rooms import Block, Column, Room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
-
-    from interfaces.lab.goals.study import Found
 
 DRAWN = 4
 """Trips of each group that are drawn; those that went wrong first."""

@@ -6,7 +6,6 @@ import csv
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +15,7 @@ from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Paper, Part, R
 from interfaces.lab.goals.pictures import maps
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND, SHUT, TITLES, setting
 from interfaces.lab.goals.shortest import Shortest
-from interfaces.lab.goals.trial import Setting, Trip, seen_all, travel
+from interfaces.lab.goals.trial import Found, seen_all, travel
 from interfaces.lab.output import to_json, write_files
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.ipr.chassis import IPR
@@ -31,24 +30,6 @@ ASKED: Final = (FURNITURE, ROUND, LATE)
 """Groups that make them up."""
 REACHED, LONGER = 0.99, 1.15
 """Share of goals that are to be reached; how much longer than the shortest a route may be."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """A trip, and the yardsticks of its length."""
-
-    group: str
-    setting: Setting
-    trip: Trip
-    mapped: float
-    """Length of the shortest way on the map [m]."""
-    true: float
-    """Of the shortest way as things stood at first [m]; infinite where there was none."""
-
-    @property
-    def ratio(self) -> float:
-        """Length of the route on the map, by the shortest; nan where either of them is unknown."""
-        return self.trip.planned / self.mapped if math.isfinite(self.mapped) else math.nan
 
 
 def study_of(goals: int) -> Paper:

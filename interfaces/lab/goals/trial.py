@@ -74,6 +74,24 @@ class Trip:
         return self.state is JourneyState.ARRIVED and self.off <= 0.05 and self.turned <= math.radians(2.0)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A trip, and the yardsticks of its length."""
+
+    group: str
+    setting: Setting
+    trip: Trip
+    mapped: float
+    """Length of the shortest way on the map [m]."""
+    true: float
+    """Of the shortest way as things stood at first [m]; infinite where there was none."""
+
+    @property
+    def ratio(self) -> float:
+        """Length of the route on the map, by the shortest; nan where either of them is unknown."""
+        return self.trip.planned / self.mapped if math.isfinite(self.mapped) else math.nan
+
+
 def body_of(setting: Setting, reality: MobileReality | None = None) -> MobileRobot:
     """The robot where it begins, with laser and sonars."""
     noise = NOISES[setting.seed[-1] % len(NOISES)]

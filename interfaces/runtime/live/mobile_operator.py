@@ -15,7 +15,7 @@ from starlette.routing import BaseRoute
 
 from interfaces.jobs import Arm, JobFile, OperatorLoss
 from interfaces.link import LinkConditions
-from interfaces.media import CameraConfig, LiveMedia
+from interfaces.media import CameraConfig, LiveMedia, MediaDoor
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
 from interfaces.runtime.live.mobile_tasks import TaskDesk
@@ -108,8 +108,9 @@ class LiveMobileOperator:
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self.drawing = MobileDrawing(config.model, start, config.room, grid_of(config.room, start))
         self._view = view_routes(self.drawing.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
-        self.media = None if config.camera is None else self._media(config.camera, access)
+        self.media = None if config.camera is None else self._media(config.camera)
         """Camera, voice and screen; None where there's no camera."""
+        self._media_routes = [] if self.media is None else MediaDoor(self.media, access).routes
         self._wants_resume = False
         self._ending = -math.inf
         """Since when a lease is ending [s]; −∞ while none is."""
@@ -118,11 +119,11 @@ class LiveMobileOperator:
     @property
     def routes(self) -> list[BaseRoute]:
         """What it answers."""
-        return [*self.server.routes, *self._view, *(() if self.media is None else self.media.routes)]
+        return [*self.server.routes, *self._view, *self._media_routes]
 
-    def _media(self, camera: CameraConfig, access: Access) -> LiveMedia:
+    def _media(self, camera: CameraConfig) -> LiveMedia:
         return LiveMedia(
-            camera, self.config.room, self.clock, access,
+            camera, self.config.room, self.clock,
             stand=self._stand,
             commands=lambda session, epoch: self.hub.commands(session, epoch, now=self.clock.now()),
             screen=self.drawing.scene.say,

@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
-from interfaces.media import CameraConfig, LiveMedia
+from interfaces.media import CameraConfig, LiveMedia, MediaDoor
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.control import Role
@@ -74,11 +74,11 @@ async def site(config: CameraConfig | None = None) -> AsyncIterator[Site]:
         CameraConfig(rate=10.0, lens=LENS) if config is None else config,
         ROOM,
         WallClock(),
-        Access({Role.VIEWER: VIEWER, Role.OPERATOR: OPERATOR}, free=()),
         stand=lambda _: ((2.0, 3.0, 0.0), 0.0),
         commands=lambda session, epoch: (session, epoch) == (KEY, EPOCH),
     )
-    app = application(media.routes, hosts(["127.0.0.1"], port))
+    door = MediaDoor(media, Access({Role.VIEWER: VIEWER, Role.OPERATOR: OPERATOR}, free=()))
+    app = application(door.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), media.running():
         yield Site(media, port)
 
