@@ -24,7 +24,7 @@ from vrs.commands import (
     SteerCommand,
     Stop,
 )
-from vrs.engine import Engine
+from vrs.engine import Engine, MobileEngine
 from vrs.model import Limits, RobotModel
 from vrs.receipt import Receipt, Status
 from vrs.segment import ArcSegment, PolynomialSegment, Segment
@@ -43,6 +43,7 @@ __all__ = [
     "Lateness",
     "Limits",
     "ManualClock",
+    "MobileEngine",
     "Motion",
     "MotionCommand",
     "OffsetClock",

@@ -6,7 +6,6 @@ Source: Han, Kim, Kim, Kim, "Internet Control Architecture for Internet-Based Pe
 from __future__ import annotations
 
 from vrs.mobile.avoidance import Avoidance
-from vrs.mobile.engine import MobileEngine
 from vrs.mobile.environment import VirtualEnvironment
 from vrs.mobile.estimator import Feedback, PostureEstimator
 from vrs.mobile.kinematics import advanced, increment, rotation, speeds, wheel_speeds, wrapped
@@ -22,7 +21,6 @@ __all__ = [
     "DriveLimits",
     "Feedback",
     "Grid",
-    "MobileEngine",
     "MobileModel",
     "PostureEstimator",
     "VirtualEnvironment",

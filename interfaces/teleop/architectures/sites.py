@@ -12,7 +12,8 @@ from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSu
 from interfaces.teleop.listening import Deed
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
-from vrs.mobile import DriveLimits, MobileEngine, MobileModel, PostureEstimator
+from vrs.engine import MobileEngine
+from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
 from vrs.mobile.kinematics import advanced
 from vrs.mobile.limiting import braking, limited
 from vrs.segment import ArcSegment, known_arc

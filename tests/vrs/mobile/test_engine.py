@@ -27,8 +27,9 @@ from vrs import (
     Status,
     Stop,
 )
+from vrs.engine import MobileEngine
 from vrs.errors import InvalidValueError, NonFiniteTimeError, UnknownCommandError
-from vrs.mobile import ArcTimeline, MobileEngine, advanced
+from vrs.mobile import ArcTimeline, advanced
 
 close = partial(np.testing.assert_allclose, rtol=0.0)
 
