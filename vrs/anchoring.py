@@ -6,7 +6,7 @@ Solves open problem (e) of Doulgeri, Zikos, Delopoulos: what came back from the 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,11 +14,9 @@ from vrs.chunk import HOLD, Piece, State
 from vrs.commands import Profile
 from vrs.errors import InvalidValueError
 from vrs.insertion import hold, piece, shifted
-from vrs.ledger import Change
 from vrs.model import Array, Limits
 from vrs.pacing import as_plan, remainder, rest_after, segment_at
 from vrs.planning import move, violation
-from vrs.scheduler import Scheduler
 from vrs.timeline import Timeline
 
 _SPANS = tuple(np.geomspace(0.1, 20.0, 24).tolist())
@@ -38,26 +36,6 @@ class Anchored:
     """From where on it's the other one [s]."""
     error: Array
     """How far apart they were at the beginning [rad], (n,)."""
-
-
-def anchor(plan: Scheduler, truth: Timeline, t: float) -> Anchored:
-    """Let what is scheduled go over into another timeline from t on; see `anchored`.
-
-    Commands that have moves in the other timeline stand, at the times that they have there; the others are
-    superseded. Nothing can be taken back past this.
-    """
-    before = plan.timeline
-    made = anchored(before, truth, t, plan.limits)
-    times: dict[int, tuple[float, float]] = {}
-    for index in range(max(truth.index_at(t), 0), len(truth)):
-        owner = truth.owner_of(index)
-        if owner != HOLD:
-            start, _ = times.get(owner, (truth.start_of(index), t))
-            times[owner] = start, truth.start_of(index + 1)
-    version = before.version + 1
-    plan.timeline = made.timeline.with_version(version)
-    plan.ledger.rebase(Change(version, 0, t, None), times)
-    return replace(made, timeline=plan.timeline)
 
 
 def anchored(timeline: Timeline, truth: Timeline, t: float, limits: Limits) -> Anchored:

@@ -229,10 +229,7 @@ class Engine:
                 return None
             if isinstance(checked, SteerCommand):
                 return self._plan.steer(checked, self._present())
-            # What most programs never use loads when it's used: `import vrs` is to be quick.
-            from vrs.edits import edit
-
-            return edit(self._plan, checked, self._present())
+            return self._plan.edit(checked, self._present())
 
     def atomic(self) -> AbstractContextManager[None]:
         """Put timeline, receipts and parameters back as they were, if what is done meanwhile raises.
@@ -299,15 +296,11 @@ class Engine:
 
     def standing(self) -> Standing:
         """What the next commands depend on besides the timeline; see `vrs.standing.Standing`."""
-        from vrs.standing import standing
-
-        return standing(self._plan, self.now())
+        return self._plan.standing(self.now())
 
     def take_up(self, stand: Standing) -> None:
         """Let an engine that was just made on a timeline go on as the one did that stood so."""
-        from vrs.standing import take_up
-
-        take_up(self._plan, stand)
+        self._plan.take_up(stand)
 
     def refuse(self, command: Command, reason: str) -> Receipt:
         """Answer a command that something outside the engine forbids."""
@@ -315,16 +308,14 @@ class Engine:
         return self._plan.reject(issued, asked, reason)
 
     def anchor(self, truth: Timeline) -> Anchored:
-        """Go over from now on into a timeline that turned out to be the true one; see `vrs.anchoring.anchor`.
+        """Go over from now on into a timeline that turned out to be the true one; see `vrs.anchoring.anchored`.
 
         Raises:
             InvalidValueError: If the timeline is of another number of joints.
             PlanningError: If no way to it keeps the limits.
         """
-        from vrs.anchoring import anchor
-
         with self.atomic():
-            return anchor(self._plan, truth, self.now())
+            return self._plan.anchor(truth, self.now())
 
     def undo(self) -> Receipt | None:
         """Take back the newest accepted command or edit, as far as it lies in the future.

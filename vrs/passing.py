@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from vrs.chunk import State
 from vrs.commands import JointTarget, Motion, MotionCommand, Profile
-from vrs.insertion import Edit, Gap, fill, gap_at, joined, move_before
+from vrs.insertion import Gap, MovePlanner, joined
 from vrs.model import Array, Limits, RobotModel
 from vrs.moves import eased
 from vrs.planning import Plan, rounding
 from vrs.planning.continuous import braking, continuous, starting
 from vrs.planning.plan import slowed
+from vrs.timeline import Timeline
 from vrs.tooled import tooled
-
-if TYPE_CHECKING:
-    from vrs.scheduler import Scheduler
-    from vrs.timeline import Timeline
 
 _SAME = 1e-15
 """Times that differ by less, as a share of them or of a second, are one."""
@@ -36,59 +33,39 @@ class _Way(NamedTuple):
     note: str
 
 
-def passing(
-    plan: Scheduler, command: MotionCommand, t: float, command_id: int, now: float | None
-) -> Edit[Timeline]:
-    """Insert a move that begins before the one that ends at t is over, and passes its target at a distance.
-
-    Args:
-        plan: What is scheduled.
-        command: The command, its deviation above 0.
-        t: Where it would begin if it stopped [s].
-        command_id: Of the command.
-        now: Present time [s]; None offline.
-
-    Raises:
-        PlanningError: If it can't be planned.
-    """
-    gap, dropped = gap_at(plan.timeline, t, command.insertion)
-    planner, joiner = plan.planner(command), plan.joiner(command)
-    found = move_before(plan.timeline, t, -inf if now is None else now, cut=command.deviation == inf)
-    # A smooth move that was cut a moment after its start has no speed yet, but an acceleration.
-    moving = gap.state.qd.any() or (gap.state.qdd.any() and found is not None and plan.smooth(found[2]))
-    if found is None or moving:
-        made = fill(plan.timeline, gap, command_id, planner, joiner, dropped)
-        if command.deviation == inf:
-            return made
-        return made._replace(notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
-    first, begin, passed_by = found
-    rest = np.zeros_like(gap.state.q)
-    gap = gap._replace(state=State(gap.state.q, rest, rest))
-    second, target, note = planner(gap.state)
-    passer = _Passer(plan, command, gap, t, passed_by, now)
-    if command.deviation == inf:
-        way = passer.continuous(first, second, begin, note)
-    else:
-        way = passer.rounded(first, begin, replace(command, target=JointTarget(target)))
-    if way.start < t and dropped is not None:
-        dropped = (passed_by, *dropped)
-    gap = gap._replace(cut=way.start, start=way.start)
-    return fill(plan.timeline, gap, command_id, lambda _: (way.plan, target, way.note), joiner, dropped)
-
-
-class _Passer:
+class Passer:
     """One command that passes the end of another; times are those of its pace, as if at 1."""
 
     def __init__(
-        self, plan: Scheduler, command: MotionCommand, gap: Gap, t: float, passed_by: int, now: float | None
+        self,
+        model: RobotModel,
+        limits: Limits,
+        timeline: Timeline,
+        planner: Callable[[MotionCommand, Limits], MovePlanner],
+        command: MotionCommand,
+        gap: Gap,
+        t: float,
+        passed: tuple[int, MotionCommand | None, bool],
+        now: float | None,
     ) -> None:
-        self.plan, self.command, self.gap, self.t = plan, command, gap, t
-        self.passed_by, self.now = passed_by, now
-        self.before = plan.ledger.command(passed_by)
+        """Take what is scheduled, and who passes whom.
+
+        Args:
+            model: The robot.
+            limits: In force.
+            timeline: As it is before the command.
+            planner: Plans moves of commands under limits.
+            command: The command, its deviation above 0.
+            gap: What it's to fill if it stopped; the arm rests there.
+            t: Where it would begin if it stopped [s].
+            passed: Id of the one before it; its command if that's known; whether it moves smoothly, if it matters.
+            now: Present time [s]; None offline.
+        """
+        self.model, self.limits, self.timeline, self.planner = model, limits, timeline, planner
+        self.command, self.gap, self.t, self.now = command, gap, t, now
+        self.passed_by, self.before, smooth = passed
         self.jerky = command.profile is Profile.JERK_LIMITED
-        self.mixed = ""
-        if self.jerky and not plan.smooth(passed_by):
-            self.mixed = "rounded with a move of parabolas"
+        self.mixed = "rounded with a move of parabolas" if self.jerky and not smooth else ""
 
     def at_full_pace(self, plan: Plan) -> Plan:
         """A plan as it is where time runs 1/pace times as fast."""
@@ -103,23 +80,23 @@ class _Passer:
         if self.before is None:
             return None
         again = replace(self.before, target=JointTarget(self.gap.state.q))
-        slow, _, note = self.plan.planner(again, limits)(self.plan.timeline.state_before(begin))
+        slow, _, note = self.planner(again, limits)(self.timeline.state_before(begin))
         return self.at_full_pace(slow), note
 
     def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> _Way:
         """Overlap as far as the deviation and the limits allow."""
-        plan, command = self.plan, self.command
+        command = self.command
         quick = self.at_full_pace(first)
 
         def plans(limits: Limits) -> tuple[Plan, Plan, str]:
-            second, _, note = plan.planner(onward, limits)(self.gap.state)
+            second, _, note = self.planner(onward, limits)(self.gap.state)
             second = self.at_full_pace(second)
-            again = None if limits is plan.limits else self.slower_first(limits, begin)
+            again = None if limits is self.limits else self.slower_first(limits, begin)
             slow, more = (quick, "") if again is None else again
             return slow, second, joined(more, note, self.mixed)
 
-        model = tooled(plan.model, command.tool)
-        way = rounding.rounded(plans, command.deviation, model, plan.limits, command.profile)
+        model = tooled(self.model, command.tool)
+        way = rounding.rounded(plans, command.deviation, model, self.limits, command.profile)
         if way.first is not quick:
             return _Way(begin, self.at_pace(way.whole), way.note)
         start = max(self._before(way.delta), begin)
@@ -128,13 +105,13 @@ class _Passer:
 
     def continuous(self, first: Plan, second: Plan, begin: float, note: str) -> _Way:
         """Begin where the move before begins to brake; where both can't have their acceleration, it gets half."""
-        t, command, pace, limits = self.t, self.command, self.command.pace, self.plan.limits
+        t, command, pace, limits = self.t, self.command, self.command.pace, self.limits
         quick, onward = self.at_full_pace(first), self.at_full_pace(second)
         notes = joined(note, self.mixed)
         if not len(second):
             return _Way(t, second, notes)
-        ready = starting(onward, limits, _straight(command, self.plan.model))
-        known = _straight(self.before, self.plan.model)
+        ready = starting(onward, limits, _straight(command, self.model))
+        known = _straight(self.before, self.model)
         most = inf if self.now is None else (t - self.now) * pace
         found = continuous(quick, onward, most, (braking(quick, limits, known), ready), limits, jerk=self.jerky)
         if found.delta > 0.0:
@@ -152,7 +129,7 @@ class _Passer:
 
     def _before(self, delta: float) -> float:
         """The time from which an overlap [s] is left; a knot where one is as near as rounding leaves it."""
-        timeline, start = self.plan.timeline, self.t - delta / self.command.pace
+        timeline, start = self.timeline, self.t - delta / self.command.pace
         index = timeline.index_at(start)
         for knot in (timeline.start_of(max(index, 0)), timeline.start_of(min(index + 1, len(timeline)))):
             if abs(knot - start) <= _SAME * max(1.0, abs(start)):

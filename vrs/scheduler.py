@@ -1,4 +1,6 @@
-"""The scheduler: f, eq. (1), on one timeline, with its receipts. It's given the time and reads no clock.
+"""The scheduler: f, eq. (1), and the edits of its plan, on one timeline, with receipts. Time is an argument.
+
+One concept in many lines: each command and edit acts on the same timeline, ledger and limits, under one causality.
 
 Source: Doulgeri, Zikos, Delopoulos, section II-B.
 """
@@ -7,33 +9,58 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from math import inf
 from typing import NamedTuple
 
-from vrs.agenda import Agenda
+import numpy as np
+
+from vrs.agenda import Agenda, Moment
+from vrs.anchoring import Anchored, anchored
+from vrs.chunk import HOLD, Piece, State
 from vrs.commands import (
+    Cancel,
     Insertion,
+    InsertVia,
+    JointTarget,
     Lateness,
     MotionCommand,
+    PlanEdit,
     Profile,
+    Resume,
+    Retime,
+    ScaleTime,
     SteerCommand,
+    Stop,
 )
 from vrs.errors import InvalidValueError, PlanningError, UnreachablePoseError
 from vrs.insertion import (
     Edit,
+    Gap,
     JoinPlanner,
     MovePlanner,
+    end_of_move,
+    fill,
+    gap_at,
+    hold,
     insert,
     joined,
     lengthened,
+    move_before,
+    next_move,
     piece,
+    stay,
 )
-from vrs.ledger import Ledger
-from vrs.model import Limits, RobotModel, frozen_array
+from vrs.ledger import Change, Entry, Ledger
+from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.moves import join, move
-from vrs.planning import Plan
-from vrs.planning.plan import end_position
+from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
+from vrs.passing import Passer
+from vrs.planning import Plan, rounding, steering, stopping
+from vrs.planning.certificate import violation
+from vrs.planning.plan import end_position, end_state
 from vrs.receipt import Receipt, Status
-from vrs.rescheduling import owner_before
+from vrs.rescheduling import braked, moved, owner_before, removed, room, span
+from vrs.standing import MOST_KNOWN, Known, Standing
 from vrs.timeline import Timeline
 
 REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
@@ -41,6 +68,9 @@ REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
 
 FRESH = 0.2
 """Age [s] at which a steering input ends."""
+
+_ROOM = 1e-3
+"""Least room [s] to be filled before what follows a stop."""
 
 
 class Paused(NamedTuple):
@@ -115,9 +145,44 @@ class Scheduler(Agenda[Timeline]):
         return self.accept(receipt, command, edit, t, appended=appended)
 
     def _passing(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit[Timeline]:
-        from vrs.passing import passing
+        """Insert a move that begins before the one that ends at t is over, and passes its target at a distance.
 
-        return passing(self, command, t, command_id, now)
+        Args:
+            command: The command, its deviation above 0.
+            t: Where it would begin if it stopped [s].
+            command_id: Of the command.
+            now: Present time [s]; None offline.
+
+        Raises:
+            PlanningError: If it can't be planned.
+        """
+        gap, dropped = gap_at(self.timeline, t, command.insertion)
+        planner, joiner = self.planner(command), self.joiner(command)
+        found = move_before(self.timeline, t, -inf if now is None else now, cut=command.deviation == inf)
+        # A smooth move that was cut a moment after its start has no speed yet, but an acceleration.
+        moving = gap.state.qd.any() or (gap.state.qdd.any() and found is not None and self.smooth(found[2]))
+        if found is None or moving:
+            made = fill(self.timeline, gap, command_id, planner, joiner, dropped)
+            if command.deviation == inf:
+                return made
+            return made._replace(notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
+        first, begin, passed_by = found
+        rest = np.zeros_like(gap.state.q)
+        gap = gap._replace(state=State(gap.state.q, rest, rest))
+        second, target, note = planner(gap.state)
+        before = self.ledger.command(passed_by)
+        smooth = command.profile is not Profile.JERK_LIMITED or self.smooth(passed_by)
+        passer = Passer(
+            self.model, self.limits, self.timeline, self.planner, command, gap, t, (passed_by, before, smooth), now
+        )
+        if command.deviation == inf:
+            way = passer.continuous(first, second, begin, note)
+        else:
+            way = passer.rounded(first, begin, replace(command, target=JointTarget(target)))
+        if way.start < t and dropped is not None:
+            dropped = (passed_by, *dropped)
+        gap = gap._replace(cut=way.start, start=way.start)
+        return fill(self.timeline, gap, command_id, lambda _: (way.plan, target, way.note), joiner, dropped)
 
     def planner(self, command: MotionCommand, limits: Limits | None = None) -> MovePlanner:
         """Plan a command's move, under the limits in force now or others."""
@@ -129,8 +194,6 @@ class Scheduler(Agenda[Timeline]):
 
     def stop_at(self, t: float) -> tuple[Plan, str]:
         """Plan a stop of each joint at t [s], jerk-limited where the motion is; and what must be said of it."""
-        from vrs.planning import stopping
-
         profile = self.profile(owner_before(self.timeline, t))
         return stopping.stop(self.timeline.state_before(t), profile, self.limits)
 
@@ -156,8 +219,6 @@ class Scheduler(Agenda[Timeline]):
 
     def steer(self, command: SteerCommand, now: float | None) -> Receipt:
         """Go on, from now, as a hand asks; inputs in a row with nothing else between are one command."""
-        from vrs.planning import steering
-
         asked = command.execute_at
         issued = command.issued_at if command.issued_at is not None else now
         try:
@@ -220,3 +281,454 @@ class Scheduler(Agenda[Timeline]):
     def go_on_steering(self, command_id: int, start: float) -> None:
         """Let the next steering input go on with a command that began at a time [s]."""
         self._session = _Session(command_id, self.timeline.version, start)
+
+    def edit(self, command: PlanEdit, now: float | None) -> Receipt:
+        """Carry out an edit of the self.
+
+        Args:
+            command: The edit.
+            now: Present time [s]; None offline.
+
+        Returns:
+            The receipt of the command that was edited, or of the edit; rejected, with nothing changed, where it
+            can't be.
+
+        Raises:
+            UnknownCommandError: If it names a command that has no receipt.
+        """
+        if isinstance(command, (Retime, Cancel, InsertVia)):
+            receipt = self.ledger.receipt(command.command_id)
+            issued = command.issued_at if command.issued_at is not None else now
+            try:
+                if isinstance(command, Retime):
+                    return self._retime(command, receipt, now)
+                if isinstance(command, Cancel):
+                    return self._cancel(command, receipt, now)
+                return self._insert_via(command, receipt, now)
+            except REFUSALS as error:
+                version = self.timeline.version
+                asked = command.execute_at
+                return Receipt(
+                    receipt.command_id, Status.REJECTED, issued, asked, reason=str(error), version=version
+                )
+        try:
+            if isinstance(command, ScaleTime):
+                return self.scale(command, now)
+            if isinstance(command, Stop):
+                return self.stop(command, now)
+            return self.resume(command, now)
+        except REFUSALS as error:
+            issued = command.issued_at if command.issued_at is not None else now
+            return self.reject(issued, command.execute_at, str(error))
+
+    def _motion(self, receipt: Receipt) -> MotionCommand:
+        """The command of a move, with the arm solution that it got.
+
+        Raises:
+            PlanningError: If it was no motion command.
+        """
+        command = self.ledger.command(receipt.command_id)
+        if command is None or receipt.q is None:
+            raise PlanningError(f"command {receipt.command_id} is no move that can be planned anew")
+        return replace(command, target=JointTarget(receipt.q), insertion=Insertion.SPLICE)
+
+    def _retime(self, command: Retime, receipt: Receipt, now: float | None) -> Receipt:
+        moment = self.moment(command, now, command.execute_at)
+        t = moment.t
+        start, _ = _scheduled(receipt, -np.inf if now is None else now)
+        segments = span(self.timeline, receipt.command_id, start)
+        if now is not None and min(start, self._first(segments)) < now:
+            raise PlanningError(f"command {receipt.command_id} began at {start:.6g} s")
+        motion = self._motion(receipt)
+        planner, joiner = self.planner(motion), self.joiner(motion)
+        reason = joined(moment.reason, f"retimed from {start:.6g} s")
+        if segments is not None:
+            earliest, latest = room(self.timeline, *segments)
+            if earliest <= t < latest:
+                made = moved(self.timeline, *segments, t, receipt.command_id, planner, joiner, self.stop_at)
+                at = min(start, t, self.timeline.start_of(segments[0]))
+                return self.accept(self._as_planned(receipt, made, moment, reason, at), motion, made, at)
+        # It goes past another move: it's taken out, and commanded again at its new time.
+        before = self.timeline
+        taken = self._take_out(receipt, start, now)
+        try:
+            made = insert(self.timeline, t, Insertion.SPLICE, receipt.command_id, planner, joiner)
+        except REFUSALS:
+            self.ledger.take_back(before.version)
+            self.timeline = before
+            raise
+        answer = self._as_planned(receipt, made, moment, reason, t)
+        answer = replace(
+            answer,
+            shift=taken.shift + made.shift,
+            shifted_names=partial(_united, taken, answer, "shifted"),
+            superseded_names=partial(_united, taken, answer, "superseded"),
+            reason=joined(answer.reason, taken.reason.removeprefix("cancelled; ").removeprefix("cancelled")),
+        )
+        accepted = self.accept(answer, motion, made, t)
+        self.ledger.fuse()
+        return accepted
+
+    def _as_planned(
+        self, receipt: Receipt, made: Edit[Timeline], moment: Moment, reason: str, at: float
+    ) -> Receipt:
+        """A command's receipt after it was planned anew, by an edit that changes nothing before a time."""
+        shifted, dropped = self.touched(made, at)
+        return replace(
+            receipt,
+            status=moment.status,
+            execute_at=made.start,
+            end=made.arrival,
+            q=frozen_array(made.target),
+            reason=joined(reason, made.notes),
+            version=made.timeline.version,
+            shift=made.shift,
+            shifted_names=shifted,
+            superseded_names=dropped,
+        )
+
+    def _cancel(self, command: Cancel, receipt: Receipt, now: float | None) -> Receipt:
+        moment = self.moment(command, now, -np.inf)
+        start, _ = _scheduled(receipt, moment.t)
+        return self._take_out(receipt, max(start, moment.t), now)
+
+    def _first(self, segments: tuple[int, int] | None) -> float:
+        """The knot at which a move begins [s]: its receipt's time may lie a rounding later."""
+        return np.inf if segments is None else self.timeline.start_of(segments[0])
+
+    def _take_out(self, receipt: Receipt, t: float, now: float | None) -> Receipt:
+        """Take a move out of the plan from t on; the one after it goes from where the arm then stands."""
+        timeline = self.timeline
+        segments = span(timeline, receipt.command_id, receipt.execute_at if receipt.execute_at is not None else t)
+        started = receipt.execute_at is not None and receipt.execute_at < t
+        started = started or (now is not None and self._first(segments) < now)
+        reason = f"cancelled from {t:.6g} s on" if started else "cancelled"
+        others: tuple[Entry, ...] = ()
+        if segments is None:
+            made = Edit(timeline.with_version(timeline.version + 1), t, t, timeline.state_before(t).q)
+        else:
+            # Receipts' times are rounded: what hasn't begun is taken out from its first segment on.
+            gap, following = removed(timeline, *segments, t if started else -np.inf, self.stop_at)
+            if following is None:
+                made = Edit(timeline.edited(gap.cut, gap.lead), gap.start, gap.start, gap.state.q, notes=gap.note)
+            else:
+                made, others = self._replanned(gap, following, receipt.command_id)
+        shifted, dropped = self.touched(made, t)
+        answer = replace(
+            receipt,
+            reason=joined(reason, made.notes),
+            version=made.timeline.version,
+            undone=True,
+            shift=made.shift,
+            shifted_names=shifted,
+            superseded_names=dropped,
+        )
+        return self.accept(answer, self.ledger.command(receipt.command_id), made, t, others=others)
+
+    def _replanned(self, gap: Gap, following: int, cancelled: int) -> tuple[Edit[Timeline], tuple[Entry, ...]]:
+        """Plan the move that begins with a segment anew, from where a gap leaves the arm."""
+        timeline = self.timeline
+        other = timeline.owner_of(following)
+        try:
+            receipt = self.ledger.receipt(other)
+            motion = self._motion(receipt)
+            _scheduled(receipt, gap.cut)
+            made = fill(timeline, gap, other, self.planner(motion), self.joiner(motion))
+        except (*REFUSALS, LookupError):
+            # It can't be planned from there: the arm goes to where it begins.
+            note = f"the arm still goes to where command {other} begins"
+            gap = braked(timeline, gap, following, self.stop_at)
+            join = self.joiner(MotionCommand(JointTarget(gap.state.q), profile=self.profile(cancelled)))
+            return fill(timeline, gap, cancelled, stay(note), join), ()
+        text = f"goes from elsewhere, as command {cancelled} was cancelled"
+        shifted = replace(
+            receipt,
+            execute_at=made.start,
+            end=made.arrival,
+            reason=joined(text, made.notes),
+            version=made.timeline.version,
+        )
+        return made, ((shifted, self.ledger.command(other)),)
+
+    def _insert_via(self, command: InsertVia, receipt: Receipt, now: float | None) -> Receipt:
+        moment = self.moment(command, now, -np.inf)
+        start, end = _scheduled(receipt, moment.t)
+        t = max(start, moment.t)
+        timeline, motion = self.timeline, self._motion(receipt)
+        segments = span(timeline, receipt.command_id, start)
+        if segments is None or t >= end:
+            raise PlanningError(f"command {receipt.command_id} has no move left that could go by a via")
+        to_via = replace(motion, target=command.target)
+
+        def by_way(state: State) -> tuple[Plan, Array, str]:
+            _, via, _ = self.planner(to_via)(state)
+            rest = State(via, np.zeros_like(via), np.zeros_like(via))
+            there = replace(motion, target=JointTarget(via))
+
+            def plans(limits: Limits) -> tuple[Plan, Plan, str]:
+                first, _, first_note = self.planner(there, limits)(state)
+                second, _, second_note = self.planner(motion, limits)(rest)
+                return first, second, joined(first_note, second_note)
+
+            way = rounding.rounded(plans, command.deviation, self.model, self.limits, motion.profile)
+            return way.whole, frozen_array(receipt.q if receipt.q is not None else via), way.note
+
+        gap = Gap(t, t, timeline.state_before(t), next_move(timeline, segments[1]))
+        made = fill(timeline, gap, receipt.command_id, by_way, self.joiner(motion))
+        made = made._replace(start=start)
+        reason = joined(moment.reason, "goes by a via")
+        return self.accept(self._as_planned(receipt, made, moment, reason, t), motion, made, t)
+
+    def scale(self, command: ScaleTime, now: float | None) -> Receipt:
+        """Let what is scheduled run at another pace.
+
+        Raises:
+            PlanningError: If a limit would be passed.
+        """
+        moment = self.moment(command, now, self.timeline.start)
+        timeline, factor = self.timeline, command.factor
+        t = max(moment.t, timeline.start)
+        moment = moment._replace(t=t)
+        if factor > 1:
+            self._check_faster(t, factor)
+        for jerk in (False, True):
+            law = paced(timeline, t, factor, self.limits, jerk=jerk)
+            ramp = list(composed(timeline, law))
+            # Jerk limits bind where any of what the pace changes in keeps them.
+            if all(self.profile(part.command_id) is not Profile.JERK_LIMITED for part in ramp):
+                break
+        s = law.end if law.durations else t
+        pieces = [*ramp, *remainder(timeline, s, factor)]
+        after = timeline.edited(t, pieces) if t < timeline.end else timeline.with_version(timeline.version + 1)
+
+        def moved(old: float) -> float:
+            if old < t:
+                return old
+            return t + (law.when(old) if old < s else law.duration + (old - s) / factor)
+
+        change = Change(after.version, self.ledger.newest + 1, t, frozenset(), moved, stills=False)
+        receipt = self._edit_receipt(moment, after, t + law.duration, f"{factor:g} times as fast")
+        begin = t + law.waits
+        if factor != 1 and begin < timeline.end:
+            receipt = replace(receipt, shifted_names=self.named(timeline, max(timeline.index_at(begin), 0), begin))
+        self.timeline = after
+        return self.ledger.accept(receipt, None, timeline, change)
+
+    def stop(self, command: Stop, now: float | None) -> Receipt:
+        """Stop along the present motion, from the commanded state, and drop what is scheduled."""
+        moment = self.moment(command, now, self.timeline.end)
+        timeline, t = self.timeline, moment.t
+        number = self.ledger.newest + 1
+        profile = self.profile(owner_before(timeline, t))
+        jerky = profile is Profile.JERK_LIMITED
+        state = timeline.state_before(t)
+        braking, note = self.stop_at(t)
+        reason = "stood"
+        pieces: list[Piece] = []
+        if len(braking):
+            straight = self._straight_stop(state, t) if jerky else None
+            if straight is not None:
+                way = [piece(straight, owner_before(timeline, t))]
+            else:
+                way = list(composed(timeline, halting(timeline, t, self.limits, jerk=jerky)))
+            smooth = not jerky or all(self.smooth(i) for i in {part.command_id for part in way})
+            # A plan made under other limits may have no way to stop on that keeps these.
+            keeps = violation(as_plan(way, timeline.dof), self.limits, jerk=jerky) is None
+            on_way = sum(sum(part.durations) for part in way)
+            if smooth and keeps and stopping.is_prompt(on_way, braking.duration):
+                reason = "stopped on its way"
+                pieces = [part._replace(command_id=number) for part in way]
+            else:
+                reason = joined("each joint braked: the limits don't let it keep to its way", note)
+                pieces = [piece(braking, number)]
+        after = timeline.edited(t, pieces)
+        end = t + sum(sum(part.durations) for part in pieces)
+        names = self.named(timeline, max(timeline.index_at(t), 0), t)
+        receipt = self._edit_receipt(moment, after, end, reason)
+        receipt = replace(receipt, q=frozen_array(after.sample(end)), superseded_names=names)
+        change = Change(after.version, number, t, None)
+        self.timeline = after
+        self.note_profile(number, profile)
+        self.paused = Paused(after.version, timeline, t)
+        return self.ledger.accept(receipt, None, timeline, change)
+
+    def resume(self, command: Resume, now: float | None) -> Receipt:
+        """Go on with what the newest stop interrupted and dropped.
+
+        The interrupted command is planned anew from where the arm stands; what was scheduled after it follows as it
+        was, at its time if that can still be.
+
+        Raises:
+            PlanningError: If nothing was stopped, or something was commanded since.
+        """
+        moment = self.moment(command, now, self.timeline.end)
+        paused, timeline = self.paused, self.timeline
+        if paused is None or paused.version != timeline.version:
+            raise PlanningError("there's nothing to resume: nothing was stopped, or something was commanded since")
+        t = max(moment.t, timeline.end)
+        old, index = paused.timeline, paused.timeline.index_at(paused.at)
+        number = self.ledger.newest + 1
+        owner = old.owner_of(index) if 0 <= index < len(old) else HOLD
+        interrupted = self.ledger.before(owner, paused.version)
+        motion = self.ledger.command(owner)
+        segments = None
+        if interrupted is not None and interrupted.execute_at is not None:
+            segments = span(old, owner, interrupted.execute_at)
+        after_it = max(index, 0)
+        if segments is not None:
+            after_it = segments[1]
+        elif owner != HOLD:
+            after_it = end_of_move(old, index)
+        tail = next_move(old, after_it)
+        unfinished = interrupted is not None and interrupted.end is not None and interrupted.end > paused.at
+        goes_on = unfinished and motion is not None
+        if unfinished and not goes_on and tail is None:
+            raise PlanningError(f"there's nothing to resume: command {owner} steered, and its inputs are old")
+        joiner = self.joiner(motion or MotionCommand(JointTarget(old.initial), profile=self.profile(owner)))
+        planner = stay("")
+        if motion is not None and interrupted is not None and interrupted.q is not None and goes_on:
+            planner = self.planner(replace(motion, target=JointTarget(interrupted.q)))
+        rest = np.zeros(timeline.dof)
+        state = State(timeline.state_before(t).q, rest, rest)
+        waiting, begin, placed, following = timeline, np.inf, np.inf, None
+        if tail is not None:
+            # What followed is put behind the present, so that the gap before it can be filled.
+            begin = old.start_of(tail)
+            placed = max(begin, t + _ROOM)
+            followers = [old.segment(i) for i in range(tail, len(old))]
+            pieces = [Piece([s.duration], [s.coefficients], s.command_id or HOLD) for s in followers]
+            waiting = timeline.edited(t, [hold(placed - t, state.q), *pieces])
+            # Counted, not looked up by time: the first of them may be too short to last at its time.
+            following = len(waiting) - len(pieces)
+        made = fill(waiting, Gap(t, t, state, following), owner or number, planner, joiner)
+        after = made.timeline.with_version(timeline.version + 1)
+        shift = made.shift + placed - begin if tail is not None else 0.0
+
+        def moved(was: float) -> float:
+            return was + shift if was >= begin else was
+
+        change = Change(after.version, number, paused.at, frozenset(), moved, begin)
+        lost = [
+            i for i in old.owners(max(index, 0), len(old) if tail is None else tail) if not (goes_on and i == owner)
+        ]
+        others: tuple[Entry, ...] = ()
+        if interrupted is not None and goes_on:
+            reason = joined("goes on after a stop", made.notes)
+            again = replace(interrupted, execute_at=t, end=made.arrival, version=after.version, reason=reason)
+            others = ((again, motion),)
+        moment = moment._replace(t=t)
+        receipt = self._edit_receipt(moment, after, made.arrival, joined("resumed", made.notes))
+        names = tuple(i for i in lost if not self.ledger.arrived(i, paused.at))
+        receipt = replace(receipt, shift=shift, superseded_names=names)
+        self.timeline = after
+        return self.ledger.reinstate(receipt, timeline, change, others)
+
+    def _straight_stop(self, state: State, t: float) -> Plan | None:
+        """A stop at t along a way that's straight in joint space, and long enough; None where it isn't."""
+        until = straight_until(self.timeline, t)
+        found = None if until is None else stopping.straight_stop(state, self.limits)
+        if found is None or until is None:
+            return None
+        ahead, needed = self.timeline.sample(until) - state.q, end_state(found).q - state.q
+        return found if ahead @ state.qd >= needed @ state.qd else None
+
+    def _edit_receipt(self, moment: Moment, after: Timeline, end: float, reason: str) -> Receipt:
+        reason = joined(moment.reason, reason)
+        number = self.ledger.newest + 1
+        stamps = moment.issued, moment.asked, moment.t
+        return Receipt(number, moment.status, *stamps, end, None, reason, after.version)
+
+    def _check_faster(self, t: float, factor: float) -> None:
+        """Refuse a pace that passes a limit, and say how fast it could be.
+
+        Raises:
+            PlanningError: If it does.
+        """
+        timeline = self.timeline
+
+        def problem(pace: float) -> str | None:
+            pieces = list(remainder(timeline, t, pace))
+            smooth = [part for part in pieces if self.profile(part.command_id) is Profile.JERK_LIMITED]
+            found = violation(as_plan(pieces, timeline.dof), self.limits, jerk=False)
+            return found or violation(as_plan(smooth, timeline.dof), self.limits, jerk=True)
+
+        found = problem(factor)
+        if found is None:
+            return
+        low, high = 1.0, factor
+        for _ in range(20):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if problem(middle) is None else (low, middle)
+        raise PlanningError(f"{found}; what is scheduled can run at most {low:.4g} times as fast")
+
+    def anchor(self, truth: Timeline, t: float) -> Anchored:
+        """Let what is scheduled go over into another timeline from t on; see `vrs.anchoring.anchored`.
+
+        Commands that have moves in the other timeline stand, at the times that they have there; the others are
+        superseded. Nothing can be taken back past this.
+        """
+        before = self.timeline
+        made = anchored(before, truth, t, self.limits)
+        times: dict[int, tuple[float, float]] = {}
+        for index in range(max(truth.index_at(t), 0), len(truth)):
+            owner = truth.owner_of(index)
+            if owner != HOLD:
+                start, _ = times.get(owner, (truth.start_of(index), t))
+                times[owner] = start, truth.start_of(index + 1)
+        version = before.version + 1
+        self.timeline = made.timeline.with_version(version)
+        self.ledger.rebase(Change(version, 0, t, None), times)
+        return replace(made, timeline=self.timeline)
+
+    def standing(self, now: float) -> Standing:
+        """How it stands at a time [s]; what costs no more than what is scheduled."""
+        timeline, ledger = self.timeline, self.ledger
+        first = max(timeline.index_at(now) - 1, 0)
+        last = min(len(timeline), first + MOST_KNOWN)
+        names = dict.fromkeys(timeline.owners(first, last))
+        session = self.steered
+        if session is not None:
+            names.setdefault(session[0])
+        for command_id in ledger.stills_from(now):
+            names.setdefault(command_id)
+        known = tuple(
+            Known(ledger.receipt(command_id), ledger.command(command_id), self.profile(command_id))
+            for command_id in sorted(names)[-MOST_KNOWN:]
+            if command_id != HOLD and command_id in ledger
+        )
+        return Standing(ledger.newest, self.lateness, self.limits, session, known)
+
+    def take_up(self, stand: Standing) -> None:
+        """Go on from there; it was just made on the same timeline."""
+        self.ledger.newest = stand.newest
+        self.lateness, self.limits = stand.lateness, stand.limits
+        for one in stand.known:
+            self.ledger.note(one.receipt, one.command)
+            if one.command is None:
+                self.note_profile(one.receipt.command_id, one.profile)
+        if stand.steered is not None and stand.steered[0] in self.ledger:
+            self.go_on_steering(*stand.steered)
+
+
+def _scheduled(receipt: Receipt, t: float) -> tuple[float, float]:
+    """Start and end of a move that isn't over at t [s].
+
+    Raises:
+        PlanningError: If there's none.
+    """
+    start, end, name = receipt.execute_at, receipt.end, f"command {receipt.command_id}"
+    if receipt.undone:
+        raise PlanningError(f"{name} was taken back")
+    if receipt.superseded_by is not None:
+        raise PlanningError(f"{name} was superseded by command {receipt.superseded_by}")
+    if start is None or end is None:
+        raise PlanningError(f"{name} was rejected")
+    if end < t:
+        raise PlanningError(f"{name} is over: it arrived at {end:.6g} s")
+    return start, end
+
+
+def _united(first: Receipt, second: Receipt, names: str) -> tuple[int, ...]:
+    """Commands that either of two edits names, except the one that's edited."""
+    both = (*getattr(first, names), *getattr(second, names))
+    return tuple(dict.fromkeys(i for i in both if i != first.command_id))

@@ -25,7 +25,7 @@ from vrs import (
     ScaleTime,
     Stop,
     Timeline,
-    tempo,
+    scheduler,
 )
 from vrs.chunk import Piece
 from vrs.receipt import Receipt
@@ -261,7 +261,7 @@ def test_a_retime_of_the_rest_after_a_stop_breaks_no_law() -> None:
 
 @pytest.mark.parametrize("command", [ScaleTime(0.5, execute_at=0.9), Stop(execute_at=0.9)])
 def test_leaving_the_way_is_seen(command: ScaleTime | Stop, monkeypatch: pytest.MonkeyPatch) -> None:
-    watch, composed = watched(speed=0.3), tempo.composed
+    watch, composed = watched(speed=0.3), scheduler.composed
 
     def spoiling(*args: Any) -> Iterator[Piece]:
         for piece in composed(*args):
@@ -272,15 +272,15 @@ def test_leaving_the_way_is_seen(command: ScaleTime | Stop, monkeypatch: pytest.
             yield Piece([h], [a], piece.command_id)
 
     scale_limits(monkeypatch, "qdd_max", 1.1)
-    monkeypatch.setattr(tempo, "composed", spoiling)
-    monkeypatch.setattr(tempo, "violation", lambda *_, **__: None)
+    monkeypatch.setattr(scheduler, "composed", spoiling)
+    monkeypatch.setattr(scheduler, "violation", lambda *_, **__: None)
     with pytest.raises(LawBrokenError, match="off the way"):
         watch.execute(command)
 
 
 def test_a_wrong_pace_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    watch, remainder = watched(), tempo.remainder
-    monkeypatch.setattr(tempo, "remainder", lambda timeline, s, pace: remainder(timeline, s, pace * (1.0 + 2e-9)))
+    watch, rest = watched(), scheduler.remainder
+    monkeypatch.setattr(scheduler, "remainder", lambda timeline, s, pace: rest(timeline, s, pace * (1.0 + 2e-9)))
     with pytest.raises(LawBrokenError, match="pace"):
         watch.execute(ScaleTime(0.5))
 
