@@ -10,7 +10,7 @@ from typing import Final, Literal
 
 from interfaces.val2 import forms, kinds, walk
 from interfaces.val2.alone import stray
-from interfaces.val2.compiler import refusal
+from interfaces.val2.compiler import compiled, refusal
 from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
 from interfaces.val2.errors import Place, ValError
 from interfaces.val2.grammar import SIGNIFICANT
@@ -109,7 +109,7 @@ class _Checker:
     def __init__(self, source: SourceFile, unreadable: Collection[int], words: Collection[str]) -> None:
         self._unreadable = unreadable
         self._programs = {program.name: program for program in source.programs}
-        self._context = Context(Arm(EngineRobot(Engine(puma560.model()))))
+        self._context = Context(Arm(EngineRobot(Engine(puma560.model()))), compiled)
         """For what compiling shows; nothing runs in it."""
         self._set: dict[str, set[str]] = defaultdict(set)
         """Programs by which names are set; the empty name stands for all."""

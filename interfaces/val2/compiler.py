@@ -8,17 +8,18 @@ error at its END, and a CASE whose head was jumped over ends where the next VALU
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
+from interfaces.val2.code import Code, StepFunction
 from interfaces.val2.context import SPECIAL, Context, Invoke, Leave
 from interfaces.val2.dialogue import prompt_step, type_step
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Warned
-from interfaces.val2.expressions import Expressions, ResultKind
+from interfaces.val2.expressions import ResultKind
 from interfaces.val2.forms import UNAVAILABLE
+from interfaces.val2.functions import expressions
 from interfaces.val2.geometry import to_oat
-from interfaces.val2.instructions import StepFunction, instruction
+from interfaces.val2.instructions import instruction
 from interfaces.val2.memory import MOST_DIMENSIONS, Slot, index, mismatch, undefined, where
 from interfaces.val2.operations import Slots
 from interfaces.val2.reactions import reaction_to
@@ -56,29 +57,6 @@ from interfaces.val2.syntax import (
     While,
 )  # fmt: skip
 from interfaces.val2.values import Location, Transformation
-
-
-@dataclass(frozen=True, slots=True)
-class Code:
-    """A compiled program."""
-
-    program: Program
-    steps: list[StepFunction]
-    """One more than the program has: the last is its end."""
-    names: int
-    """How many names are the call's own: arguments first."""
-    kept: int
-    """How many FOR and CASE there are."""
-
-    def slots(self, arguments: list[Slot]) -> list[Any]:
-        """What a call has of its own.
-
-        Raises:
-            ValError: If there are too many arguments.
-        """
-        if len(arguments) > len(self.program.parameters):
-            raise ValError("Too many arguments", f"{self.program.name} takes {len(self.program.parameters)}")
-        return [*arguments, *[Slot() for _ in range(self.names - len(arguments))], *[None] * self.kept]
 
 
 def compiled(program: Program, context: Context) -> Code:
@@ -119,7 +97,7 @@ class _Compiler:
                 else:
                     scope[name] = context.memory.own(program.name, name)
         self.names = names
-        self.x = Expressions(context, scope)
+        self.x = expressions(context, scope)
         self.kept: dict[int, int] = {}
 
     def code(self) -> Code:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from collections.abc import Generator, MutableMapping
+from collections.abc import Callable, Generator, MutableMapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
+from interfaces.val2.code import Code
 from interfaces.val2.errors import Place, ValError
 from interfaces.val2.events import Event, SignalChanged, Warned
 from interfaces.val2.forms import PARAMETERS, SWITCHES
@@ -15,10 +16,7 @@ from interfaces.val2.memory import Memory, where
 from interfaces.val2.ports import ArmPort
 from interfaces.val2.reactions import Reactions
 from interfaces.val2.signals import Signals
-from interfaces.val2.syntax import NOWHERE
-
-if TYPE_CHECKING:
-    from interfaces.val2.compiler import Code
+from interfaces.val2.syntax import NOWHERE, Program
 
 SPECIAL: Final = -1
 """What a step returns instead of the next step's index when `Context.pending` holds what is to be done."""
@@ -88,6 +86,8 @@ class Context:
     """What the closures of compiled programs reach out to."""
 
     arm: ArmPort
+    compile: Callable[[Program, Context], Code]
+    """Makes closures of a program; see `interfaces.val2.compiler.compiled`."""
     memory: Memory = field(default_factory=Memory)
     signals: Signals = field(default_factory=Signals)
     reactions: Reactions = field(default_factory=Reactions)
@@ -122,14 +122,12 @@ class Context:
         Raises:
             ValError: If there's none, or its structures don't match.
         """
-        from interfaces.val2.compiler import compiled
-
         program = self.memory.programs.get(name)
         if program is None:
             raise ValError("Undefined program name", name, place=where(at))
         code = self.compiled.get(name)
         if code is None or code.program is not program:
-            code = self.compiled[name] = compiled(program, self)
+            code = self.compiled[name] = self.compile(program, self)
         return code
 
     def go_on(self, following: int) -> int:

@@ -17,7 +17,7 @@ from interfaces.val2.compiler import compiled
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Event, Failed
-from interfaces.val2.expressions import Expressions
+from interfaces.val2.functions import expressions
 from interfaces.val2.interpreter import State, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, Slot
 from interfaces.val2.ports import ArmPort
@@ -77,7 +77,7 @@ class Controller:
             rng: Of RANDOM.
             now: Session time [s]; timers begin here.
         """
-        self.context = Context(arm, memory or Memory(), now=now)
+        self.context = Context(arm, compiled, memory or Memory(), now=now)
         if rng is not None:
             self.context.rng = rng
         if parameters is not None:
@@ -166,7 +166,7 @@ class Controller:
         context = self.context
         context.now = max(now, context.now)
         code = context.code(name)
-        x = Expressions(context)
+        x = expressions(context)
         slots = [x.reference(a)([]) if isinstance(a, Variable) else Slot(x.value(a)([])) for a in arguments]
         task = Task(context, code, slots, cycles=cycles, step=step, single=single)
         rules = [self._rule(r) for r in self.cell]
@@ -178,7 +178,7 @@ class Controller:
         self.signals.begin(rules, now=context.now)
 
     def _rule(self, rule: SignalRule) -> Rule:
-        test = Expressions(self.context).condition(rule.value)
+        test = expressions(self.context).condition(rule.value)
 
         def holds() -> bool:
             try:
@@ -311,7 +311,7 @@ class Controller:
             ValError: If it has none.
         """
         self.context.now = max(now, self.context.now)
-        return Expressions(self.context).value(expression)([])
+        return expressions(self.context).value(expression)([])
 
     def forget(self) -> None:
         """ZERO: no program, no variables; outputs off.

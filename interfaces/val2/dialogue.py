@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Generator
 
 from interfaces.val2 import formats
+from interfaces.val2.code import StepFunction
 from interfaces.val2.context import SPECIAL, Waiting
 from interfaces.val2.events import Asked, Typed
 from interfaces.val2.expressions import Expressions
-from interfaces.val2.instructions import StepFunction
 from interfaces.val2.memory import Slot, mismatch
 from interfaces.val2.operations import Slots
 from interfaces.val2.syntax import Expression, Format, Prompt, Variable

@@ -6,9 +6,9 @@ Global names are bound when a program is compiled, its arguments and its own nam
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum, auto
-from typing import Any, Final, TypeAlias, cast
+from typing import Any, Final, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -44,23 +44,34 @@ class ResultKind(Enum):
     """A name without a prefix: a real or a transformation."""
 
 
+class Functions(NamedTuple):
+    """Makes closures of functions of the language, whose arguments are expressions again."""
+
+    results: Mapping[str, ResultKind]
+    """What functions give that aren't reals."""
+    real: Callable[[Expressions, Apply], Real]
+    string: Callable[[Expressions, Apply], String]
+    frame: Callable[[Expressions, Apply], Frame]
+    point: Callable[[Expressions, Apply], Callable[[Slots], PrecisionPoint]]
+
+
 class Expressions:
     """Makes closures of the expressions of one program."""
 
-    def __init__(self, context: Context, scope: dict[str, int | Slot] | None = None) -> None:
+    def __init__(self, context: Context, functions: Functions, scope: dict[str, int | Slot] | None = None) -> None:
         """Bind to a context.
 
         Args:
             context: Holds the memory.
+            functions: Of the language.
             scope: Where the program's own names are: numbers in the call's slots, or slots that last.
         """
         self.context = context
+        self._functions = functions
         self._scope = scope or {}
 
     def kind(self, e: Expression) -> ResultKind:
         """What an expression is."""
-        from interfaces.val2.functions import RESULTS
-
         match e:
             case Number() | Unary():
                 return ResultKind.REAL
@@ -71,7 +82,7 @@ class Expressions:
             case Variable():
                 return {"$": ResultKind.STRING, "#": ResultKind.POINT}.get(e.prefix, ResultKind.NAME)
             case Apply():
-                return RESULTS.get(e.function, ResultKind.REAL)
+                return self._functions.results.get(e.function, ResultKind.REAL)
             case Binary():
                 both = (self.kind(e.left), self.kind(e.right))
                 return ResultKind.STRING if e.operator == "+" and ResultKind.STRING in both else ResultKind.REAL
@@ -159,9 +170,7 @@ class Expressions:
                     return lambda s: -1.0 if test(s) else 0.0
                 return self._binary(e)
             case Apply():
-                from interfaces.val2.functions import real_function
-
-                return real_function(self, e)
+                return self._functions.real(self, e)
             case _:
                 raise ValError("Invalid expression", "a number was expected", place=where(e.at))
 
@@ -271,9 +280,7 @@ class Expressions:
                 left, right = self.string(e.left), self.string(e.right)
                 return lambda s: left(s) + right(s)
             case Apply() if self.kind(e) is ResultKind.STRING:
-                from interfaces.val2.functions import string_function
-
-                return string_function(self, e)
+                return self._functions.string(self, e)
             case _:
                 raise ValError("Invalid expression", "a string was expected", place=where(e.at))
 
@@ -307,9 +314,7 @@ class Expressions:
 
                 return compound
             case Apply() if self.kind(e) is ResultKind.TRANSFORMATION:
-                from interfaces.val2.locations import frame_function
-
-                return frame_function(self, e)
+                return self._functions.frame(self, e)
             case _:
                 raise ValError("Invalid expression", "a transformation was expected", place=where(e.at))
 
@@ -322,9 +327,7 @@ class Expressions:
         if isinstance(e, Variable) and e.prefix == "#":
             return cast("Callable[[Slots], PrecisionPoint]", self.read(e))
         if isinstance(e, Apply):
-            from interfaces.val2.locations import point_function
-
-            return point_function(self, e)
+            return self._functions.point(self, e)
         raise ValError("Invalid expression", "a precision point was expected", place=where(e.at))
 
     def location(self, e: Expression) -> Callable[[Slots], Location]:

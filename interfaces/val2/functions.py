@@ -10,12 +10,13 @@ import numpy as np
 from interfaces.val2 import arithmetic, formats
 from interfaces.val2.arguments import arguments, reals
 from interfaces.val2.arithmetic import truth, whole
+from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Warned
-from interfaces.val2.expressions import Expressions, ResultKind, String
+from interfaces.val2.expressions import Expressions, Functions, ResultKind, String
 from interfaces.val2.forms import FUNCTIONS
-from interfaces.val2.locations import FRAMES
-from interfaces.val2.memory import where
+from interfaces.val2.locations import FRAMES, frame_function, point_function
+from interfaces.val2.memory import Slot, where
 from interfaces.val2.operations import Real, Slots, placed
 from interfaces.val2.syntax import Apply, Format, Variable
 from interfaces.val2.values import Value
@@ -337,3 +338,11 @@ RESULTS: Final[dict[str, ResultKind]] = {
     **dict.fromkeys(("#PPOINT", "#HERE", "#DEST"), ResultKind.POINT),
 }
 """What functions give that aren't reals."""
+
+ALL: Final = Functions(RESULTS, real_function, string_function, frame_function, point_function)
+"""The functions of VAL-II."""
+
+
+def expressions(context: Context, scope: dict[str, int | Slot] | None = None) -> Expressions:
+    """What makes closures of VAL-II's expressions; see `Expressions`."""
+    return Expressions(context, ALL, scope)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import Any, Final, Protocol, TypeAlias
 
+from interfaces.val2.code import StepFunction
 from interfaces.val2.context import ARM, SLICE, SPECIAL, Action, Context, Finish, Suspend, Waiting
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
@@ -21,8 +22,6 @@ from interfaces.val2.ports import ALTER_PERIOD
 from interfaces.val2.settings import ALTERING, AT_ONCE, AT_REST
 from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Instruction, Number, Unary, Variable
 
-StepFunction: TypeAlias = Callable[[Slots], int]
-"""Does a step and returns the next one's index, or SPECIAL."""
 Pause: TypeAlias = Generator[float, None, None]
 _CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "RANDOM", "SPEED"}
 """Functions whose values change with time alone."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from interfaces.val2.compiler import Code
+from interfaces.val2.code import Code
 from interfaces.val2.context import (
     ARM,
     Action,
