@@ -54,8 +54,7 @@ def compare(
     differences.
     """
     from interfaces.recording.figures import differences
-    from interfaces.recording.kinds import check_alike
-    from interfaces.recording.recording import open_recording
+    from interfaces.recording.recording import check_alike, open_recording
     from interfaces.runs.summary import to_json
 
     with ExitStack() as stack:
@@ -82,7 +81,9 @@ def _summary(recording: Recording) -> dict[str, Any]:
     Raises:
         FormatError: If too little is left of it.
     """
-    value = recording.kind.summary(recording)
+    from interfaces.report.recorded import summary
+
+    value = summary(recording)
     for line in value.get("missing", ()):
         typer.echo(f"vrs: {recording.path.name}: missing: {line}", err=True)
     return value

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from interfaces.recording.engines import begun
 from interfaces.recording.history import arm_timeline
 from interfaces.recording.messages import OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
@@ -216,7 +217,7 @@ class _Reading:
     def _alone(self) -> Timeline:
         """What the commands alone make of the virtual robot."""
         sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
-        return carried_out(*self.recording.kind.begun(self.recording), sent)
+        return carried_out(*begun(self.recording), sent)
 
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[Packet, ...]:
         if not self._live:

@@ -1,130 +1,48 @@
-"""What of a recording depends on the kind of its robot: an arm, or a mobile robot."""
+"""The kinds of robots that recordings are of: an arm, or a mobile robot."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from dataclasses import dataclass
+from typing import Final
 
-from vrs.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from interfaces.recording.export import Table
-    from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
-    from interfaces.recording.messages import Begin
-    from interfaces.recording.playback import Frame
-    from interfaces.recording.recording import Recording
-    from interfaces.stream.meshcat import Committed
-    from interfaces.stream.meshcat.twins import TwinScene
-    from vrs.clock import ManualClock
-    from vrs.engine import Engine
-    from vrs.model import Array
+from interfaces.recording.messages import Begin
+from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE
 
 
-class Follower(Protocol):
-    """Says of a real robot how it follows the virtual one."""
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of robot, as recordings know it."""
 
-    def play(self, t: float) -> float | None:
-        """The time of the timeline at which the real robot is at a time [s]; None where nobody knows."""
-
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
-
-
-class Stage(Protocol):
-    """A recording's robots on a page."""
-
-    @property
-    def scene(self) -> TwinScene:
-        """What pages look at."""
-
-    def show(self, frame: Frame, committed: Committed | None, *, now: float) -> None:
-        """Show a frame whose virtual robot is known."""
-
-
-class Kind(ABC):
-    """A kind of robot."""
-
-    name: ClassVar[str]
+    name: str
     """For people, with its article."""
-    word: ClassVar[str]
+    word: str
     """For programs."""
-    virtual: ClassVar[str]
+    virtual: str
     """Topic of the virtual robot's samples."""
-    real: ClassVar[str]
+    real: str
     """Topic of the real robot's."""
-    unit: ClassVar[str]
-    """Of a follower's error: `rad` or `m`."""
+    unit: str
+    """Of how far the real robot is from the virtual one: `rad` or `m`."""
 
-    @abstractmethod
-    def told(self, begin: Begin) -> int:
-        """How many numbers the real robot was told at a time."""
 
-    def shows(self, begin: Begin) -> list[str]:  # noqa: ARG002 - an arm shows nothing more
-        """What a page shows of it besides both robots and the committed path."""
-        return []
-
-    @abstractmethod
-    def begun(self, recording: Recording) -> tuple[Engine, ManualClock]:
-        """An engine that stands as the recorded one did when the recording began, and its clock.
-
-        Raises:
-            FormatError: If it can't stand so, or what it needs for that is missing from the file.
-        """
-
-    @abstractmethod
-    def edit_entries(
-        self, before: AnyTimeline, after: AnyTimeline, edit: int, at: float, command_id: int | None
-    ) -> tuple[AnyChange | AnyHistory, ...]:
-        """An edit as it stands in a recording."""
-
-    @abstractmethod
-    def follower(self, recording: Recording) -> Follower:
-        """How the real robot of a recording follows."""
-
-    @abstractmethod
-    def prepare(self, recording: Recording) -> None:
-        """Read and load what takes long before a recording can be shown; from any thread."""
-
-    @abstractmethod
-    def stage(self, recording: Recording) -> Stage:
-        """The robots of a recording for a page."""
-
-    @abstractmethod
-    def summary(self, recording: Recording) -> dict[str, Any]:
-        """The run's figures from its recording alone.
-
-        Raises:
-            FormatError: If the recording has too little of it.
-        """
-
-    @abstractmethod
-    def tables(self, recording: Recording) -> tuple[Table, ...]:
-        """What is exported.
-
-        Raises:
-            FormatError: If the recording's robot isn't known.
-        """
+ARM: Final = Kind("an arm", "arm", VIRTUAL, REAL, "rad")
+"""Joints, and polynomials on its timeline."""
+MOBILE: Final = Kind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m")
+"""Postures, and arcs on its timeline."""
 
 
 def kind_of(begin: Begin) -> Kind:
     """The kind of a recording's robot."""
+    return ARM if begin.drive is None else MOBILE
+
+
+def references(begin: Begin) -> int:
+    """How many numbers the real robot was told at a time: a reference a joint; v and ω."""
+    return len(begin.q) if begin.drive is None else 2
+
+
+def shows(begin: Begin) -> list[str]:
+    """What a page shows besides both robots and the committed path: the paths, and what was learned of the room."""
     if begin.drive is None:
-        from interfaces.recording.arm import ARM
-
-        return ARM
-    from interfaces.recording.driving.kind import MOBILE
-
-    return MOBILE
-
-
-def check_alike(recordings: Sequence[Recording]) -> None:
-    """Refuse recordings of robots of different kinds.
-
-    Raises:
-        InvalidValueError: If they are.
-    """
-    names = [recording.kind.name for recording in recordings]
-    if len(set(names)) > 1:
-        given = f"{recordings[0].path} of {names[0]} and {recordings[1].path} of {names[1]}"
-        raise InvalidValueError("recordings", given, "of one kind of robot")
+        return []
+    return ["driven"] if begin.drive.grid is None else ["driven", "learned"]

@@ -15,8 +15,10 @@ from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
 from interfaces.playhead import Mode
+from interfaces.recording.kinds import shows
 from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Moment, Playback, Track
+from interfaces.recording.stages import stage_of
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import HEADERS, files
 from interfaces.stream.meshcat.viewers import Viewers
@@ -127,7 +129,7 @@ class ReplayPage:
             show: Time between two frames [s].
         """
         self.playback, self._clock, self._first, self._show = playback, clock, first, show
-        self._stages = tuple(track.recording.kind.stage(track.recording) for track in playback.tracks)
+        self._stages = tuple(stage_of(track.recording) for track in playback.tracks)
         self.scenes = tuple(stage.scene for stage in self._stages)
         self.board = Newest(BEGIN) if board is None else board
         """What pages are told: JSON by key."""
@@ -290,7 +292,7 @@ def _recording(track: Track, name: str, growing: bool) -> dict[str, Any]:
         "robot": session.robot,
         "kind": recording.kind.word,
         "unit": recording.kind.unit,
-        "shows": recording.kind.shows(session),
+        "shows": shows(session),
         "driver": session.driver,
         "delay": session.delay,
         "damage": "; ".join(filter(None, (str(damage) if damage else "", track.problem))),

@@ -6,20 +6,19 @@ import enum
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 
 from interfaces.playhead import LiveEdge, Mode, PlayHead
-from interfaces.recording.kinds import check_alike
+from interfaces.recording.driving.pursuit import Pursuit
+from interfaces.recording.kinds import ARM
 from interfaces.recording.marks import Mark, MarkReader
+from interfaces.recording.recording import Recording, check_alike
 from interfaces.stream.meshcat.committed import Committed
 from vrs.commands import finite
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
-
-if TYPE_CHECKING:
-    from interfaces.recording.recording import Recording
 
 _T = TypeVar("_T")
 
@@ -84,6 +83,32 @@ class Moment:
     """One for each recording."""
 
 
+class Follower(Protocol):
+    """Says of a real robot how it follows the virtual one."""
+
+    def play(self, t: float) -> float | None:
+        """The time of the timeline at which the real robot is at a time [s]; None where nobody knows."""
+
+    def error(self, t: float, q_real: Array, play: float) -> float | None:
+        """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
+
+
+class _AtEqualTime:
+    """Compares with the virtual robot at equal timeline time."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+
+    def play(self, t: float) -> float | None:
+        """See `Follower`."""
+        return float(self._recording.play(t))
+
+    def error(self, t: float, q_real: Array, play: float) -> float | None:  # noqa: ARG002 - play says it all
+        """See `Follower`: the largest difference of a joint [rad]."""
+        q = self._recording.virtual(play)
+        return float(np.abs(q_real - q).max()) if np.isfinite(q).all() else None
+
+
 class Track:
     """A recording in a play-back."""
 
@@ -91,7 +116,7 @@ class Track:
         self.recording, self.marks = recording, MarkReader(recording)
         self.shift = shift
         """The play-back's time less the recording's own [s]."""
-        self._follower = recording.kind.follower(recording)
+        self._follower: Follower = _AtEqualTime(recording) if recording.kind is ARM else Pursuit(recording)
         self.problem = ""
         """What of the file makes no sense, the first line of it; empty where all does."""
         self._more = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Literal
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from interfaces.recording.damage import Damage
 from interfaces.recording.driving.messages import CellsEntry, RoomEntry
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
-from interfaces.recording.kinds import Kind, kind_of
+from interfaces.recording.kinds import Kind, kind_of, references
 from interfaces.recording.log import Log
 from interfaces.recording.messages import (
     Anchor,
@@ -80,7 +80,7 @@ class Recording:
             """How the run was set up."""
             self.kind: Kind = kind_of(begin)
             """What its robot is."""
-            self._tracks = Tracks(self._blocks, len(begin.q), self.kind.told(begin), str(path))
+            self._tracks = Tracks(self._blocks, len(begin.q), references(begin), str(path))
             self._chain, self._applied = Chain(str(path)), 0
             self._model: RobotModel | None = None
         except FormatError:
@@ -352,3 +352,15 @@ class Recording:
     def link(self) -> tuple[LinkEntry, ...]:
         """Packets of the link whose fate was known, both ways, in the order of the file."""
         return tuple(self._logs["/link"].entries())
+
+
+def check_alike(recordings: Sequence[Recording]) -> None:
+    """Refuse recordings of robots of different kinds.
+
+    Raises:
+        InvalidValueError: If they are.
+    """
+    names = [recording.kind.name for recording in recordings]
+    if len(set(names)) > 1:
+        given = f"{recordings[0].path} of {names[0]} and {recordings[1].path} of {names[1]}"
+        raise InvalidValueError("recordings", given, "of one kind of robot")

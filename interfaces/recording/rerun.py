@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import msgspec
 
+from interfaces.recording import capture
+from interfaces.recording.driving import arcs
+from interfaces.recording.engines import begun
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
-from interfaces.recording.kinds import Kind
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt, Late
+from interfaces.recording.recording import Recording
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import VrsError
+from vrs.mobile import ArcTimeline
 from vrs.receipt import Receipt, Status
-
-if TYPE_CHECKING:
-    from interfaces.recording.recording import Recording
+from vrs.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +48,8 @@ def rerun(recording: Recording) -> Rerun:
     Raises:
         FormatError: If the recording is of a robot that isn't known, or holds no commands that can be.
     """
-    engine, clock = recording.kind.begun(recording)
-    again = _Again(engine, clock, recording.kind, recording.changes, late=recording.session.late)
+    engine, clock = begun(recording)
+    again = _Again(engine, clock, recording.changes, late=recording.session.late)
     for entry in recording.commands:
         if entry.number != again.commands + 1:
             some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
@@ -79,12 +80,11 @@ class _Again:
         self,
         engine: Engine,
         clock: ManualClock,
-        kind: Kind,
         changes: Sequence[AnyHistory | AnyChange],
         *,
         late: Late | None,
     ) -> None:
-        self._engine, self._clock, self._kind, self._late = engine, clock, kind, late
+        self._engine, self._clock, self._late = engine, clock, late
         self._recorded: dict[int, list[AnyHistory | AnyChange]] = {}
         for change in changes:
             self._recorded.setdefault(change.edit, []).append(change)
@@ -122,7 +122,7 @@ class _Again:
         elif engine.timeline is not before:
             self._edit += 1
             after = engine.timeline
-            self._compare(self._kind.edit_entries(before, after, self._edit, entry.at, command_id), entry)
+            self._compare(_entries(before, after, self._edit, entry.at, command_id), entry)
 
     def _goes_back(self, entry: CommandEntry | Anchor, made: Receipt | None) -> bool:
         """Whether a command needs what only an engine from before the recording knows."""
@@ -170,6 +170,17 @@ class _Again:
             self.missing = f"{len(self._unseen)} edits aren't in the recording, from edit {self._unseen[0]} on"
         elif self._recorded:
             self.missing = f"what made edit {min(self._recorded)} isn't in the recording"
+
+
+def _entries(
+    before: AnyTimeline, after: AnyTimeline, edit: int, at: float, command_id: int | None
+) -> tuple[AnyChange | AnyHistory, ...]:
+    """An edit as it stands in a recording."""
+    if isinstance(before, Timeline):
+        assert isinstance(after, Timeline)
+        return capture.edit_entries(before, after, edit, at, command_id)
+    assert isinstance(after, ArcTimeline)
+    return arcs.edit_entries(before, after, edit, at, command_id)
 
 
 def _named(entry: CommandEntry | Anchor) -> str:

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket
 from interfaces.recording.page import BEGIN, MOST_HEARD, ReplayPage, page_files
 from interfaces.recording.playback import Align, Playback
 from interfaces.recording.recording import Recording, open_recording
+from interfaces.recording.stages import prepare
 from interfaces.station.shelf import LOOKED_INTO, Shelf
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.viewers import Viewers
@@ -237,7 +238,7 @@ def _open(paths: Sequence[Path], align: Align, found: list[Recording]) -> Playba
     found.extend(open_recording(path) for path in paths)
     for recording in found:
         # What is read or put together once is read here.
-        recording.kind.prepare(recording)
+        prepare(recording)
     playback = Playback(found, align=align)
     playback.read_marks()
     return playback

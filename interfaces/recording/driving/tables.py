@@ -1,4 +1,4 @@
-"""A mobile robot's recording as tables; see `interfaces.recording.export`."""
+"""A mobile robot's recording as tables; see `interfaces.recording.tables`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from interfaces.recording.export import (
+from interfaces.recording.tables import (
     Column,
     Table,
     commands_table,

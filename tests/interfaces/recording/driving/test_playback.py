@@ -11,8 +11,8 @@ import pytest
 
 from interfaces.cli.main import _status
 from interfaces.recording import open_recording
-from interfaces.recording.driving.kind import mobile_model
 from interfaces.recording.driving.stage import DriveStage
+from interfaces.recording.engines import mobile_model
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
 from interfaces.view_parts import parts_at

@@ -1,0 +1,54 @@
+"""Recordings' robots on pages."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from interfaces.recording.driving.stage import DriveStage
+from interfaces.recording.engines import mobile_model
+from interfaces.recording.kinds import ARM
+from interfaces.recording.playback import Frame
+from interfaces.recording.recording import Recording
+from interfaces.stream.meshcat import Committed, MeshcatScene
+from interfaces.stream.meshcat.twins import TwinScene
+from interfaces.view_parts import link_shapes
+
+
+class Stage(Protocol):
+    """A recording's robots on a page."""
+
+    @property
+    def scene(self) -> TwinScene:
+        """What pages look at."""
+
+    def show(self, frame: Frame, committed: Committed | None, *, now: float) -> None:
+        """Show a frame whose virtual robot is known."""
+
+
+class ArmStage:
+    """Two arms."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._model = recording.model
+        self.scene: MeshcatScene = MeshcatScene(recording.model)
+
+    def show(self, frame: Frame, committed: Committed | None, *, now: float) -> None:
+        """See `Stage`."""
+        links = self._model.links
+        assert frame.q_virtual is not None
+        real = None if frame.q_real is None else links(frame.q_real)
+        self.scene.show(virtual=links(frame.q_virtual), real=real, path=committed, now=now)
+
+
+def stage_of(recording: Recording) -> Stage:
+    """The robots of a recording for a page."""
+    return ArmStage(recording) if recording.kind is ARM else DriveStage(recording, mobile_model(recording))
+
+
+def prepare(recording: Recording) -> None:
+    """Read and load what takes long before a recording can be shown; from any thread."""
+    if recording.kind is ARM:
+        recording.model.links(recording.virtual(recording.span[0]))
+        return
+    link_shapes(mobile_model(recording))
+    recording.virtual(recording.span[0])
