@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import importlib
 import inspect
 import os
@@ -14,19 +15,33 @@ import pytest
 
 HOME = Path(__file__).resolve().parents[1]
 OURS = ("vrs", "robots", "interfaces")
-ALLOWED = {"vrs": {"vrs"}, "robots": {"vrs", "robots"}, "interfaces": {"vrs", "robots", "interfaces"}}
 STRANGE = {"examples", "tests", "benchmarks"}
-LOWER = {
-    "link": (),
-    "middleware": ("link",),
-    "jobs": ("val2",),
-    "teleop": ("jobs", "link", "wire"),
-    "stream": ("jobs", "link", "teleop", "wire"),
-    "rsp": ("link", "stream"),
-}
-"""The lower parts of `interfaces`, and what each may import of the others."""
-STUDYING = ("lab", "report", "recording", "cli")
-"""The parts that may import the laboratory: what runs live never needs it."""
+# fmt: off
+ORDER = (
+    "vrs", "vrs.testing",
+    # The robots.
+    "robots.drive_limits", "robots.solids", "robots.text_files", "robots.bullet", "robots.onboard",
+    "robots.ipr", "robots.puma560", "robots.cubo", "robots",
+    # What the interfaces share; values that cross or are stored.
+    "interfaces.files", "interfaces.software", "interfaces.children", "interfaces.timer", "interfaces.plugin",
+    "interfaces.playhead", "interfaces.messages", "interfaces.wire",
+    # The network; what is asked of a personal robot.
+    "interfaces.link", "interfaces.middleware", "interfaces.jobs",
+    # What an engine's clients reach it through; both sites; what a run is.
+    "interfaces.changes", "interfaces.journal", "interfaces.forecasts", "interfaces.broadcast",
+    "interfaces.ordering", "interfaces.resending", "interfaces.servlet", "interfaces.site", "interfaces.ports",
+    "interfaces.teleop", "interfaces.runs",
+    # The clients.
+    "interfaces.designer", "interfaces.observer", "interfaces.supervisor", "interfaces.mirror",
+    "interfaces.sources", "interfaces.viewer", "interfaces.view_parts",
+    # Server and protocols; recordings; both drivers, and the door.
+    "interfaces.stream", "interfaces.rsp", "interfaces.recording", "interfaces.media", "interfaces.runtime",
+    "interfaces.connecting", "interfaces",
+    # The language and the page, then the laboratory, which nothing that runs live needs.
+    "interfaces.val2", "interfaces.station", "interfaces.lab", "interfaces.report", "interfaces.cli",
+)
+# fmt: on
+"""The rooms, folders and files, in their order: each imports only itself and what stands before it."""
 HEAVY = {"pybullet", "pybullet_data", "pybullet_utils", "roboticstoolbox", "spatialmath", "trimesh", "matplotlib"}
 NUMPY = 0.15
 """What importing NumPy takes on a machine of usual pace [s]."""
@@ -52,7 +67,7 @@ def violations(path, package):
     tree = ast.parse(path.read_text(encoding="utf-8"))
     for name, line in imports(tree):
         root = name.split(".")[0]
-        if root in STRANGE or (root in OURS and root not in ALLOWED[package]):
+        if root in STRANGE:
             yield f"{path}:{line} imports {name}"
         if package == "vrs" and (root in SOCKETS or root.startswith("pybullet")):
             yield f"{path}:{line} imports {name}"
@@ -68,30 +83,112 @@ def test_imports_point_one_way(path):
     assert list(violations(path, path.relative_to(HOME).parts[0])) == []
 
 
-def upward(path, part):
-    """Imports of a file of a part of `interfaces` that the part may not have."""
-    for name, line in imports(ast.parse(path.read_text(encoding="utf-8"))):
-        root, _, inner = name.partition(".")
-        other = inner.split(".")[0]
-        if root != "interfaces" or other in ("", part) or not (HOME / "interfaces" / other).is_dir():
+def imported(home, packages):
+    """What each module of a tree imports of the others, by line: at its top, in functions and for types alike."""
+    modules = {}
+    for path in (path for package in packages for path in (home / package).rglob("*.py")):
+        name = ".".join(path.relative_to(home).with_suffix("").parts)
+        modules[name.removesuffix(".__init__")] = path
+    found = {}
+    for module, path in modules.items():
+        found[module] = {}
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"relative import in {path}:{node.lineno}"
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+            for name in names:
+                parts = name.split(".")
+                while parts and ".".join(parts) not in modules:
+                    parts.pop()
+                if parts and ".".join(parts) != module:
+                    found[module][".".join(parts)] = node.lineno
+    return found
+
+
+def room_of(module, order):
+    """The room that a module is in: the innermost that is named. None where none is."""
+    parts = module.split(".")
+    while parts and ".".join(parts) not in order:
+        parts.pop()
+    return ".".join(parts) or None
+
+
+def out_of_order(found, order):
+    """Imports of rooms that stand later in the order, and modules that are in no room of their own."""
+    for module, others in found.items():
+        room = room_of(module, order)
+        if room is None or (room != module and room in OURS and room != "vrs"):
+            yield f"{module} is in no room"
             continue
-        allowed = any(f"{inner}.".startswith(f"{one}.") for one in LOWER.get(part, (other,)))
-        if not allowed or (other == "lab" and part not in STUDYING):
-            yield f"{path}:{line} imports {name}"
+        for other, line in others.items():
+            there = room_of(other, order)
+            if there is not None and order.index(there) > order.index(room):
+                yield f"{module}:{line} imports {other}"
 
 
-@pytest.mark.parametrize("part", sorted(path.parent.name for path in (HOME / "interfaces").glob("*/__init__.py")))
-def test_the_parts_of_interfaces_build_on_lower_ones(part):
-    assert [found for path in (HOME / "interfaces" / part).rglob("*.py") for found in upward(path, part)] == []
+def circle(found):
+    """Modules that import each other in a circle; empty where none do."""
+    try:
+        tuple(graphlib.TopologicalSorter({module: set(others) for module, others in found.items()}).static_order())
+    except graphlib.CycleError as error:
+        return error.args[1]
+    return []
 
 
-def test_an_import_upward_is_seen(tmp_path):
-    bad = tmp_path / "bad.py"
-    bad.write_text("from interfaces.stream.hub import Hub\nfrom interfaces.link.round_trip import Ping\n")
-    assert len(list(upward(bad, "teleop"))) == 1
-    bad.write_text("def f():\n    import interfaces.lab.claims\n")
-    assert len(list(upward(bad, "runtime"))) == 1
-    assert not list(upward(bad, "report"))
+def test_each_room_imports_what_stands_before_it():
+    found = imported(HOME, OURS)
+    assert list(out_of_order(found, ORDER)) == []
+    assert {room_of(module, ORDER) for module in found} == set(ORDER)
+    assert len(ORDER) == len(set(ORDER))
+
+
+def test_no_files_import_each_other_in_a_circle():
+    assert circle(imported(HOME, OURS)) == []
+
+
+LOW, HIGH = "interfaces/link/low.py", "interfaces/stream/high.py"
+
+
+@pytest.mark.parametrize(
+    ("low", "line"),
+    [
+        ("from interfaces.stream.high import f\n", 1),
+        ("from interfaces.stream import high\n", 1),
+        ("import interfaces.stream.high\n", 1),
+        ("def f():\n    from interfaces.stream.high import f\n", 2),
+        ("class C:\n    def f(self):\n        import interfaces.stream.high as it\n", 3),
+        ("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from interfaces.stream.high import f\n", 3),
+        ("try:\n    from interfaces.stream.high import f\nexcept ImportError:\n    f = None\n", 2),
+    ],
+)
+def test_an_import_upward_is_seen_wherever_it_stands(tmp_path, low, line):
+    for name, text in ((LOW, low), (HIGH, "def f(): ...\n")):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+    found = imported(tmp_path, OURS)
+    assert list(out_of_order(found, ORDER)) == [f"interfaces.link.low:{line} imports interfaces.stream.high"]
+    assert circle(found) == []
+    (tmp_path / LOW).write_text("")
+    (tmp_path / HIGH).write_text(low.replace("stream.high", "link.low"))
+    assert list(out_of_order(imported(tmp_path, OURS), ORDER)) == []
+
+
+def test_a_circle_and_a_room_that_is_not_named_are_seen(tmp_path):
+    (tmp_path / "interfaces/link").mkdir(parents=True)
+    for name, text in (
+        ("link/one.py", "import interfaces.link.two\n"),
+        ("link/two.py", "def f():\n    from interfaces.link.three import g\n"),
+        ("link/three.py", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import interfaces.link.one\n"),
+        ("elsewhere.py", "import vrs\n"),
+    ):
+        (tmp_path / "interfaces" / name).write_text(text)
+    found = imported(tmp_path, OURS)
+    assert {f"interfaces.link.{name}" for name in ("one", "two", "three")} == set(circle(found))
+    assert list(out_of_order(found, ORDER)) == ["interfaces.elsewhere is in no room"]
 
 
 @pytest.mark.parametrize("package", ["robots", "interfaces"])
@@ -107,7 +204,7 @@ def test_the_laboratory_reads_no_clock(package):
 
 def test_a_violation_is_seen(tmp_path):
     bad = tmp_path / "bad.py"
-    bad.write_text("import time\nimport socket\nfrom robots import puma560\nimport trimesh\n")
+    bad.write_text("import time\nimport socket\nfrom tests import rig\nimport trimesh\n")
     assert len(list(violations(bad, "vrs"))) == 4
 
 
