@@ -17,7 +17,7 @@ export function mount(station, box) {
   const fields = { forward: {}, backward: {} };
   const same = h("input", { id: "net-same", type: "checkbox" });
   const apply = h("button.main", { id: "net-apply" }, "Apply");
-  const reset = h("button", { type: "button", id: "net-reset" }, "As it is");
+  const reset = h("button", { type: "button", id: "net-reset" }, "Discard");
   const needs = h("p.needs", { id: "net-needs" });
   const fault = h("p.refused", { id: "net-fault" });
   const advice = h("p.advice", { id: "net-advice", role: "status" });
