@@ -257,6 +257,7 @@ def run_mobile(
     from interfaces.teleop.architectures import architecture as makes
     from interfaces.teleop.architectures.equipment import CONTROL
     from interfaces.teleop.driving import DrivenConfig, Hands
+    from interfaces.val2.val_arm import ValArm, in_a_thread
     from robots.onboard import LossPolicy, WatchdogConfig
 
     address = parse_address("--listen", listen)
@@ -267,9 +268,8 @@ def run_mobile(
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
     driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
     jobs = RunnerConfig(loss=OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss)))
-    config = LiveMobileConfig(
-        room_of(room), architecture, driven, jobs, Hands(speaker=Aloud()), halting=dog, server=software()
-    )
+    hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
+    config = LiveMobileConfig(room_of(room), architecture, driven, jobs, hands, halting=dog, server=software())
     access, allowed = access_for(address.host, token_file, free={Role.SITE}), asked_for(address.host, reached_as)
 
     async def main() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from interfaces import connect_mobile
-from interfaces.jobs import Command, Forecast, JobFile, JobList, Move, OperatorLoss, RunnerConfig, Stage, Wait
+from interfaces.jobs import Arm, Command, Forecast, JobFile, JobList, Move, OperatorLoss, RunnerConfig, Stage, Wait
 from interfaces.link import LinkConditions
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
@@ -29,6 +29,7 @@ from robots import ipr
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
 from robots.onboard.journey import Goal, JourneyState
+from tests.contract import doors
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
 from vrs.errors import InvalidValueError
@@ -128,6 +129,18 @@ def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss)
         jobs, progress = JobFile(tmp_path / "jobs.json").load()
         assert jobs.entries == JobList.of(Move(THERE), Wait()).entries
         assert progress.stage is (Stage.PAUSED if loss is OperatorLoss.STOP else Stage.DONE)
+
+
+def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> None:
+    wave = ".PROGRAM wave()\n    DRIVE 1, 5, 50\n.END\n"
+    with (
+        doors.served("serve", "--robot", "ipr", "--port", "0", cwd=tmp_path) as serving,
+        met(f"http://{serving.address}", "driver") as robot,
+    ):
+        controlled(robot)
+        assert isinstance(robot.load(JobList.of(Arm("wave", wave))), Tasks)
+        assert isinstance(robot.do(Command.RUN), Tasks)
+        assert robot.wait(lambda it: it.tasks is not None and it.tasks.progress.stage is Stage.DONE, 30.0)
 
 
 def test_an_arm_is_no_mobile_robot() -> None:
