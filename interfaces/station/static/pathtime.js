@@ -1,6 +1,8 @@
 // Path error and time difference of a follower on a leader's path, as `compare_paths` of vrs/comparison.py has them.
 // Points are in arrays of x, y, z, x, y, z, …; both are known at the same even times.
 
+/** Points of the leader that are kept in a cell, at most, beside its ends. */
+const POINTS = 50;
 const at = (p, k) => [p[3 * k], p[3 * k + 1], p[3 * k + 2]];
 const squared = ([a, b, c], [d, e, f]) => (a - d) ** 2 + (b - e) ** 2 + (c - f) ** 2;
 const clamp = (x, low, high) => Math.max(low, Math.min(high, x));
@@ -72,26 +74,48 @@ function matched(t, follower, reached, path, advance) {
   return match;
 }
 
-/** Distance to the polyline beside the matched cell, and the path length of the nearest point. */
-function projected(point, path, s, cell) {
-  const count = s.length;
+/** The leader's path with what was recorded between its cells: lengths, ascending, and points. */
+function polyline(s, path, lengths, leader) {
+  const [along, points] = [[], []];
+  const put = (length, point) => {
+    if (length === along.at(-1)) return;
+    along.push(length);
+    points.push(point);
+  };
+  let [cell, bin] = [0, -1];
+  for (let k = 0; k < lengths.length; k++) {
+    const [before, last] = [bin, k === lengths.length - 1];
+    bin = Math.floor(lengths[k] * (POINTS / s[1]));
+    if (bin === before && !last) continue;
+    for (; cell < s.length && s[cell] <= lengths[k]; cell++) put(s[cell], at(path, cell));
+    put(lengths[k], at(leader, k));
+  }
+  for (; cell < s.length; cell++) put(s[cell], at(path, cell));
+  return [along, points];
+}
+
+/** Distance to the path from the neighbour before a matched cell to the one after, and the length up to the nearest
+ * point. */
+function projected(point, along, points, s, cell) {
+  const end = along.at(-1);
+  const first = countBelow(along, s[Math.max(cell - 1, 0)]);
+  const last = Math.max(countBelow(along, cell + 1 < s.length ? s[cell + 1] : end) - 1, first);
   let [distance, length] = [Infinity, 0];
-  for (const start of [cell - 1, cell]) {
-    const low = clamp(start, 0, count - 2);
-    const [from, to] = [at(path, low), at(path, low + 1)];
-    const along = to.map((x, i) => x - from[i]);
+  for (let low = first; low <= last; low++) {
+    const [from, to] = [points[low], points[low + 1]];
+    const piece = to.map((x, i) => x - from[i]);
     const size = Math.max(
-      along.reduce((sum, x) => sum + x * x, 0),
+      piece.reduce((sum, x) => sum + x * x, 0),
       1e-300,
     );
-    const share = clamp(along.reduce((sum, x, i) => sum + (point[i] - from[i]) * x, 0) / size, 0, 1);
+    const share = clamp(piece.reduce((sum, x, i) => sum + (point[i] - from[i]) * x, 0) / size, 0, 1);
     const gap = Math.sqrt(
       squared(
         point,
-        from.map((x, i) => x + share * along[i]),
+        from.map((x, i) => x + share * piece[i]),
       ),
     );
-    if (gap < distance) [distance, length] = [gap, s[low] + share * (s[low + 1] - s[low])];
+    if (gap < distance) [distance, length] = [gap, along[low] + share * (along[low + 1] - along[low])];
   }
   return [distance, length];
 }
@@ -130,13 +154,10 @@ export function comparePaths(t, leader, follower, { vMax, cell, vMin = 0.02 }) {
   }
   const advance = clamp(Math.round((2 * vMax * dt) / cell), 1, 255);
   const match = matched(t, follower, reachedAt, path, advance);
-  const line = new Float64Array(path.length + 3);
-  line.set(path);
-  line.set(at(leader, t.length - 1), path.length);
-  const sAll = [...s, lengths.at(-1)];
+  const [lengthsAlong, points] = polyline(s, path, lengths, leader);
   const away = [];
   const along = Array.from(t, (_, k) => {
-    const [distance, length] = projected(at(follower, k), line, sAll, match[k]);
+    const [distance, length] = projected(at(follower, k), lengthsAlong, points, s, match[k]);
     away.push(distance);
     return length;
   });
