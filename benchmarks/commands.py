@@ -12,8 +12,8 @@ from benchmarks.moves import LIMITS, MODEL
 from benchmarks.results import Bar, Chart, Cost, Part, Result
 from benchmarks.timing import Stopwatch
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Profile, Status
-from vrs.chunk import State
 from vrs.model import Array
+from vrs.segment import State
 
 COMMANDS = 600
 WARM_UP = 20

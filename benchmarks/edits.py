@@ -12,7 +12,7 @@ from benchmarks.moves import MODEL, PROFILES
 from benchmarks.results import Bar, Chart, Cost, Part, Result
 from benchmarks.timing import Stopwatch
 from vrs import Engine, Insertion, JointTarget, MotionCommand, Profile, Status, Timeline
-from vrs.chunk import Piece
+from vrs.segment import Piece
 
 SEGMENTS = 100_000
 EDITS = 5_000

@@ -18,7 +18,6 @@ import numpy as np
 from benchmarks.kinematics import sample
 from robots import puma560
 from vrs import Profile
-from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array
 from vrs.planning.along import TOLERANCE
@@ -26,7 +25,7 @@ from vrs.planning.certificate import violation
 from vrs.planning.course import Course, rotation_vector, rotations
 from vrs.planning.line import line
 from vrs.planning.plan import Plan
-from vrs.segment import evaluate
+from vrs.segment import State, evaluate
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

@@ -8,8 +8,8 @@ import numpy as np
 
 from robots import puma560
 from vrs import Engine, Insertion, JointTarget, MotionCommand, Profile, Timeline, planning
-from vrs.chunk import Piece, State
 from vrs.model import Array
+from vrs.segment import Piece, State
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

@@ -13,9 +13,9 @@ import ruckig
 
 from robots import puma560
 from vrs import Profile
-from vrs.chunk import State
 from vrs.planning import Plan, move, run_up, violation
 from vrs.planning.plan import end_state
+from vrs.segment import State
 
 LIMITS = puma560.model().limits
 ZERO = np.zeros(6)

@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 
 from robots import puma560
-from vrs.chunk import Piece
 from vrs.planning.steering import Frame, steer
+from vrs.segment import Piece
 from vrs.timeline import Timeline
 
 MODEL = puma560.model()

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from vrs import Timeline
-from vrs.chunk import Piece
 from vrs.model import Array
+from vrs.segment import Piece
 
 N = 6
 SIZES = (10, 1_000, 100_000, 1_000_000)

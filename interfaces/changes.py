@@ -6,8 +6,8 @@ from itertools import groupby
 from typing import Any
 
 from interfaces.messages import Change, History
-from vrs.chunk import HOLD, Piece
 from vrs.errors import InvalidValueError
+from vrs.segment import HOLD, Piece
 from vrs.timeline import Timeline
 from vrs.track import Track
 from vrs.tree import Leaf

@@ -15,7 +15,7 @@ from interfaces.resending import Resending
 from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop, finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
-from vrs.receipt import Receipt
+from vrs.ledger import Receipt
 
 REMEMBERED = 4096
 """Commands whose fate is kept; the oldest is forgotten first."""

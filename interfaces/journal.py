@@ -13,7 +13,7 @@ from interfaces.messages import Change, History
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import UnknownCommandError
-from vrs.receipt import Receipt, Status
+from vrs.ledger import Receipt, Status
 from vrs.timeline import Timeline
 
 KEPT = 256

@@ -12,8 +12,8 @@ from typing import ClassVar, TypeAlias
 
 from vrs.commands import Command, finite
 from vrs.errors import InvalidValueError
+from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.receipt import Receipt
 from vrs.segment import PolynomialSegment
 
 

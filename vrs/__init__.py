@@ -25,8 +25,8 @@ from vrs.commands import (
     Stop,
 )
 from vrs.engine import Engine, MobileEngine
+from vrs.ledger import Receipt, Status
 from vrs.model import Limits, RobotModel
-from vrs.receipt import Receipt, Status
 from vrs.segment import ArcSegment, PolynomialSegment, Segment
 from vrs.timeline import Timeline
 

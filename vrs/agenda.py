@@ -14,12 +14,11 @@ from functools import partial
 from operator import add
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from vrs.chunk import HOLD
 from vrs.commands import DriveCommand, Lateness, MotionCommand, PlanEdit, SteerCommand, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Edit
-from vrs.ledger import ARRIVED, Change, Entry, Ledger
-from vrs.receipt import Names, Receipt, Status
+from vrs.ledger import ARRIVED, Change, Entry, Ledger, Names, Receipt, Status
+from vrs.segment import HOLD
 from vrs.track import Track
 
 TrackT = TypeVar("TrackT", bound=Track[Any])

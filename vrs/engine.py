@@ -37,18 +37,17 @@ from vrs.commands import (
     Target,
 )
 from vrs.errors import InvalidValueError
-from vrs.ledger import Ledger
+from vrs.ledger import Ledger, Receipt
 from vrs.model import Array, Limits, RobotModel, frozen_array
-from vrs.receipt import Receipt
 from vrs.scheduler import Scheduler
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from vrs.anchoring import Anchored
+    from vrs.ledger import Standing
     from vrs.mobile.driver import Driver
     from vrs.mobile.model import DriveLimits, MobileModel
     from vrs.mobile.timeline import ArcTimeline
-    from vrs.standing import Standing
 
 
 class Engine:
@@ -295,7 +294,7 @@ class Engine:
         self._plan.ledger.newest = command_id
 
     def standing(self) -> Standing:
-        """What the next commands depend on besides the timeline; see `vrs.standing.Standing`."""
+        """What the next commands depend on besides the timeline; see `vrs.ledger.Standing`."""
         return self._plan.standing(self.now())
 
     def take_up(self, stand: Standing) -> None:

@@ -10,7 +10,7 @@
     │   └── UnresolvedError        a straight line too near a singularity for the joints to be smooth along it
     └── FormatError                bytes, JSON or a file that is not what it should be (also a ValueError)
 
-Misuse raises; outcomes that a user must expect (postponed, rejected) are values: see `vrs.receipt.Receipt`.
+Misuse raises; outcomes that a user must expect (postponed, rejected) are values: see `vrs.ledger.Receipt`.
 """
 
 from __future__ import annotations

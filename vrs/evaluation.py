@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vrs.model import Array
-from vrs.polynomials import QUICK_ORDER, filled_rows
-from vrs.segment import evaluate
+from vrs.segment import QUICK_ORDER, evaluate, filled_rows
 from vrs.tree import Node, first_start
 
 STACKS = 128

@@ -1,26 +1,96 @@
-"""The ledger: receipts, and what later edits made of them.
+"""Receipts of commands, and the ledger of what later edits made of them.
 
 An edit in the middle of a long plan moves or drops thousands of commands. Writing that into each receipt would
 take longer than planning, so an edit leaves one `Change` behind, and a receipt is worked out when it's asked for.
+
+With the commands they are what an engine knows besides its timeline, so that another one can go on from there.
 """
 
 from __future__ import annotations
 
+import enum
 from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from vrs.commands import MotionCommand
+from vrs.commands import Lateness, MotionCommand, Profile
 from vrs.errors import UnknownCommandError
-from vrs.receipt import Receipt, Status
+from vrs.model import Array, Limits
 from vrs.track import Track
+
+Names: TypeAlias = tuple[int, ...] | Callable[[], tuple[int, ...]]
+"""Command ids, or what finds them when somebody asks."""
+
+
+class Status(enum.StrEnum):
+    """Outcome of a command."""
+
+    ACCEPTED = "accepted"
+    POSTPONED = "postponed"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Receipt:
+    """What became of a command; it belongs to one version of the timeline."""
+
+    command_id: int
+    """Id of the command, from 1; rejected commands have one too."""
+    status: Status
+    issued_at: float | None
+    """Issue time [s]; None where none was given to an offline engine."""
+    asked_at: float | None
+    """Execution time that was asked for [s]; None where none was."""
+    execute_at: float | None = None
+    """Start of the motion [s]; None when rejected."""
+    end: float | None = None
+    """Arrival [s]; None when rejected."""
+    q: Array | None = None
+    """Joints of the target [rad], (n,), poses resolved; None when rejected, or where there's no target."""
+    reason: str = ""
+    """Why it was postponed or rejected, or what else the user must know."""
+    version: int = 0
+    """Version of the timeline that the command made, or left when rejected."""
+    shift: float = 0.0
+    """Δ by which the commands in `shifted` were shifted [s]."""
+    superseded_by: int | None = None
+    """Id of the later command that cut this one short or dropped it; None while it stands."""
+    undone: bool = False
+    """Whether it was taken back or cancelled."""
+    shifted_names: Names = ()
+    """Ids for `shifted`, or what finds them: naming a long tail takes time that a command hasn't got."""
+    superseded_names: Names = ()
+    """Ids for `superseded`, or what finds them."""
+    hindrance: str = ""
+    """Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it."""
+
+    @property
+    def shifted(self) -> tuple[int, ...]:
+        """Ids of commands whose moves now come at another time."""
+        return self.shifted_names if isinstance(self.shifted_names, tuple) else self.shifted_names()
+
+    @property
+    def superseded(self) -> tuple[int, ...]:
+        """Ids of commands that will not arrive any more, wholly or in part."""
+        return self.superseded_names if isinstance(self.superseded_names, tuple) else self.superseded_names()
+
+    @property
+    def is_still(self) -> bool:
+        """Whether the command's target is where the arm stood anyway: it has no segments."""
+        return self.q is not None and self.end == self.execute_at
+
+    @property
+    def stands(self) -> bool:
+        """Whether the command is to be carried out as the receipt says, or was."""
+        return self.end is not None and self.superseded_by is None and not self.undone
+
 
 UNDO_DEPTH = 1000
 """Commands that can be taken back, one after the other; each keeps a timeline alive."""
@@ -396,3 +466,37 @@ def _after(receipt: Receipt, change: Change) -> Receipt:
         return receipt
     start, end = change.moved(start), change.moved(end)
     return replace(receipt, execute_at=start, end=end, version=change.version)
+
+
+MOST_KNOWN = 2000
+"""Commands that an engine's standing holds, at most: the first ones to come."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """A command that isn't over, or by which the arm moved last."""
+
+    receipt: Receipt
+    """As it is now."""
+    command: MotionCommand | None
+    """What it answers; None where it's no motion command."""
+    profile: Profile
+    """By which profile it moves the arm."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """What the next commands of an engine depend on, besides its timeline.
+
+    What could be taken back, and what a stop interrupted, is no part of it: an undo or a resume of what was before
+    finds nothing.
+    """
+
+    newest: int
+    """Highest command id given out, ≥ 0."""
+    lateness: Lateness
+    limits: Limits
+    """In force."""
+    steered: tuple[int, float] | None = None
+    """The command that the next steering input goes on with, and when that began [s]."""
+    known: tuple[Known, ...] = ()

@@ -1,4 +1,7 @@
-"""The plans of one command: at its speed and pace, with its share of the acceleration, for its tool."""
+"""The plans of one command: at its speed and pace, with its share of the acceleration, for its tool.
+
+Or for two commands: a move may begin before the one before it is over, so that the arm doesn't stop between them.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +9,22 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from math import inf
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from vrs import planning
 from vrs.analyzer import solve
-from vrs.chunk import State
 from vrs.commands import JointTarget, Motion, MotionCommand, Profile
 from vrs.errors import PlanningError
-from vrs.insertion import joined
+from vrs.insertion import Gap, MovePlanner, joined
 from vrs.model import Array, Limits, RobotModel
-from vrs.planning import Plan
+from vrs.planning import Plan, rounding
+from vrs.planning.path import Tooled, tooled
 from vrs.planning.plan import end_position, slowed
-from vrs.tooled import Tooled, tooled
+from vrs.planning.rounding import braking, continuous, starting
+from vrs.segment import State
+from vrs.timeline import Timeline
 
 HASTY = "planned with all of the limits: the arm is too fast for the command's pace or acceleration"
 
@@ -143,3 +148,142 @@ def _planned(
     q = solve(target, model, state.q)
     plan, note = planning.move(state, q, speed, profile, limits)
     return plan, q, note
+
+
+_SAME = 1e-15
+"""Times that differ by less, as a share of them or of a second, are one."""
+STOPS = "stops at the via: no overlap keeps the limits"
+
+
+class _Way(NamedTuple):
+    """A move that passes the end of the one before it."""
+
+    start: float
+    """When it begins [s]."""
+    plan: Plan
+    note: str
+
+
+class Passer:
+    """One command that passes the end of another; times are those of its pace, as if at 1."""
+
+    def __init__(
+        self,
+        model: RobotModel,
+        limits: Limits,
+        timeline: Timeline,
+        planner: Callable[[MotionCommand, Limits], MovePlanner],
+        command: MotionCommand,
+        gap: Gap,
+        t: float,
+        passed: tuple[int, MotionCommand | None, bool],
+        now: float | None,
+    ) -> None:
+        """Take what is scheduled, and who passes whom.
+
+        Args:
+            model: The robot.
+            limits: In force.
+            timeline: As it is before the command.
+            planner: Plans moves of commands under limits.
+            command: The command, its deviation above 0.
+            gap: What it's to fill if it stopped; the arm rests there.
+            t: Where it would begin if it stopped [s].
+            passed: Id of the one before it; its command if that's known; whether it moves smoothly, if it matters.
+            now: Present time [s]; None offline.
+        """
+        self.model, self.limits, self.timeline, self.planner = model, limits, timeline, planner
+        self.command, self.gap, self.t, self.now = command, gap, t, now
+        self.passed_by, self.before, smooth = passed
+        self.jerky = command.profile is Profile.JERK_LIMITED
+        self.mixed = "rounded with a move of parabolas" if self.jerky and not smooth else ""
+
+    def at_full_pace(self, plan: Plan) -> Plan:
+        """A plan as it is where time runs 1/pace times as fast."""
+        return plan if self.command.pace == 1.0 or not len(plan) else slowed(plan, self.command.pace)
+
+    def at_pace(self, plan: Plan) -> Plan:
+        """The other way round."""
+        return plan if self.command.pace == 1.0 or not len(plan) else slowed(plan, 1.0 / self.command.pace)
+
+    def slower_first(self, limits: Limits, begin: float) -> tuple[Plan, str] | None:
+        """The move before, planned anew within other limits; None where it isn't known."""
+        if self.before is None:
+            return None
+        again = replace(self.before, target=JointTarget(self.gap.state.q))
+        slow, _, note = self.planner(again, limits)(self.timeline.state_before(begin))
+        return self.at_full_pace(slow), note
+
+    def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> _Way:
+        """Overlap as far as the deviation and the limits allow."""
+        command = self.command
+        quick = self.at_full_pace(first)
+
+        def plans(limits: Limits) -> tuple[Plan, Plan, str]:
+            second, _, note = self.planner(onward, limits)(self.gap.state)
+            second = self.at_full_pace(second)
+            again = None if limits is self.limits else self.slower_first(limits, begin)
+            slow, more = (quick, "") if again is None else again
+            return slow, second, joined(more, note, self.mixed)
+
+        model = tooled(self.model, command.tool)
+        way = rounding.rounded(plans, command.deviation, model, self.limits, command.profile)
+        if way.first is not quick:
+            return _Way(begin, self.at_pace(way.whole), way.note)
+        start = max(self._before(way.delta), begin)
+        rest = rounding.later(way.whole, way.first.duration - way.delta)
+        return _Way(start, self.at_pace(rest), way.note)
+
+    def continuous(self, first: Plan, second: Plan, begin: float, note: str) -> _Way:
+        """Begin where the move before begins to brake; where both can't have their acceleration, it gets half."""
+        t, command, pace, limits = self.t, self.command, self.command.pace, self.limits
+        quick, onward = self.at_full_pace(first), self.at_full_pace(second)
+        notes = joined(note, self.mixed)
+        if not len(second):
+            return _Way(t, second, notes)
+        ready = starting(onward, limits, _straight(command, self.model))
+        known = _straight(self.before, self.model)
+        most = inf if self.now is None else (t - self.now) * pace
+        found = continuous(quick, onward, most, (braking(quick, limits, known), ready), limits, jerk=self.jerky)
+        if found.delta > 0.0:
+            return self._at(max(self._before(found.delta), begin), found.plan, found.delta, notes)
+        again = None
+        if self.before is not None and self.before.deviation < inf and (self.now is None or begin >= self.now):
+            again = self.slower_first(eased(limits, 0.5), begin)
+        if again is not None:
+            slow, more = again
+            found = continuous(slow, onward, inf, (braking(slow, limits, known), ready), limits, jerk=self.jerky)
+            if found.delta > 0.0:
+                lead = _until(slow, slow.duration - found.delta)
+                return self._at(begin, lead.then(found.plan), found.delta, joined(more, notes))
+        return _Way(t, second, joined(notes, STOPS))
+
+    def _before(self, delta: float) -> float:
+        """The time from which an overlap [s] is left; a knot where one is as near as rounding leaves it."""
+        timeline, start = self.timeline, self.t - delta / self.command.pace
+        index = timeline.index_at(start)
+        for knot in (timeline.start_of(max(index, 0)), timeline.start_of(min(index + 1, len(timeline)))):
+            if abs(knot - start) <= _SAME * max(1.0, abs(start)):
+                return knot
+        return start
+
+    def _at(self, start: float, plan: Plan, delta: float, notes: str) -> _Way:
+        passed = f"begins {delta / self.command.pace:.3g} s before command {self.passed_by} is over"
+        return _Way(start, self.at_pace(plan), joined(notes, passed))
+
+
+def _straight(command: MotionCommand | None, model: RobotModel) -> RobotModel | None:
+    """Whose tool goes straight in a command; None where the joints do."""
+    if command is None or command.motion is not Motion.LINE:
+        return None
+    return tooled(model, command.tool)
+
+
+def _until(plan: Plan, t: float) -> Plan:
+    """What of a plan comes before t [s]."""
+    ends: Array = np.cumsum(plan.durations)
+    k = min(int(np.searchsorted(ends, t)), len(plan) - 1)
+    h = np.array(plan.durations[: k + 1])
+    h[k] -= ends[k] - t
+    keep = k + 1 if h[k] > 0.0 else k
+    return Plan(h[:keep], plan.coefficients[:keep])

@@ -16,7 +16,6 @@ import numpy as np
 
 from vrs.agenda import Agenda, Moment
 from vrs.anchoring import Anchored, anchored
-from vrs.chunk import HOLD, Piece, State
 from vrs.commands import (
     Cancel,
     Insertion,
@@ -38,6 +37,7 @@ from vrs.insertion import (
     Gap,
     JoinPlanner,
     MovePlanner,
+    braked,
     end_of_move,
     fill,
     gap_at,
@@ -46,21 +46,23 @@ from vrs.insertion import (
     joined,
     lengthened,
     move_before,
+    moved,
     next_move,
+    owner_before,
     piece,
+    removed,
+    room,
+    span,
     stay,
 )
-from vrs.ledger import Change, Entry, Ledger
+from vrs.ledger import MOST_KNOWN, Change, Entry, Known, Ledger, Receipt, Standing, Status
 from vrs.model import Array, Limits, RobotModel, frozen_array
-from vrs.moves import join, move
+from vrs.moves import Passer, join, move
 from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
-from vrs.passing import Passer
 from vrs.planning import Plan, rounding, steering, stopping
 from vrs.planning.certificate import violation
 from vrs.planning.plan import end_position, end_state
-from vrs.receipt import Receipt, Status
-from vrs.rescheduling import braked, moved, owner_before, removed, room, span
-from vrs.standing import MOST_KNOWN, Known, Standing
+from vrs.segment import HOLD, Piece, State
 from vrs.timeline import Timeline
 
 REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)

@@ -14,22 +14,31 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.chunk import HOLD, Packed, Piece, State, checked_run, run_of
 from vrs.commands import finite, finite_array
 from vrs.errors import InvalidValueError, NonFiniteTimeError
 from vrs.evaluation import Places, places_of, sample_many
 from vrs.model import Array
-from vrs.polynomials import (
+from vrs.segment import (
+    HOLD,
     QUICK_ORDER,
     Cursor,
+    Packed,
+    Piece,
+    PolynomialSegment,
+    State,
+    check_derivative,
+    checked_run,
+    evaluate,
     filled_rows,
     first_state,
     idle_cursor,
+    known_segment,
     power_sum,
     rows_of,
+    run_of,
     settled,
+    times,
 )
-from vrs.segment import PolynomialSegment, check_derivative, evaluate, known_segment, times
 from vrs.track import Track, remade
 from vrs.tree import Node, knots_of, leaves, path_at, splice
 

@@ -12,9 +12,8 @@ from typing import Any, Generic, Self, TypeVar, overload
 
 import numpy as np
 
-from vrs.chunk import HOLD
 from vrs.model import Array
-from vrs.segment import Segment
+from vrs.segment import HOLD, Segment
 from vrs.tree import Leaf, Node, Path, first_start, last_end, leaves, path_at, path_to
 
 S = TypeVar("S", bound=Segment)

@@ -35,9 +35,8 @@ from interfaces.teleop import Correction, Deed, OperatorSite, Report, Sample
 from interfaces.wire.commands import command_wire
 from interfaces.wire.fields import text
 from vrs.commands import Profile
+from vrs.ledger import Receipt, Standing, Status
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt, Status
-from vrs.standing import Standing
 from vrs.timeline import Timeline
 
 PART = 256

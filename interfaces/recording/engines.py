@@ -14,7 +14,7 @@ from vrs.clock import ManualClock
 from vrs.commands import Lateness
 from vrs.engine import Engine
 from vrs.errors import FormatError
-from vrs.standing import Standing
+from vrs.ledger import Standing
 from vrs.timeline import Timeline
 
 POSTURE = 3

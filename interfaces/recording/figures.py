@@ -23,10 +23,10 @@ from interfaces.runs.summary import Json, summarize
 from interfaces.runs.twin_run import Event, Packet, Samples, TwinRun, carried_out
 from interfaces.teleop import Correction
 from robots.onboard.playout import PlayoutConfig
+from vrs.comparison import measured_rows
 from vrs.errors import FormatError
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, frozen_array
-from vrs.path_matching import measured_rows
-from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
 MOST_ROWS = 1_000_000

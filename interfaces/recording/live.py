@@ -22,8 +22,8 @@ from interfaces.software import software
 from interfaces.teleop import Correction, Deed, Report, RobotLine, Sample
 from interfaces.teleop.measured import PERIOD
 from interfaces.wire import fields
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
 RATE = 60.0

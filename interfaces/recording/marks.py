@@ -14,8 +14,8 @@ from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
 from interfaces.runs.events import correction_text
 from interfaces.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
+from vrs.ledger import Status
 from vrs.model import Array
-from vrs.receipt import Status
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:

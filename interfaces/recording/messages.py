@@ -31,10 +31,9 @@ from interfaces.wire.fields import (
 )
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import InvalidValueError
+from vrs.ledger import Known, Receipt
 from vrs.model import Array, frozen_array
-from vrs.receipt import Receipt
 from vrs.segment import PolynomialSegment, known_segment
-from vrs.standing import Known
 from vrs.timeline import Timeline
 
 FORMAT = "vrs-recording/1"
@@ -52,7 +51,7 @@ class Entry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
 
 
 class Late(Wire, frozen=True, omit_defaults=True, gc=False):
-    """How the operator's engine stood when a recording began in the middle of its session; see `vrs.standing`."""
+    """How the operator's engine stood when a recording began in the middle of its session; see `vrs.ledger`."""
 
     newest: Count
     """Highest command id given out."""

@@ -34,10 +34,9 @@ from interfaces.recording.source import Source
 from interfaces.recording.track import Track, Tracks
 from interfaces.runs.twin_run import Event, Packet
 from vrs.errors import FormatError, InvalidValueError
+from vrs.ledger import Known, Receipt
 from vrs.model import Array, RobotModel, frozen_array
-from vrs.receipt import Receipt
 from vrs.segment import times
-from vrs.standing import Known
 
 
 def _puma560() -> RobotModel:

@@ -17,8 +17,8 @@ from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import VrsError
+from vrs.ledger import Receipt, Status
 from vrs.mobile import ArcTimeline
-from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
 

@@ -7,7 +7,7 @@ from html import escape
 from typing import Any, Final
 
 from interfaces.report.tables import MEASURES, OFFSETS, offset_rows
-from vrs.receipt import Receipt
+from vrs.ledger import Receipt
 
 Json = Mapping[str, Any]
 

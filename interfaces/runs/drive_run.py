@@ -16,9 +16,8 @@ from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture
 from vrs.checks import number_in, one_of
-from vrs.comparison import PathComparison, summed_up
+from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array
-from vrs.path_matching import PathMatch, match_paths
 
 ROBOTS = ("ipr", "micro", "bare")
 """Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""

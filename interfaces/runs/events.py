@@ -8,8 +8,8 @@ import numpy as np
 
 from interfaces.runs.twin_run import Event, Packet
 from interfaces.teleop import Correction
+from vrs.ledger import Receipt, Status
 from vrs.model import Array
-from vrs.receipt import Receipt, Status
 
 NEAR = 0.3
 """Waits that are nearer than this [s] are told as one."""

@@ -12,8 +12,8 @@ import numpy as np
 from interfaces.runs.attribution import CAUSES, Attribution, OffsetOutcome
 from interfaces.runs.twin_run import TwinRun
 from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
+from vrs.ledger import Receipt, Status
 from vrs.model import Array
-from vrs.receipt import Receipt, Status
 
 SCHEMA = "vrs-summary/1"
 DIGITS = 9

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from interfaces.teleop import Correction
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
+from vrs.comparison import measured_rows
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
+from vrs.ledger import Receipt
 from vrs.model import Array, RobotModel, frozen_array
-from vrs.path_matching import measured_rows
-from vrs.receipt import Receipt
 from vrs.timeline import Timeline
 
 

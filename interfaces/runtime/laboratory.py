@@ -17,8 +17,8 @@ from interfaces.teleop.robot import Reference, RobotSite
 from robots.onboard.play import PlayState
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
+from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.receipt import Receipt
 
 _BLOCK = 100
 """Ticks that are passed together while nothing needs to know where the body is."""

@@ -8,8 +8,8 @@ from typing import NamedTuple, Protocol
 from interfaces.teleop.measured import Sample
 from interfaces.teleop.messages import Report
 from vrs.commands import Command
+from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.receipt import Receipt
 from vrs.timeline import Timeline
 
 

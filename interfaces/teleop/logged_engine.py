@@ -24,8 +24,8 @@ from vrs.commands import (
     Stop,
 )
 from vrs.engine import Engine
+from vrs.ledger import Receipt
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt
 
 
 class LoggedEngine(Engine):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from interfaces.teleop.measured import Ranges, Sample
 from vrs.commands import Command
+from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.receipt import Receipt
 from vrs.segment import PolynomialSegment
 
 

@@ -20,8 +20,8 @@ from vrs.clock import ManualClock
 from vrs.commands import Command, Lateness, Position
 from vrs.engine import Engine
 from vrs.errors import PlanningError, VrsError
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
 NOT_FOLLOWING = "the robot doesn't follow"

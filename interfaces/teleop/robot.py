@@ -30,15 +30,15 @@ from robots.onboard.stamps import Stamp, Verdict
 from robots.onboard.stops import from_commanded
 from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import number_in
-from vrs.chunk import HOLD, State
 from vrs.clock import ManualClock
 from vrs.commands import Profile, finite
 from vrs.engine import Engine
 from vrs.errors import VrsError
 from vrs.insertion import hold, piece
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
 from vrs.planning.stopping import stop
-from vrs.receipt import Receipt, Status
+from vrs.segment import HOLD, State
 from vrs.timeline import Timeline
 
 _TELL_MOST = 4096

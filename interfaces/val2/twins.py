@@ -18,8 +18,8 @@ from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.playing import Listeners, Player, endless, stuck
 from interfaces.val2.source import SourceFile
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
+from vrs.ledger import Receipt
 from vrs.model import RobotModel
-from vrs.receipt import Receipt
 
 LONGEST: Final = 600.0
 """How long a program may take [s], unless it's told otherwise."""

@@ -32,7 +32,7 @@ from interfaces.wire.fields import (
 from vrs import commands
 from vrs.commands import Command, Frame, Insertion, JointTarget, Motion, PoseTarget, Profile
 from vrs.errors import InvalidValueError
-from vrs.receipt import Receipt, Status
+from vrs.ledger import Receipt, Status
 
 _Row = Annotated[list[Annotated[float, Meta(ge=-1e6, le=1e6)]], Meta(min_length=4, max_length=4)]
 """Of a pose: whether it's one can be found out without an overflow."""

@@ -23,8 +23,8 @@ from robots.onboard.movers import MoversConfig, MoverTracker
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.routes import RouteMap
 from robots.onboard.yielding import Yielding, YieldingConfig
+from vrs.mobile.environment import Grid
 from vrs.mobile.kinematics import all_wrapped
-from vrs.mobile.rays import Grid
 from vrs.model import Array
 
 CELL = 0.05

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from robots.onboard.laser import LaserScan, OdometryTrack, beam_angles, deskewed
 from vrs.checks import number_in
+from vrs.mobile.environment import Grid
 from vrs.mobile.kinematics import all_wrapped
-from vrs.mobile.rays import Grid
 from vrs.model import Array
 
 Bools = NDArray[np.bool_]

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
-from vrs.chunk import State
 from vrs.commands import Profile
 from vrs.insertion import piece
 from vrs.model import Array, Limits, frozen_array
 from vrs.pacing import composed, halting
 from vrs.planning import parabolic, stopping
 from vrs.planning.plan import Plan, end_state
-from vrs.segment import PolynomialSegment
+from vrs.segment import PolynomialSegment, State
 from vrs.timeline import Timeline
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from robots.onboard.avoidance import SonarMount
 from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
-from vrs.mobile.rays import Grid
+from vrs.mobile.environment import Grid
 from vrs.model import Array
 
 _NEVER = -math.inf

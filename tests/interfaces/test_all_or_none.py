@@ -41,7 +41,7 @@ from vrs import (
 )
 from vrs.commands import Command
 from vrs.errors import InvalidValueError, PlanningError, UnknownCommandError, UnreachablePoseError
-from vrs.receipt import Receipt
+from vrs.ledger import Receipt
 
 HOME = Path(__file__).resolve().parents[2]
 MODEL = puma560.model()

@@ -18,8 +18,8 @@ from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import Event, Packet, TwinRun
 from interfaces.teleop import Correction
 from robots import puma560
+from vrs.ledger import Receipt, Status
 from vrs.model import Array
-from vrs.receipt import Receipt, Status
 
 EVIL = '</script><script>window.evil = 1</script><!-- <img src=x onerror="window.evil=2"> & \u2028'
 

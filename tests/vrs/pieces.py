@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vrs.chunk import Piece
+from vrs.segment import Piece
 
 N = 3
 

@@ -19,8 +19,8 @@ import pytest
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, SteerCommand, Timeline, archive, tree
 from vrs.archive import Keeper, StoredLeaf, StoredNode
-from vrs.chunk import Piece
 from vrs.codec import from_msgpack, to_msgpack
+from vrs.segment import Piece
 from vrs.testing import Figures, Generator, Session
 
 MODEL = puma560.model()

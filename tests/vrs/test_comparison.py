@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vrs.comparison import best_lag, compare_paths, shifted
+from vrs.comparison import best_lag, compare_paths, resample, shifted
 from vrs.errors import InvalidValueError
-from vrs.path_matching import resample
 
 T_END = 60.0
 

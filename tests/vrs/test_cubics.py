@@ -6,10 +6,10 @@ import numpy as np
 
 from robots import puma560
 from vrs import Limits
-from vrs.chunk import State
 from vrs.planning import violation
-from vrs.planning.cubics import integrated
+from vrs.planning.online import integrated
 from vrs.planning.plan import end_state, integrate
+from vrs.segment import State
 
 LIMITS = puma560.model().limits
 ONE = np.ones(1)

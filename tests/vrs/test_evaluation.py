@@ -20,8 +20,8 @@ from vrs import (
     evaluation,
     tree,
 )
-from vrs.chunk import Piece
 from vrs.errors import NonFiniteTimeError
+from vrs.segment import Piece
 
 
 def test_every_order_of_coefficients_keeps_its_place():

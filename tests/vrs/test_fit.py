@@ -3,11 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.planning.fit import fit
 from vrs.planning.plan import Plan, end_state
-from vrs.segment import evaluate
+from vrs.segment import State, evaluate
 
 AMPLITUDE = np.array([2.5, -1.0, 0.3])
 RATE = np.array([1.0, 3.0, 7.0])

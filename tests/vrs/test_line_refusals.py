@@ -7,16 +7,14 @@ import pytest
 
 from robots import puma560
 from vrs import Profile
-from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Limits, RobotModel
 from vrs.planning.course import Course, rotation_vector, rotations
 from vrs.planning.joining import smooth_stop
-from vrs.planning.line import line
-from vrs.planning.obstacles import obstacle
+from vrs.planning.line import line, obstacle
 from vrs.planning.path import trace
 from vrs.planning.plan import Plan, end_state
-from vrs.segment import evaluate
+from vrs.segment import State, evaluate
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

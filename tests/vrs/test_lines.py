@@ -11,13 +11,13 @@ import pytest
 from robots import puma560
 from robots.puma560.parameters import A3, D4
 from vrs import Profile
-from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.planning import move
 from vrs.planning.certificate import violation
 from vrs.planning.course import rotation_vector, rotations
 from vrs.planning.line import line
 from vrs.planning.plan import Plan, end_state
+from vrs.segment import State
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

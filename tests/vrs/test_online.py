@@ -5,10 +5,10 @@ import pytest
 
 from robots import puma560
 from vrs import Limits, Profile
-from vrs.chunk import State
 from vrs.planning import Plan, move, parabolic
 from vrs.planning.online import _least_change, online
 from vrs.planning.plan import _orders, parabolas
+from vrs.segment import State
 
 LIMITS = puma560.model().limits
 ZERO = np.zeros(6)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vrs.comparison import _match, match_paths, resample
 from vrs.model import Array
-from vrs.path_matching import _match, match_paths, resample
 
 
 def plainly(t: Array, follower: Array, t_leader: Array, path: Array, advance: int) -> tuple[list[int], float]:

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from robots import puma560
 from vrs import Engine, JointTarget, Limits, MotionCommand, Profile
-from vrs.chunk import State
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.planning import jerk_limited, move, overlapped, parabolic, run_up, violation
-from vrs.planning.blend import _certified, _Move, _quickest, _slowest_joint, _Times, blend
-from vrs.planning.bounds import bounds
+from vrs.planning.certificate import bounds
 from vrs.planning.online import online
+from vrs.planning.parabolic import _certified, _Move, _quickest, _slowest_joint, _Times, blend
 from vrs.planning.plan import Plan, empty, end_state, integrate
+from vrs.segment import State
 
 LIMITS = puma560.model().limits
 ZERO = np.zeros(6)

@@ -7,11 +7,11 @@ import pytest
 
 from robots import puma560
 from vrs import Profile
-from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.planning import Plan, move, run_up, violation
-from vrs.planning.blend import blend
+from vrs.planning.parabolic import blend
 from vrs.planning.plan import end_state
+from vrs.segment import State
 
 LIMITS = puma560.model().limits
 ZERO = np.zeros(6)

@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from robots import puma560
-from vrs.chunk import Piece, State
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError
 from vrs.planning import Profile, move
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, end_state
-from vrs.planning.steer_course import damped_rates, sliding_rates, weighted_jacobian
 from vrs.planning.steer_joint import change, one_joint, run
-from vrs.planning.steering import BRAKED_ONLY, steer
+from vrs.planning.steering import BRAKED_ONLY, damped_rates, sliding_rates, steer, weighted_jacobian
+from vrs.segment import Piece, State
 from vrs.timeline import Timeline
 
 MODEL = puma560.model()

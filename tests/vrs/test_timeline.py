@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vrs import ArcSegment, PolynomialSegment, Timeline
-from vrs.chunk import HOLD, Piece
 from vrs.codec import from_json, from_msgpack, segment_from_wire, segment_to_wire, to_json, to_msgpack
 from vrs.errors import FormatError, InvalidValueError, NonFiniteTimeError
+from vrs.segment import HOLD, Piece
 
 
 def drifting(pieces: int, n: int = 6, seed: int = 0) -> Timeline:

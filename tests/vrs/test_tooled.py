@@ -12,7 +12,7 @@ from tests.vrs.test_continuous import TOOL, along, corner, lawful
 from vrs import Engine, Insertion, InsertVia, JointTarget, Motion, MotionCommand, PoseTarget, Profile
 from vrs.errors import InvalidValueError
 from vrs.planning.course import rotation_vector, rotations
-from vrs.tooled import Tooled, bare, tooled
+from vrs.planning.path import Tooled, bare, tooled
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from tests.vrs.pieces import N, piece
 from vrs import ArcSegment, PolynomialSegment, Timeline, tree
-from vrs.chunk import HOLD, Piece
 from vrs.codec import from_json, to_json
 from vrs.errors import FormatError, InvalidValueError
+from vrs.segment import HOLD, Piece
 
 
 @pytest.fixture

@@ -27,9 +27,9 @@ from vrs import (
     Timeline,
     scheduler,
 )
-from vrs.chunk import Piece
-from vrs.receipt import Receipt
+from vrs.ledger import Receipt
 from vrs.scheduler import Scheduler
+from vrs.segment import Piece
 from vrs.testing import BOUNDS, LawBrokenError, Watch, check_run, columns, extremes
 from vrs.testing.laws import Figures
 

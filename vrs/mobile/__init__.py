@@ -6,12 +6,10 @@ Source: Han, Kim, Kim, Kim, "Internet Control Architecture for Internet-Based Pe
 from __future__ import annotations
 
 from vrs.mobile.avoidance import Avoidance
-from vrs.mobile.environment import VirtualEnvironment
+from vrs.mobile.environment import Grid, VirtualEnvironment, cast
 from vrs.mobile.estimator import Feedback, PostureEstimator
 from vrs.mobile.kinematics import advanced, increment, rotation, speeds, wheel_speeds, wrapped
-from vrs.mobile.limiting import braking, clipped, limited
-from vrs.mobile.model import DriveLimits, MobileModel, Wheels
-from vrs.mobile.rays import Grid, cast
+from vrs.mobile.model import DriveLimits, MobileModel, Wheels, braking, clipped, limited
 from vrs.mobile.timeline import ArcPiece, ArcTimeline
 
 __all__ = [

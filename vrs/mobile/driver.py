@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from vrs.agenda import Agenda
-from vrs.chunk import HOLD
 from vrs.commands import DriveCommand, Insertion, Lateness, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Edit, tail_at
-from vrs.ledger import Ledger
-from vrs.mobile.limiting import braking
-from vrs.mobile.model import DriveLimits, MobileModel
+from vrs.ledger import Ledger, Receipt
+from vrs.mobile.model import DriveLimits, MobileModel, braking
 from vrs.mobile.timeline import ArcPiece, ArcTimeline
-from vrs.receipt import Receipt
+from vrs.segment import HOLD
 
 _NOWHERE = np.empty(0)
 """A drive command has no target."""

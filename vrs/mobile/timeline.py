@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
-from vrs.chunk import HOLD
 from vrs.errors import InvalidValueError, NonFiniteTimeError
 from vrs.mobile.kinematics import advanced, displaced, on_arcs, wrapped
 from vrs.model import Array
-from vrs.segment import ArcSegment, check_derivative, known_arc, times
+from vrs.segment import HOLD, ArcSegment, check_derivative, known_arc, times
 from vrs.track import Track, remade
 from vrs.tree import Node, Run, leaves, splice
 

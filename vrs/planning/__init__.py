@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from vrs.chunk import State
 from vrs.commands import Profile
 from vrs.model import Array, Limits
 from vrs.planning import jerk_limited, parabolic
 from vrs.planning.certificate import violation
-from vrs.planning.overlap import overlapped
 from vrs.planning.plan import Plan, empty
+from vrs.planning.rounding import overlapped
+from vrs.segment import State
 
 __all__ = ["Plan", "empty", "move", "overlapped", "run_up", "violation"]
 

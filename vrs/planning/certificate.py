@@ -4,20 +4,65 @@ A polynomial lies within the hull of its Bernstein coefficients. Where the hulls
 proof. Where one doesn't, degrees up to 3 are decided by their exact extremes, higher ones by halving the piece
 until its hull keeps the limits or an end of a half passes one.
 Source: Farouki and Rajan, Algorithms for polynomials in Bernstein form, 1988.
+
+What it needs of a robot's limits again and again is made once for each `Limits` value.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vrs.errors import PlanningError
 from vrs.model import Array, Limits
-from vrs.planning.bounds import TOLERANCE
 from vrs.planning.plan import Plan
+
+TOLERANCE = 5e-10
+"""Relative overshoot that a certificate lets pass: rounding, half of what the laws allow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """Limits as plain floats: for six joints these are several times quicker than arrays."""
+
+    qd_max: tuple[float, ...]
+    """[rad/s]."""
+    qdd_max: tuple[float, ...]
+    """[rad/s²]."""
+    qddd_max: tuple[float, ...]
+    """[rad/s³]."""
+    lowest: tuple[float, ...]
+    """q_min [rad], less the tolerance."""
+    highest: tuple[float, ...]
+    """q_max [rad] and the tolerance."""
+    slack: tuple[Array, Array]
+    """What a tolerance is relative to at q_min and at q_max [rad], (n,) each, at least 1."""
+
+    def check_inside(self, q: list[float]) -> None:
+        """Raise PlanningError unless q [rad] lies within the position limits."""
+        for j, value in enumerate(q):
+            if not self.lowest[j] <= value <= self.highest[j]:
+                raise PlanningError(f"joint {j + 1} would pass its position limit")
+
+
+@lru_cache(maxsize=64)
+def bounds(limits: Limits) -> Bounds:
+    """The bounds of limits, which are compared by identity."""
+    at_low, at_high = abs(limits.q_min).clip(1.0), abs(limits.q_max).clip(1.0)
+    return Bounds(
+        tuple(limits.qd_max.tolist()),
+        tuple(limits.qdd_max.tolist()),
+        tuple(limits.qddd_max.tolist()),
+        tuple((limits.q_min - TOLERANCE * at_low).tolist()),
+        tuple((limits.q_max + TOLERANCE * at_high).tolist()),
+        (at_low, at_high),
+    )
+
 
 MAX_DEGREE = 31
 """Of a piece that can be certified."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vrs.chunk import State
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits
 from vrs.planning.certificate import violation
@@ -13,6 +12,7 @@ from vrs.planning.parabolic import brake
 from vrs.planning.parabolic import from_rest as parabolic_from_rest
 from vrs.planning.plan import Plan, empty, end_state
 from vrs.planning.straight import follow, rates
+from vrs.segment import State
 
 BRAKED_FIRST = "braked with parabolas first: no jerk-limited plan from this state keeps the limits"
 JOINED_BY_PARABOLAS = "the joining move accelerates with parabolas"

@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from vrs.chunk import State
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning.certificate import violation
 from vrs.planning.course import Course, rotation_vector, turning
 from vrs.planning.path import DERIVATIVES, NODES
 from vrs.planning.plan import Plan, empty, integrate
+from vrs.segment import State
 
 _TIMES: Final = (0.3, 0.5, 0.75, 1.0, 1.4, 2.0, 3.0)
 """Blend times to try, in times of what stopping takes and of what reaching full speed takes."""

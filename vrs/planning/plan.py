@@ -9,10 +9,8 @@ from struct import pack
 
 import numpy as np
 
-from vrs.chunk import State
 from vrs.model import Array
-from vrs.polynomials import state_of
-from vrs.segment import evaluate
+from vrs.segment import State, evaluate, state_of
 
 TAYLOR = np.array([[1.0], [1.0], [1.0 / 2.0], [1.0 / 6.0]])
 """What derivatives are multiplied by to be coefficients, (4, 1)."""

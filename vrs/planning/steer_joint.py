@@ -13,9 +13,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from vrs.chunk import State
 from vrs.model import Array, Limits
 from vrs.planning.plan import Plan, empty, packed
+from vrs.segment import State
 
 JerkProfile: TypeAlias = list[tuple[float, float, float]]
 """(duration [s], jerk [rad/s³], acceleration at its end [rad/s²]) of each phase."""

@@ -1,35 +1,465 @@
 """Steering: a hand's rates or twist as a plan that goes on for a while and then stops by itself.
 
 Every plan ends at rest, so the watchdog is in the plan: what no further input replaces stops the arm.
+
+A tool twist asks rates of the joints, from the Jacobian, at the start and on the way. Lengths are divided by the
+model's characteristic length, so that linear and angular rows compare. One time law s(t) holds for all joints: the
+tool goes along the asked-for twist at s(t) times its speed. What the arm moves beside that at the start (it came
+from another direction) dies away as a transient of its own.
+
+One concept in over 600 lines: what a hand steers; how joints keep to rates is `steer_joint`'s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import degrees, hypot
+from math import degrees, hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
-from vrs.chunk import State
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan
-from vrs.planning.steer_course import (
-    SLOW_FROM,
-    Twist,
-    damped_rates,
-    rates_to_limits,
-    sliding_rates,
-    weighted_jacobian,
-)
-from vrs.planning.steer_joint import rates_plan
-from vrs.planning.steer_tool import STANDING, along
+from vrs.planning.steer_joint import JerkProfile, change, cut, from_accelerations, rates_plan
+from vrs.segment import State
+
+SLOW_FROM = 30.0
+"""Condition number from which approaching a singularity slows the tool."""
+STOP_AT = 100.0
+"""Condition number at which approaching ends, and above which rates are damped."""
+_NODES = np.array([0.0, 0.3, 1.0])
+_FINE = np.linspace(0.0, 1.0, 25)
+FREE = np.ones_like(_FINE)
+"""Caps of a course that nothing slows; known by its identity."""
+_SPEED = 0.97
+"""Share of the speed limits for the way along the twist."""
+_TANGENTIAL = 0.3
+"""Growth of the logarithm of the condition number per radian of joint motion that isn't an approach yet."""
+_SINGULAR = 0.1 / STOP_AT
+"""σ_min / σ_max below which the sign of det J is noise."""
+_BRAKING = 0.8
+"""Share of the acceleration limits with which joints slow before their position limits."""
+_SHORTEST = 0.01
+"""Shortest way that's looked at [s at full speed]."""
+
+
+class Twist(NamedTuple):
+    """Where the tool is to go."""
+
+    linear: Array
+    """[m/s] over the characteristic length, (3,), in the base frame, at the start."""
+    angular: Array
+    """[rad/s], (3,), in the base frame."""
+    turns: bool
+    """Whether the linear part turns with the tool."""
+
+    def after(self, s: Array) -> Array:
+        """The twist at each of the times s [s] of motion at full speed, (k, 6)."""
+        v, w = self.linear, self.angular
+        rate = float(np.sqrt(w @ w))
+        if not self.turns or rate == 0.0:
+            return np.broadcast_to(np.concatenate([v, w]), (len(s), 6))
+        axis = w / rate
+        along = (axis @ v) * axis
+        c, d = np.cos(rate * s)[:, None], np.sin(rate * s)[:, None]
+        turned = along + c * (v - along) + d * _cross(axis, v)
+        return np.concatenate([turned, np.broadcast_to(w, (len(s), 3))], axis=1)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+def weighted_jacobian(model: RobotModel, q: Array) -> Array:
+    """Jacobians of joint positions (k, n), linear rows over the characteristic length: (k, 6, n)."""
+    J = np.array(model.jacobian(q))
+    J[:, :3] /= model.characteristic_length
+    return J
+
+
+def damped_rates(J: Array, twists: Array) -> tuple[Array, Array]:
+    """Least rates that give the twists, damped where the condition number is above STOP_AT.
+
+    A singular value σ below ε = σ_max / STOP_AT answers with σ/ε² instead of 1/σ: continuous, and 0 for the
+    directions in which the tool can't go.
+
+    Args:
+        J: Jacobians, (k, 6, n).
+        twists: (k, 6).
+
+    Returns:
+        Rates [rad/s], (k, n), and σ_min / σ_max with the sign of det J (J square), (k,).
+    """
+    U, S, Vt = np.linalg.svd(J, full_matrices=False)
+    floor = S[:, :1] / STOP_AT
+    answer = 1.0 / np.maximum(S, floor)
+    answer *= np.minimum(S / np.maximum(floor, 1e-300), 1.0)
+    parts = answer * (twists[:, None] @ U)[:, 0]
+    u = (parts[:, None] @ Vt)[:, 0]
+    nearness = S[:, -1] / np.maximum(S[:, 0], 1e-300)
+    if J.shape[1] == J.shape[2]:
+        nearness = nearness * np.where(np.linalg.det(J) < 0.0, -1.0, 1.0)
+    return u, nearness
+
+
+def sliding_rates(J: Array, twist: Array, low: Array, high: Array) -> Array:
+    """The rates that come nearest to a twist with some of them bounded, (n,).
+
+    The joint that passes its bound by most is set to it and the others are solved again, until none does.
+
+    Args:
+        J: Jacobian, (6, n).
+        twist: (6,).
+        low: Lowest rates [rad/s], (n,), not positive.
+        high: Highest rates [rad/s], (n,), not negative.
+    """
+    n = J.shape[1]
+    u = np.zeros(n)
+    free = np.ones(n, dtype=bool)
+    while free.any():
+        left = twist - J[:, ~free] @ u[~free]
+        u[free] = damped_rates(J[None, :, free], left[None])[0][0]
+        over = np.where(free, np.maximum(u - high, low - u), -np.inf)
+        worst = int(np.argmax(over))
+        if over[worst] <= 0.0:
+            break
+        u[worst] = min(max(u[worst], low[worst]), high[worst])
+        free[worst] = False
+    return u
+
+
+def rates_to_limits(q: Array, limits: Limits) -> tuple[Array, Array]:
+    """Rates with which each joint may go down and up, falling to 0 at its limits: (n,), (n,) [rad/s]."""
+    A = _BRAKING * limits.qdd_max
+    lag = 0.5 * A * limits.qdd_max / limits.qddd_max
+    down, up = np.maximum(q - limits.q_min, 0.0), np.maximum(limits.q_max - q, 0.0)
+    low, high = (np.sqrt(lag * lag + 2.0 * A * way) - lag for way in (down, up))
+    return -low, high
+
+
+class TwistCourse(NamedTuple):
+    """The joint rates along the twist, as functions of the way s [s at full speed]."""
+
+    u: Array
+    """Rates at the start [rad/s], (n,)."""
+    slope: Array
+    curve: Array
+    offset: Array
+    """What the rates change by when the transient has moved the arm aside."""
+    seen: float
+    """How far they hold [s]."""
+    grid: Array
+    """Ways at which the speed is bounded [s], (k,)."""
+    caps: Array
+    """Largest share of the asked-for speed there, (k,)."""
+
+
+def course(
+    model: RobotModel, q: Array, u: Array, aside: Array, twist: Twist, reach: float, limits: Limits
+) -> TwistCourse:
+    """Sample rates and condition numbers on the way.
+
+    Args:
+        model: The arm.
+        q: Start [rad], (n,).
+        u: Rates there [rad/s], (n,).
+        aside: Where the transient leaves the arm, from q [rad], (n,).
+        twist: What to follow.
+        reach: How far to look [s at full speed].
+        limits: Their speeds bound the share.
+    """
+    seen = reach
+    for _ in range(3):
+        ways = seen * _NODES
+        places = q + aside + ways[:, None] * u
+        rates, near = damped_rates(weighted_jacobian(model, places), twist.after(ways))
+        # Rates near a singularity change like 1 / σ_min: no parabola fits them over a longer way.
+        change_here = float(np.abs(near[1:] - near[0]).max()) / max(abs(float(near[0])), 1.0 / STOP_AT)
+        if change_here <= 0.6 or seen <= _SHORTEST:
+            break
+        seen = max(0.5 * seen / change_here, _SHORTEST)
+    offset = rates[0] - u
+    # The parabola through the three.
+    before, after = (rates[1] - rates[0]) / ways[1], (rates[2] - rates[1]) / (ways[2] - ways[1])
+    curve = 2.0 * (after - before) / seen
+    slope = before - 0.5 * curve * ways[1]
+    fastest = _SPEED / (np.abs(rates) / limits.qd_max).max(axis=1)
+    grid = reach * _FINE
+    caps = FREE
+    sharpest = float(((np.abs(slope) + seen * np.abs(curve)) / limits.qdd_max).max())
+    slowest = min(float(fastest.min()), sqrt(0.5 / max(sharpest, 0.5)))
+    if slowest < 1.0:
+        caps = np.minimum(np.interp(grid, ways, fastest), sqrt(0.5 / max(sharpest, 0.5)))
+    sign = -1.0 if near[0] < 0.0 else 1.0
+    if (sign * near).min() < 1.0 / SLOW_FROM or seen < reach:
+        ahead = np.interp(grid, ways, near)
+        ahead += np.maximum(grid - seen, 0.0) * float(near[2] - near[1]) / float(ways[2] - ways[1])
+        caps = np.minimum(caps, _share(ahead, grid, sqrt(float(u @ u))))
+    return TwistCourse(u, slope, curve, offset, seen, grid, caps)
+
+
+def _share(near: Array, way: Array, rate: float) -> Array:
+    """Share of the speed that a singularity leaves: all of it, unless it's being approached.
+
+    Args:
+        near: Signed σ_min / σ_max along the way, (k,).
+        way: Where [s at full speed], (k,).
+        rate: Joint rates of the twist [rad/s], their norm.
+    """
+    nearness = np.abs(near)
+    condition = 1.0 / np.maximum(nearness, 1e-12)
+    left = np.clip((STOP_AT - condition) / (STOP_AT - SLOW_FROM), 0.0, 1.0)
+    step = np.diff(near) / np.diff(way)
+    # From an exactly singular pose every way leads away.
+    falling = -near * np.append(step, step[-1]) / np.maximum(nearness, _SINGULAR) ** 2
+    approaching = np.clip((falling / rate - _TANGENTIAL) / (4.0 * _TANGENTIAL), 0.0, 1.0)
+    share = 1.0 - (1.0 - left) * approaching
+    if nearness[0] > _SINGULAR:
+        share[1:][near[1:] * near[:-1] < 0.0] = 0.0
+    return np.asarray(share)
+
+
+STANDING = 1e-9
+"""Share of the speed limits below which a joint doesn't move."""
+
+_BUDGETS = ((0.85, 0.1, 1.0), (0.5, 0.4, 0.6), (0.3, 0.25, 0.3))
+"""Shares of the acceleration and jerk limits for the time law and for the transient, and of the hold, tried in
+turn. A shorter hold stops before a position limit that the longer one would pass."""
+_TRANSIENTS = (0.06, 0.09, 0.12, 0.15, 0.19, 0.24, 0.3, 0.38, 0.48, 0.6, 0.75, 0.95)
+"""Durations of a transient to try [s]."""
+_GAP = 0.06
+"""Longest segment [s]: accelerations run straight in it."""
+_NEAR = 4e-3
+"""Knots nearer than this [s] become one."""
+_CLOSE = 0.01
+"""Share of the asked-for speed that the time law leaves to the transient."""
+_AHEAD = 0.12
+"""How far beyond the hold the way is looked at [s at full speed]."""
+_STOP = 0.8
+"""How long after the hold the arm may still move [s]: each joint by itself stops in about half of that."""
+_FOUR = np.arange(4.0)
+
+
+class Transient(NamedTuple):
+    """A motion that dies away: its acceleration runs straight between four knots."""
+
+    duration: float
+    """[s]."""
+    a: Array
+    """Accelerations at the knots, the last one 0, (4, n)."""
+
+    def aside(self, dv: Array) -> Array:
+        """Where it ends, from where it began at the rate dv [rad], (n,)."""
+        h = self.duration / 3.0
+        return np.asarray(3.0 * h * dv + h * h * (self.a[0] * (4.0 / 3.0) + self.a[1] * 2.0 + self.a[2]))
+
+
+def transient(dv: Array, da: Array, T: float) -> Transient:
+    """Bring a rate dv and an acceleration da to nothing in T, with the least squared jerk."""
+    half = -1.5 / T * dv - 0.25 * da
+    bend = da / 6.0
+    return Transient(T, np.array([da, half + bend, half - bend, np.zeros_like(da)]))
+
+
+def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
+    """The first of the durations to try in which a transient keeps a share of the limits; else the last [s]."""
+    joints = zip(dv.tolist(), da.tolist(), limits.qdd_max.tolist(), limits.qddd_max.tolist(), strict=True)
+    tried = iter(_TRANSIENTS)
+    T = next(tried)
+    for v, a, A, J in joints:
+        # A longer duration asks less of every joint, unless a itself is the reason.
+        while not _kept(v, a, share * A, share * J * T / 3.0, T):
+            longer = next(tried, None)
+            if longer is None:
+                return T
+            T = longer
+    return T
+
+
+def _kept(v: float, a: float, A: float, step: float, T: float) -> bool:
+    """Whether one joint's transient keeps accelerations A, and changes of them from knot to knot of `step`."""
+    half, bend = -1.5 / T * v - 0.25 * a, a / 6.0
+    first, second = half + bend, half - bend
+    most = max(abs(first - a), abs(second - first), abs(second))
+    return max(abs(first), abs(second)) <= A and most <= step
+
+
+class SpeedLaw(NamedTuple):
+    """s(t): share of the asked-for speed, in phases of constant jerk."""
+
+    starts: Array
+    """(k,)."""
+    state: Array
+    """Way, share, its rate, its jerk at the start of each phase, (4, k); after the last one it stands."""
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Way [s at full speed], share and its rate [1/s] at times t."""
+        i = np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+        x, v, a, j = self.state[:, i]
+        u = t - self.starts[i]
+        return x + u * (v + u * (a / 2 + u * j / 6)), v + u * (a + u * j / 2), a + u * j
+
+
+def reachable(way: TwistCourse, A: float, J: float) -> Array:
+    """Largest share at each place of the grid from which the caps ahead can still be kept, (k,).
+
+    Args:
+        way: With the caps.
+        A: Largest rate of the share [1/s]; half of it is counted on.
+        J: Largest rate of that [1/s²].
+    """
+    if way.caps is FREE:
+        return FREE
+    later = way.grid[None] - way.grid[:, None]
+    lag = 0.25 * A * A / J
+    brakes = way.caps + np.sqrt(lag * lag + A * np.maximum(later, 0.0)) - lag
+    share = np.where(later >= 0.0, brakes, np.inf).min(axis=1)
+    # Nothing is to be had beyond a place that mustn't be passed.
+    share[np.minimum.accumulate(way.caps) <= 0.0] = 0.0
+    return np.asarray(share)
+
+
+def speed_law(
+    s: float, ds: float, goal: float, hold: float, way: TwistCourse, A: float, J: float
+) -> tuple[SpeedLaw, float]:
+    """Bring the share from s to its goal, keep under the caps on the way, stop after `hold`.
+
+    Args:
+        s: Share at the start.
+        ds: Its rate [1/s].
+        goal: Share asked for.
+        hold: When the stop begins [s].
+        way: With the caps.
+        A: Largest rate of the share [1/s].
+        J: Largest rate of that [1/s²].
+
+    Returns:
+        The law, and the share that may be had at the start.
+    """
+    allowed = reachable(way, A, J)
+    steps = 1 if allowed.min() >= goal else 5
+    starts, states = [], []
+    x, v, a, t = 0.0, s, ds, 0.0
+    parts: list[tuple[float, float]] = [(goal, hold)] if steps == 1 else [(-1.0, hold / steps)] * steps
+    for target, lasting in [*parts, (0.0, np.inf)] if hold > 0.0 else [(0.0, np.inf)]:
+        u = target if target >= 0.0 else min(goal, float(np.interp(x, way.grid, allowed)))
+        phases: JerkProfile = change(v, a, u, A, J)
+        for h, j, after in cut(phases, a, lasting) if lasting < np.inf else phases:
+            starts.append(t)
+            states.append((x, v, a, j))
+            x += h * (v + h * (2.0 * a + after) / 6.0)
+            v += 0.5 * h * (a + after)
+            a = after
+            t += h
+    starts.append(t)
+    states.append((x, 0.0, 0.0, 0.0))
+    return SpeedLaw(np.array(starts), np.array(states).T), float(allowed[0])
+
+
+def along(
+    state: State,
+    model: RobotModel,
+    u: Array,
+    twist: Twist,
+    goal: float,
+    hold: float,
+    limits: Limits,
+    *,
+    blocked: bool = False,
+) -> tuple[Plan | None, float]:
+    """Plan along a twist.
+
+    Args:
+        state: Start.
+        model: The arm.
+        u: Joint rates of the twist at the start [rad/s], (n,).
+        twist: What to follow.
+        goal: Share of its speed to reach.
+        hold: When the stop begins [s].
+        limits: Limits that hold at every instant.
+        blocked: Whether a joint at its limit is in the way, so that only the share is of use.
+
+    Returns:
+        A certified plan, or None where none of the budgets gives one; and the share of the speed that may be
+        had at the start.
+    """
+    # A joint counts by its share of the speed limits.
+    onto_u = u / (limits.qd_max * limits.qd_max)
+    onto_u = onto_u / float(onto_u @ u)
+    s = float(state.qd @ onto_u)
+    dv = state.qd - (goal if abs(s - goal) < _CLOSE else s) * u
+    still = np.zeros_like(u)
+    rough = transient(dv, still, shortest(dv, still, limits, _BUDGETS[0][1]))
+    way = course(model, state.q, u, rough.aside(dv), twist, hold + _AHEAD, limits)
+    bent = state.qdd - s * s * way.slope
+    ds = float(bent @ onto_u)
+    target = min(goal, float(way.caps[0]))
+    if abs(s - target) < _CLOSE and abs(ds) < 20.0 * _CLOSE:
+        # Near enough to leave the rest to the transient, without knots of its own.
+        s, ds = target, 0.0
+    dv, da = state.qd - s * u, bent - ds * u
+    T = shortest(dv, da, limits, _BUDGETS[0][1])
+    size = np.abs(u) + np.abs(way.curve) * way.seen**2
+    bend = np.abs(way.slope) + np.abs(way.curve) * way.seen
+    sharpest = float((bend / limits.qddd_max).max())
+    for for_law, for_transient, part in _BUDGETS:
+        A = for_law / max(float((size / limits.qdd_max).max()), 10.0 * sharpest)
+        J = 0.7 * for_law / float((size / limits.qddd_max).max())
+        law, share = speed_law(s, ds, goal, part * hold, way, A, J)
+        if for_transient != _BUDGETS[0][1]:
+            T = shortest(dv, da, limits, for_transient)
+        if blocked or max(T, float(law.starts[-1])) > hold + _STOP:
+            break
+        plan = _composed(state, way, law, s, ds, T)
+        problem = violation(plan, limits, jerk=True)
+        if problem is None:
+            return plan, share
+    return None, share
+
+
+def _composed(state: State, way: TwistCourse, law: SpeedLaw, s: float, ds: float, T: float) -> Plan:
+    """The course under the law, and a transient of duration T that meets the state."""
+    # The offset comes as 1 − (1 − t/T)².
+    du = s * s * way.slope + (2.0 * s / T) * way.offset
+    beside = transient(state.qd - s * way.u, state.qdd - ds * way.u - du, T)
+    t = _knots([*law.starts.tolist(), T / 3.0, 2.0 * T / 3.0, T])
+    x, v, a = law.at(t)
+    left = np.maximum(1.0 - t / T, 0.0)
+    x, v, a, left = x[:, None], v[:, None], a[:, None], left[:, None]
+    u = way.u + (1.0 - left * left) * way.offset + x * (way.slope + 0.5 * x * way.curve)
+    du = (2.0 / T * left) * way.offset + v * (way.slope + x * way.curve)
+    hats = np.maximum(1.0 - np.abs((3.0 / T) * t[:, None] - _FOUR), 0.0)
+    accelerations = a * u + v * du + hats @ beside.a
+    accelerations[-1] = 0.0
+    h = t[1:] - t[:-1]
+    # What straight lines between the knots left over of the rate goes where the arm is about to stop.
+    residue = state.qd + 0.5 * h @ (accelerations[1:] + accelerations[:-1])
+    tail = np.maximum(t - 0.4 * t[-1], 0.0) * (t[-1] - t)
+    accelerations -= (tail / (0.5 * h @ (tail[1:] + tail[:-1])))[:, None] * residue
+    jerks = (accelerations[1:] - accelerations[:-1]) / h[:, None]
+    return from_accelerations(state, h, accelerations[:-1], jerks)
+
+
+def _knots(times: list[float]) -> Array:
+    """The times in order from 0 to the last, none nearer than _NEAR, none farther apart than _GAP."""
+    end = max(times)
+    knots = [0.0]
+    for t in sorted(times):
+        if t - knots[-1] >= _NEAR and (end - t >= _NEAR or t == end):
+            gap = t - knots[-1]
+            parts = int(gap / _GAP) + 1
+            start = knots[-1]
+            knots += [start + gap * k / parts for k in range(1, parts)]
+            knots.append(t)
+    return np.array(knots)
+
 
 _SLOWED = 0.5
 """A hand is told what is in its way where less than this share is left of what it asks for."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from vrs.chunk import State
 from vrs.commands import Profile
 from vrs.model import Limits
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, integrate
 from vrs.planning.steer_joint import change, rates_plan
+from vrs.segment import State
 
 BRAKED = "braked with parabolas: no jerk-limited stop from this state keeps the limits"
 

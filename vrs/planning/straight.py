@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vrs.model import Array, Limits
-from vrs.planning.bounds import bounds
+from vrs.planning.certificate import bounds
 from vrs.planning.plan import Plan
 
 NEGLIGIBLE = 1e-12

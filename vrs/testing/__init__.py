@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from vrs.testing.draws import KINDS, Draws, Generator, Source, lines_are_planned
 from vrs.testing.extremes import extremes
 from vrs.testing.laws import (
     BOUNDS,
@@ -13,15 +12,18 @@ from vrs.testing.laws import (
     check_limits,
     check_memory,
     check_moves,
+    check_names,
+    check_pace,
     check_past,
+    check_receipts,
     check_rest,
     check_run,
+    check_same,
     check_tail,
+    check_way,
     columns,
 )
-from vrs.testing.pace import check_pace, check_way
-from vrs.testing.receipts import check_names, check_receipts, check_same
-from vrs.testing.sessions import Session
+from vrs.testing.sessions import KINDS, Draws, Generator, Session, Source, lines_are_planned
 from vrs.testing.watch import Watch
 
 __all__ = [

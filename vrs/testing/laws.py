@@ -1,17 +1,22 @@
-"""The laws that every edit of a timeline keeps, as checks of what was there before and what is there after it."""
+"""The laws that every edit of a timeline keeps, as checks of what was there before and what is there after it.
+
+Some edits keep the way and change when it's gone. Receipts are true, name what they should, and nothing else
+changes them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.chunk import HOLD
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, Limits
+from vrs.segment import HOLD
 from vrs.testing.extremes import extremes, values
 from vrs.timeline import Timeline
 from vrs.tree import Leaf
@@ -363,3 +368,214 @@ def check_rest(timeline: Timeline, run: Columns, figures: Figures) -> None:
         figures.see("end's qd [rad/s]", np.abs(values(a, run.durations[-1:], 1)).max())
     if timeline.sample(timeline.end, derivative=1).any():
         raise LawBrokenError("rest", "the arm moves after the end")
+
+
+_PLACES = 6
+"""Places at which a way is compared."""
+_DIPS = 4
+"""Places where the way comes near that are looked at closely."""
+_ASTRAY = 1e-3
+"""How far from where it's looked for a place may lie [s], as where the arm hardly moves times aren't certain."""
+_STEADY = 1e-24
+"""Square of a speed [rad²/s²] below which the arm stands."""
+
+
+def check_way(
+    before: Timeline, after: Timeline, span: tuple[float, float], there: float | None, pace: float, figures: Figures
+) -> None:
+    """While its pace changes, the arm is on the way that it had, and goes on along it.
+
+    Args:
+        before: The motion as it was.
+        after: The motion at another pace.
+        span: From when to when its pace changes, steadily [s].
+        there: Where on the old way the arm then is [s]; None if that isn't known.
+        pace: To which it changes from 1; 0 stops.
+        figures: Where the worst figures are kept.
+
+    Raises:
+        LawBrokenError: If it isn't.
+    """
+    begin, end = span
+    if end <= begin:
+        return
+    slow, fast = min(pace, 1.0), max(pace, 1.0)
+    s, step = begin, (end - begin) / _PLACES
+    for k in range(1, _PLACES + 1):
+        t = begin + k * step
+        # Places found where the arm hardly moves are too uncertain to bound the next ones from above.
+        low, high = s + slow * step, begin + fast * (t - begin)
+        if there is not None:
+            low, high = max(low, there - fast * (end - t)), min(high, there - slow * (end - t))
+        q = after.sample(t)
+        s = _nearest(before, q, max(low - _ASTRAY, begin), high + _ASTRAY)
+        figures.see("off the way [rad]", np.abs(before.sample(s) - q).max(), f"at {t!r} s")
+
+
+def _nearest(timeline: Timeline, q: Array, low: float, high: float) -> float:
+    """Where between two times the timeline is nearest to q [s]; a way may come by again."""
+    moments = np.linspace(low, high, 129)
+    away = np.abs(timeline.sample(moments) - q).max(1)
+    beside = np.concatenate([[np.inf], away, [np.inf]])
+    dips = np.flatnonzero((away <= beside[:-2]) & (away <= beside[2:]))
+    found = []
+    for dip in dips[np.argsort(away[dips])][:_DIPS].tolist():
+        s = _refined(timeline, q, float(moments[max(dip - 1, 0)]), float(moments[min(dip + 1, 128)]))
+        found.append((float(np.abs(timeline.sample(s) - q).max()), s))
+    return min(found)[1]
+
+
+def _refined(timeline: Timeline, q: Array, low: float, high: float) -> float:
+    for _ in range(2):
+        moments = np.linspace(low, high, 17)
+        best = int(np.abs(timeline.sample(moments) - q).max(1).argmin())
+        low, high = float(moments[max(best - 1, 0)]), float(moments[min(best + 1, 16)])
+    s = 0.5 * (low + high)
+    for _ in range(5):
+        qd = timeline.sample(s, derivative=1)
+        square = float(qd @ qd)
+        if square < _STEADY:
+            break
+        s = min(max(s + float((q - timeline.sample(s)) @ qd) / square, low), high)
+    return s
+
+
+def check_pace(
+    before: Columns, after: Columns, first: int, factor: float, figures: Figures
+) -> tuple[int, int] | None:
+    """The last segments of after are the last of before, run `factor` times as fast.
+
+    Args:
+        before: Segments before the edit.
+        after: Segments after it.
+        first: Index, in after, of the first that is whole.
+        factor: Ratio of the paces.
+        figures: Where the worst figures are kept.
+
+    Returns:
+        Indices, in before and after, of the first pair; None if there's none.
+
+    Raises:
+        LawBrokenError: If they aren't.
+    """
+    new = [i for i in range(first, len(after)) if after.durations[i] * factor > SLIVER]
+    old = before.lasting(0)[-len(new) :] if new else []
+    if [before.owners[i] for i in old] != [after.owners[i] for i in new]:
+        raise LawBrokenError("pace", "other commands than before follow the change of pace")
+    if not new:
+        return None
+    figures.see("pace", np.abs(after.durations[new] * factor / before.durations[old] - 1.0).max())
+    for i, j in zip(old, new, strict=True):
+        a, b = before.padded(i, i + 1)[0], after.padded(j, j + 1)[0]
+        if a.shape != b.shape:
+            raise LawBrokenError("pace", "polynomials of another degree follow the change of pace")
+        scaled = a * factor ** np.arange(len(a))[:, None]
+        figures.see("pace", (np.abs(b - scaled) / np.maximum(np.abs(scaled), 1e-300)).max(initial=0.0))
+    return old[0], new[0]
+
+
+_KEPT = tuple(item.name for item in fields(Receipt) if item.name not in {"q", "shifted_names", "superseded_names"})
+_ROUNDING = 1.001e-9
+"""Times that differ by less [s] may be the same."""
+_SHORT = 1e-6
+"""Moves up to this long [s] aren't looked for at their receipts' times, which are rounded."""
+
+
+def check_receipts(
+    timeline: Timeline, run: Columns, receipts: dict[int, Receipt], moves: Collection[int], figures: Figures
+) -> None:
+    """Every receipt that stands says where the arm is at its end, and its move is under way when it says so.
+
+    Args:
+        timeline: What is scheduled.
+        run: Its segments.
+        receipts: All receipts, by command id.
+        moves: Commands that have moves of their own, under way from beginning to end.
+        figures: Where the worst figures are kept.
+
+    Raises:
+        LawBrokenError: If one doesn't.
+    """
+    for r in receipts.values():
+        if r.status is Status.REJECTED and (r.stands or r.execute_at is not None or not r.reason):
+            raise LawBrokenError(
+                "receipts", f"command {r.command_id} was rejected, and its receipt says other things"
+            )
+        if r.stands and r.command_id in moves and r.execute_at is not None and r.end is not None:
+            if r.end - r.execute_at <= _SHORT:
+                continue
+            middle = run.index_at(0.5 * (r.execute_at + r.end))
+            if not 0 <= middle < len(run) or run.owners[middle] != r.command_id:
+                raise LawBrokenError("receipts", f"command {r.command_id} isn't under way when its receipt says so")
+    standing = [r for r in receipts.values() if r.stands and r.q is not None]
+    if standing:
+        away = np.abs(timeline.sample([r.end for r in standing]) - [r.q for r in standing]).max(1)  # type: ignore[arg-type]
+        worst = standing[int(away.argmax())]
+        figures.see("receipt's q [rad]", away.max(), f"in the receipt of command {worst.command_id}")
+
+
+def check_names(
+    answer: Receipt, version: int, before: dict[int, Receipt], after: dict[int, Receipt], moves: Collection[int]
+) -> None:
+    """A receipt names what it shifted and superseded, and no other.
+
+    Args:
+        answer: The receipt.
+        version: Of the timeline before the edit.
+        before: All receipts before the edit, by command id.
+        after: After it.
+        moves: Commands that have moves of their own.
+
+    Raises:
+        LawBrokenError: If it doesn't.
+    """
+    mine, shifted, superseded = answer.command_id, set(answer.shifted), set(answer.superseded)
+    gone: set[int] = set()
+    moved: dict[int, float] = {}
+    for i, was in before.items():
+        r = after[i]
+        if i == mine or not was.stands:
+            continue
+        if not r.stands:
+            if r.superseded_by != mine:
+                raise LawBrokenError("receipts", f"command {i} stands no more, and doesn't name command {mine}")
+            if i in moves:
+                gone.add(i)
+        elif "elsewhere" in r.reason and r.version > version:
+            shifted.discard(i)
+        elif was.execute_at != was.end:
+            times = zip((was.execute_at, was.end), (r.execute_at, r.end), strict=True)
+            moved[i] = max(abs(x - y) for x, y in times if x is not None and y is not None)
+    # What stood no more, has no move or belongs to the engine that this one branched from may be named too.
+    stands = {i for i in superseded if i != mine and i in after and after[i].stands}
+    if not gone <= superseded or stands:
+        raise LawBrokenError("receipts", f"superseded {sorted(gone)}, says {sorted(superseded)}")
+    shifted = {i for i in shifted if i in moves and i in after and after[i].stands and i != mine}
+    far = {i for i, away in moved.items() if away > _ROUNDING and i in moves}
+    if not far <= shifted or not all(moved.get(i, 1.0) for i in shifted):
+        raise LawBrokenError("receipts", f"shifted {sorted(far)}, says {sorted(shifted)}")
+
+
+def check_same(was: dict[int, Receipt], now: dict[int, Receipt], law: str) -> None:
+    """Receipts say the same.
+
+    Args:
+        was: Receipts by command id.
+        now: The same ones, later.
+        law: What's broken if they don't.
+
+    Raises:
+        LawBrokenError: If one doesn't.
+    """
+    if was.keys() != now.keys():
+        raise LawBrokenError(law, f"receipts {sorted(was.keys() ^ now.keys())} came or went")
+    for i, r in was.items():
+        other = now[i]
+        if other is r:
+            continue
+        for name in _KEPT:
+            if getattr(r, name) != getattr(other, name):
+                detail = f"receipt {i}: {name} was {getattr(r, name)!r}, is {getattr(other, name)!r}"
+                raise LawBrokenError(law, detail)
+        if not np.array_equal(r.q, other.q):  # type: ignore[arg-type]
+            raise LawBrokenError(law, f"receipt {i}: q was {r.q}, is {other.q}")

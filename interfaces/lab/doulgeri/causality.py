@@ -14,7 +14,7 @@ from interfaces.link import Conditions, ConstantDelay, LinkConditions
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Status
-from vrs.receipt import Receipt
+from vrs.ledger import Receipt
 
 D_F: Final = 0.3
 """Forward delay [s]."""

@@ -17,8 +17,8 @@ from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite
 from vrs import Status, SteerCommand
 from vrs.comparison import best_lag
+from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.receipt import Receipt
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

@@ -16,8 +16,8 @@ from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from vrs import MotionCommand
 from vrs.comparison import compare_paths
+from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.receipt import Receipt
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, REAL, VIRTUAL, draw, legend
 from interfaces.runs.drive_run import Case, DriveRun
-from vrs.path_matching import PathMatch
+from vrs.comparison import PathMatch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

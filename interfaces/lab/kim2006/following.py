@@ -30,9 +30,9 @@ from robots.ipr.position import FusedPosition
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import MobileRobot
 from vrs.checks import number_in, one_of
+from vrs.comparison import match_paths
 from vrs.mobile import clipped, wrapped
 from vrs.model import Array
-from vrs.path_matching import match_paths
 
 TICK: Final = 0.02
 """Between two turns of everything, the paper's T [s]."""

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 
 from interfaces.changes import SAME, first_unlike
 from interfaces.recording.driving.messages import ArcChange, ArcEntry, ArcHistory
-from vrs.chunk import HOLD
 from vrs.errors import InvalidValueError
 from vrs.mobile import ArcPiece, ArcTimeline, wrapped
-from vrs.segment import ArcSegment
+from vrs.segment import HOLD, ArcSegment
 
 PART = 256
 """Arcs of one message of a history."""

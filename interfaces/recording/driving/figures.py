@@ -14,9 +14,9 @@ from interfaces.runs.drive_row import facts_of, row_of
 from interfaces.runs.drive_run import Case, DriveRun
 from interfaces.teleop.architectures import Transport
 from robots.ipr.robot import Collision
+from vrs.comparison import resample
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
-from vrs.path_matching import resample
 
 if TYPE_CHECKING:
     from interfaces.recording.recording import Recording

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vrs.comparison import PathMatch, match_paths, measured_rows
 from vrs.model import Array
-from vrs.path_matching import PathMatch, match_paths, measured_rows
 
 if TYPE_CHECKING:
     from interfaces.recording.recording import Recording

@@ -15,7 +15,7 @@ from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
 from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
 from vrs.mobile.kinematics import advanced
-from vrs.mobile.limiting import braking, limited
+from vrs.mobile.model import braking, limited
 from vrs.segment import ArcSegment, known_arc
 
 

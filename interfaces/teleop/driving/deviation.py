@@ -1,6 +1,6 @@
 """How far a robot is from the path that it's to follow, and how much later, while both are driving.
 
-The laboratory matches whole paths afterwards (`vrs.path_matching`); live, each measured posture is matched to the
+The laboratory matches whole paths afterwards (`vrs.comparison`); live, each measured posture is matched to the
 nearest place of the path near the place before.
 """
 

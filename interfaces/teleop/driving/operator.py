@@ -15,7 +15,7 @@ from interfaces.teleop.tasks import Doing, Errand, Halt, Sight, Task, TaskReport
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import finite
 from vrs.mobile import MobileModel
-from vrs.mobile.limiting import braking
+from vrs.mobile.model import braking
 from vrs.segment import ArcSegment
 
 NOT_MET: Final = "the robot hasn't been met yet"

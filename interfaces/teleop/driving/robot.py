@@ -16,7 +16,7 @@ from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.sensor_watch import SoundPosition
 from vrs.checks import number_in
 from vrs.mobile import DriveLimits
-from vrs.mobile.limiting import braking
+from vrs.mobile.model import braking
 
 TOO_FAR = "the drive is to begin too far from where the robot is"
 """Why a new epoch isn't followed."""

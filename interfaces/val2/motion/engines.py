@@ -14,8 +14,8 @@ from vrs.clock import ManualClock
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import VrsError
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
 _REMEMBERED: Final = 64

@@ -11,8 +11,8 @@ from interfaces.val2.motion.engines import standing
 from interfaces.val2.motion.robot import Fate
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
+from vrs.ledger import Receipt
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from vrs.commands import Command
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
-from vrs.receipt import Receipt, Status
 from vrs.timeline import Timeline
 
 

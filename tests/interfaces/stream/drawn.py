@@ -39,9 +39,9 @@ from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState
 from robots.onboard.supervisor import CellChange
 from vrs import commands as v
+from vrs.ledger import Receipt, Status
 from vrs.mobile import DriveLimits
 from vrs.model import Limits
-from vrs.receipt import Receipt, Status
 from vrs.segment import ArcSegment, PolynomialSegment
 
 floats = partial(st.floats, allow_subnormal=False)

@@ -49,9 +49,9 @@ from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState
 from robots.onboard.supervisor import CellChange
 from vrs import Engine, Insertion, ManualClock, Motion, PolynomialSegment, Profile, commands
+from vrs.ledger import Receipt, Status
 from vrs.mobile import DriveLimits
 from vrs.model import Limits, frozen_array
-from vrs.receipt import Receipt, Status
 from vrs.segment import ArcSegment
 
 PATH = Path(__file__).with_name("vectors.json")

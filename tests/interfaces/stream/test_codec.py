@@ -29,7 +29,7 @@ from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
 from vrs import JointTarget, MotionCommand, PolynomialSegment
 from vrs.errors import InvalidValueError
-from vrs.receipt import Receipt, Status
+from vrs.ledger import Receipt, Status
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 QUICK = settings(max_examples=25, deadline=None, phases=PHASES, database=None, derandomize=True)
