@@ -8,14 +8,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from interfaces.lab.localization.trial import Listener, body_of, furnished, setting, wander
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.global_localization import locate
 from robots.onboard.laser import LaserScan
 from robots.onboard.localizer import Localizer
-from robots.onboard.map_building import MapBuilder
+from robots.onboard.map_building import MapBuilder, Surveyor
 from robots.onboard.paper_localization import PaperLocalizer
-from robots.onboard.surveying import Surveyor
 
 if TYPE_CHECKING:
     from benchmarks.results import Part

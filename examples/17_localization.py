@@ -10,7 +10,7 @@ from interfaces.lab.localization.wandering import Wanderer
 from robots.ipr.apartments import ApartmentConfig, apartment
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import plan_map
 from robots.ipr.reality import MobileReality
 from robots.onboard import LaserModel, Localizer, Status
 

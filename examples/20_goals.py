@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robots.drive_limits import IPR_LIMITS
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.navigation import BodyNavigator
 from robots.ipr.position import LaserPosition
 from robots.ipr.robot import place
 from robots.onboard import Goal, LaserModel
-from robots.onboard.driving import STAND, kept
+from robots.onboard.driving import IPR_LIMITS, STAND, kept
 from robots.onboard.journey import GOING
 
 PERIOD = 0.05

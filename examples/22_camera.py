@@ -9,8 +9,7 @@ import numpy as np
 from PIL import Image
 
 from robots.bullet.rooms import read_room
-from robots.ipr.camera import NECK, PanTilt
-from robots.ipr.sight import Sight
+from robots.ipr.camera import NECK, PanTilt, Sight
 
 room = read_room("""room 1
 name A hall

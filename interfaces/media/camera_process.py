@@ -12,8 +12,7 @@ import sys
 
 from interfaces.media.coding import VideoEncoder, encode_still
 from interfaces.media.messages import HEAD, Order, Ready, Setup, Shot, Taken, decode_order, encode, size_of
-from robots.ipr.camera import Look
-from robots.ipr.sight import Sight
+from robots.ipr.camera import Look, Sight
 from vrs.clock import WallClock
 from vrs.errors import FormatError
 

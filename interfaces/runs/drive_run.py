@@ -11,10 +11,9 @@ from interfaces.link.link import Link
 from interfaces.teleop.architectures import Constants, OperatorSite, Packet, Report, Transport
 from interfaces.teleop.architectures.equipment import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
-from robots.drive_limits import IPR_LIMITS
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
-from robots.onboard.driving import Posture
+from robots.onboard.driving import IPR_LIMITS, Posture
 from vrs.checks import number_in, one_of
 from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array

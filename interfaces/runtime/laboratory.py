@@ -14,7 +14,7 @@ from interfaces.link import Lane, Link, LinkConditions
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import Reference, RobotSite
-from robots.onboard.play import PlayState
+from robots.onboard.playout import PlayState
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt

@@ -24,8 +24,7 @@ from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.received import ReceivedLog
 from robots.onboard.following import SensorMonitor, Violation, too_far
-from robots.onboard.play import EvenPlay, PlayState, play_of
-from robots.onboard.playout import Playout, PlayoutConfig
+from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
 from robots.onboard.stamps import Stamp, Verdict
 from robots.onboard.stops import from_commanded
 from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.ways import CELL, Ways
+from robots.ipr.floor_plan import CELL, Ways
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 

@@ -1,13 +1,21 @@
-"""A room in two dimensions: exact rays, overlaps and distances, without physics."""
+"""A room in two dimensions: exact rays, overlaps and distances, without physics.
+
+Its line map has the faces of walls and known things, as far as they can be seen. Its grid says where a robot or a
+person can go, and the shortest routes that keep away from things.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.bullet.rooms import Block, Column, Room
+from robots.onboard.gsp_map import GspMap, Lines
+from vrs.checks import number_in
+from vrs.errors import InvalidValueError
 from vrs.model import Array
 
 _TINY = 1e-300
@@ -173,3 +181,178 @@ class FloorPlan:
                 self._rx, self._ry, radii = np.array(self._round, dtype=np.float64).reshape(-1, 3).T.copy()
                 self._r2 = radii * radii
             self._time = t
+
+
+_OUTSIDE = 1e-6
+"""By how much a face is looked at before it [m]: whether that's inside of another thing."""
+
+
+def plan_map(
+    room: Room, height: float = 0.3, *, doubt: float = 0.0005, turn_doubt: float = 1.5e-4, shortest: float = 0.2
+) -> GspMap:
+    """Make the map of a floor plan.
+
+    Columns have no straight face, and what comes or goes isn't relied on.
+
+    Args:
+        room: What stands there; only what is known counts.
+        height: Of the scanner's plane [m]: lower things aren't seen.
+        doubt: Standard deviation of a face along its normal [m], in [0, 1]: how well the plan was built.
+        turn_doubt: And of its direction [rad], in [0, 1].
+        shortest: Shorter faces are left out [m], in [0.01, 10].
+    """
+    number_in("doubt", doubt, 0.0, 1.0, unit=" m")
+    number_in("turn_doubt", turn_doubt, 0.0, 1.0, unit=" rad")
+    number_in("shortest", shortest, 0.01, 10.0, unit=" m")
+    blocks = [b for b in room.known().blocks if b.height >= height and b.start == -math.inf and b.end == math.inf]
+    rows: list[tuple[float, float, float, float]] = []
+    for block in blocks:
+        for face in _faces(block):
+            others = [other for other in blocks if other is not block]
+            rows += [row for row in _open(face, others, room) if row[3] >= shortest]
+    found = np.array(rows).reshape(-1, 4)
+    half = found[:, 3] / 2
+    variances = np.tile([doubt**2, turn_doubt**2], (len(found), 1))
+    lines = Lines.of(found[:, :3], np.column_stack([-half, half]), variances, np.zeros(len(found)))
+    return GspMap.of(room.name, lines)
+
+
+def _faces(block: Block) -> list[tuple[Array, Array, float]]:
+    """The four faces of a block: begin, direction and length, the outside on the left."""
+    made = []
+    for quarter, (length, width) in enumerate([(block.length, block.width), (block.width, block.length)] * 2):
+        # Facing away from the middle, the left of the direction is outside.
+        angle = block.angle + quarter * math.pi / 2 + math.pi
+        along = np.array([math.cos(angle), math.sin(angle)])
+        out = np.array([-along[1], along[0]])
+        middle = np.array([block.x, block.y]) + out * width / 2
+        made.append((middle - along * length / 2, along, length))
+    return made
+
+
+def _open(
+    face: tuple[Array, Array, float], others: list[Block], room: Room
+) -> list[tuple[float, float, float, float]]:
+    """The parts of a face that aren't covered: centre, direction and length."""
+    begin, along, length = face
+    out = np.array([-along[1], along[0]])
+    before = begin + _OUTSIDE * out
+    covered = [span for other in others if (span := _within(before, along, length, other)) is not None]
+    covered.append((length, math.inf))
+    angle = math.atan2(along[1], along[0])
+    parts, at = [], 0.0
+    for low, high in sorted(covered):
+        if low > at:
+            middle = begin + along * (at + low) / 2
+            inside = 0 <= middle[0] + 0.01 * out[0] <= room.length and 0 <= middle[1] + 0.01 * out[1] <= room.width
+            if inside:
+                parts.append((float(middle[0]), float(middle[1]), angle, low - at))
+        at = max(at, high)
+    return parts
+
+
+def _within(begin: Array, along: Array, length: float, block: Block) -> tuple[float, float] | None:
+    """From where to where a segment is inside a block [m]; None if it isn't."""
+    c, s = math.cos(block.angle), math.sin(block.angle)
+    dx, dy = begin[0] - block.x, begin[1] - block.y
+    low, high = 0.0, length
+    for at, way, half in (
+        (c * dx + s * dy, c * along[0] + s * along[1], block.length / 2),
+        (c * dy - s * dx, c * along[1] - s * along[0], block.width / 2),
+    ):
+        if abs(way) < 1e-9:
+            if abs(at) > half:
+                return None
+            continue
+        ends = sorted(((-half - at) / way, (half - at) / way))
+        low, high = max(low, ends[0]), min(high, ends[1])
+    return (low, high) if high - low > 1e-9 else None
+
+
+CELL = 0.05
+"""Side of a cell [m]."""
+_COMFORT = 0.35
+"""So much farther from things than need be, a way costs no more [m]."""
+
+
+class Ways:
+    """The free part of a room, for somebody of a radius; what stands at time 0 counts."""
+
+    def __init__(self, room: Room, radius: float, *, start: tuple[float, float] | None = None) -> None:
+        """Work out where there's room enough.
+
+        Args:
+            room: Walls and things, known or not; people don't count.
+            radius: Of who goes there [m].
+            start: Only what can be reached from here [m]; else the largest part that hangs together.
+
+        Raises:
+            InvalidValueError: If nothing is free.
+        """
+        from scipy.ndimage import distance_transform_edt, label
+
+        shape = math.ceil(room.length / CELL - 1e-9), math.ceil(room.width / CELL - 1e-9)
+        standing = Room(room.name, room.length, room.width, room.start, room.blocks, room.columns)
+        taken = FloorPlan(standing).grid(CELL, shape, 0.0)
+        outside = np.pad(taken, 1, constant_values=True)
+        self.clearance: Array = distance_transform_edt(~outside)[1:-1, 1:-1] * CELL
+        """From each cell to the nearest that's taken [m]."""
+        parts, count = label(self.clearance > radius, np.ones((3, 3)))
+        if count == 0:
+            raise InvalidValueError("room", room.name, f"one with room for {radius:g} m")
+        part = int(np.argmax(np.bincount(parts.ravel())[1:])) + 1
+        if start is not None and parts[self._cell(start, shape)]:
+            part = int(parts[self._cell(start, shape)])
+        self.free: NDArray[np.bool_] = parts == part
+        """Which cells can be reached."""
+        self._radius = radius
+        self._graph = self._edges()
+
+    @staticmethod
+    def _cell(place: tuple[float, float], shape: tuple[int, int]) -> tuple[int, int]:
+        i, j = (min(max(int(x / CELL), 0), n - 1) for x, n in zip(place, shape, strict=True))
+        return i, j
+
+    @property
+    def places(self) -> Array:
+        """Middles of the free cells [m], (k, 2)."""
+        return np.asarray((np.argwhere(self.free) + 0.5) * CELL)
+
+    def _edges(self) -> Any:
+        """Neighbours with the length of the way, longer near things."""
+        from scipy.sparse import coo_matrix
+
+        m, n = self.free.shape
+        number = np.arange(m * n).reshape(m, n)
+        near = np.clip(self._radius + _COMFORT - self.clearance, 0.0, None) / _COMFORT
+        cost = 1.0 + 4.0 * near
+        rows, columns, ways = [], [], []
+        for di, dj in ((1, 0), (0, 1), (1, 1), (1, -1)):
+            a = slice(0, m - di), slice(max(0, -dj), n - max(0, dj))
+            b = slice(di, m), slice(max(0, dj), n + min(0, dj))
+            both = self.free[a] & self.free[b]
+            rows.append(number[a][both])
+            columns.append(number[b][both])
+            ways.append(CELL * math.hypot(di, dj) * 0.5 * (cost[a] + cost[b])[both])
+        size = m * n
+        pairs = np.concatenate(rows), np.concatenate(columns)
+        return coo_matrix((np.concatenate(ways), pairs), shape=(size, size)).tocsr()
+
+    def route(self, begin: tuple[float, float], end: tuple[float, float]) -> Array:
+        """The way from the free cell nearest to one place to the one nearest to another [m], (k, 2)."""
+        from scipy.sparse.csgraph import dijkstra
+
+        first, last = self._nearest(begin), self._nearest(end)
+        _, trees = dijkstra(self._graph, directed=False, indices=[last], return_predecessors=True)
+        before = trees[0]
+        cells = [first]
+        while cells[-1] != last:
+            cells.append(int(before[cells[-1]]))
+        found = np.column_stack(np.unravel_index(cells, self.free.shape))
+        return np.asarray((found + 0.5) * CELL)
+
+    def _nearest(self, place: tuple[float, float]) -> int:
+        cells = np.argwhere(self.free)
+        off = (cells + 0.5) * CELL - place
+        i, j = cells[int(np.argmin((off * off).sum(axis=1)))].tolist()
+        return int(i * self.free.shape[1] + j)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import hypot
 
-from robots.drive_limits import IPR_WHEEL_BASE, drive_limits
 from robots.ipr import parameters as p
+from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, Wheels

@@ -9,14 +9,12 @@ import numpy as np
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.robot import MobileRobot
-from robots.onboard.avoidance import AvoidanceConfig, SonarMount
+from robots.onboard.avoidance import AvoidanceConfig, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.free_ways import Outline
 from robots.onboard.journey import JourneyConfig
-from robots.onboard.movers import MoversConfig
+from robots.onboard.movers import MoversConfig, YieldingConfig
 from robots.onboard.navigator import CELL, Navigator, NavigatorConfig
 from robots.onboard.routes import RouteConfig, RouteMap
-from robots.onboard.yielding import YieldingConfig
 from vrs.mobile import Grid
 from vrs.model import Array
 

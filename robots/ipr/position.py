@@ -11,7 +11,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import plan_map
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture
 from robots.onboard.gsp_map import GspMap

@@ -18,8 +18,7 @@ from robots.ipr.chassis import Chassis, Senses, chassis
 from robots.ipr.drive_train import DriveTrain, Odometry, as_posture
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.reality import MobileReality
-from robots.ipr.scanner import LaserScanner
-from robots.ipr.sensing import Fix, OverheadCamera, SonarRing, SonarScan
+from robots.ipr.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, SonarScan
 from robots.onboard.laser import LaserScan
 from robots.onboard.sensor_watch import SensorWatch
 from vrs.checks import finite, integer_in, one_of

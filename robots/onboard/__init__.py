@@ -1,6 +1,6 @@
 """What a robot carries on board, whatever robot it is."""
 
-from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
 from robots.onboard.command_filter import (
     CommandFilter,
     CommandFilterConfig,
@@ -8,31 +8,33 @@ from robots.onboard.command_filter import (
     FilterEventKind,
     FilterOutput,
 )
-from robots.onboard.curve import Curve, CurveKind, CurvePoint
-from robots.onboard.curve_file import load_curve, read_curve
+from robots.onboard.curve import Curve, CurveKind, CurvePoint, load_curve, read_curve
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, SensorFault, SensorMonitor, too_far
-from robots.onboard.free_ways import Outline
 from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
 from robots.onboard.gsp_map import GspMap, Lines, load_map, read_map, save_map
 from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
-from robots.onboard.known_trajectory import KnownTrajectory
-from robots.onboard.laser import LaserModel, LaserScan, OdometryTrack, deskewed
-from robots.onboard.laser_frame import FrameReader, decode_scan, encode_scan
+from robots.onboard.laser import (
+    FrameReader,
+    LaserModel,
+    LaserScan,
+    OdometryTrack,
+    decode_scan,
+    deskewed,
+    encode_scan,
+)
 from robots.onboard.lease import Ended, Grant, Lease, LeaseConfig, LeaseEnd, LeaseRefusal, LeaseState, Pending
 from robots.onboard.line_extraction import ExtractionConfig, extract
-from robots.onboard.line_filter import LineFilter, MotionConfig
-from robots.onboard.line_matching import MatchingConfig
+from robots.onboard.line_filter import LineFilter, MatchingConfig, MotionConfig
 from robots.onboard.localization import LocalizationConfig, Observability, Tracker
 from robots.onboard.localizer import Event, Localizer, LocalizerConfig, Status
-from robots.onboard.map_building import BuildingConfig, MapBuilder
-from robots.onboard.movers import Mover, MoversConfig, MoverTracker
+from robots.onboard.map_building import BuildingConfig, MapBuilder, Surveyor
+from robots.onboard.movers import Mover, MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.navigator import Navigator, NavigatorConfig
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.paper_localization import PaperConfig, PaperLocalizer
-from robots.onboard.path import Arc, MovingPath, Pivot, Projection
+from robots.onboard.path import Arc, MovingPath, PathGenerator, PathGeneratorConfig, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
-from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
 from robots.onboard.pure_pursuit import PurePursuit, PurePursuitConfig
 from robots.onboard.quadratic_tracker import (
     Backwards,
@@ -46,8 +48,7 @@ from robots.onboard.servo import FeedForward, Servo, ServoGains
 from robots.onboard.stamps import Kind, Stamp, Verdict
 from robots.onboard.stops import StopMotion, from_commanded, from_measured
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
-from robots.onboard.surveying import Surveyor
-from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
+from robots.onboard.trajectory_tracking import KnownTrajectory, Reference, TrackingConfig, TrajectoryTracker
 from robots.onboard.watchdog import (
     AcceptedFuture,
     BeginStop,
@@ -59,7 +60,6 @@ from robots.onboard.watchdog import (
     WatchdogConfig,
     WatchdogState,
 )
-from robots.onboard.yielding import Yielding, YieldingConfig
 
 __all__ = [
     "AcceptedFuture",

@@ -1,10 +1,38 @@
-"""What the parts that drive a mobile robot share: drives, postures, and a drive within the limits."""
+"""What the parts that drive a mobile robot share: drives, postures, and limits, by the distance between the wheels.
+
+Source: Kim, Han, Kim, Kim, 2002 [K]: safety limits of the mobile robot IPR.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Final, NamedTuple
 
 from vrs.mobile import DriveLimits, clipped
+
+V_MAX: Final = 0.5
+"""Largest linear speed [m/s]; safety limit of [K]."""
+W_MAX: Final = math.radians(45.0)
+"""Largest angular speed [rad/s]; safety limit of [K], 45 deg/s."""
+A_MAX: Final = 0.52
+"""Largest linear acceleration [m/s²]; safety limit of [K]."""
+IPR_WHEEL_BASE: Final = 0.40
+"""L of the IPR [m], an assumption: as wide as the body allows, with wheels 5 cm thick inside its 45 cm."""
+
+
+def drive_limits(wheel_base: float) -> DriveLimits:
+    """Limits of a robot's commands: the safety limits of [K], and one of the angular acceleration.
+
+    That's where each wheel's rim, on the spot, has the linear limit; an assumption.
+
+    Args:
+        wheel_base: L, distance between the wheels [m].
+    """
+    return DriveLimits(V_MAX, W_MAX, A_MAX, 2.0 * A_MAX / wheel_base)
+
+
+IPR_LIMITS: Final = drive_limits(IPR_WHEEL_BASE)
+"""Limits of the IPR's commands, and of what drives on board unless told otherwise."""
 
 
 class Drive(NamedTuple):

@@ -16,9 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robots.onboard.gsp_map import GspMap, Lines
-from robots.onboard.line_filter import LineFilter
-from robots.onboard.line_matching import MatchingConfig, matched
-from robots.onboard.scan_check import Evidence, expected_ranges, judged
+from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, expected_ranges, judged, matched
 from vrs.checks import number_in
 from vrs.mobile import wrapped
 from vrs.mobile.kinematics import all_wrapped

@@ -8,6 +8,16 @@ itself.
 A map's errors don't average out: the same wall is wrong in the same way each time that it's seen. So they are in
 the state. A map that *stands* is only considered (Schmidt 1966): its errors count in the doubt and aren't
 estimated. A map that is being built is corrected, too (Smith, Self and Cheeseman 1990).
+
+Which line of the map a line of a scan is, is told by gates on what the filter expects, and by what the others say.
+A seen line may be the map's if it faces the same way, lies where that is, and differs by no more than the doubt
+allows (Mahalanobis). Where two lines of the map at different places could be it, nobody says which. Then each is
+held against the rest: what it is off from what all others together say, in its own deviations; the worst goes
+until none is too far off. That drops furniture that stands nearly where a wall is.
+
+A scan is held against the map beam by beam: what the map explains, and what contradicts it. A beam that ends
+before the map's first wall met something that the map doesn't have. One that goes on behind it contradicts the
+map: nothing that's put into a room makes a wall transparent.
 """
 
 from __future__ import annotations
@@ -19,7 +29,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.onboard.gsp_map import GspMap, Lines
+from robots.onboard.gsp_map import GspMap, Lines, cast_lines
+from robots.onboard.laser import Points
 from vrs.checks import finite_array, number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
@@ -379,3 +390,155 @@ class LineFilter:
         entries = np.concatenate([np.ones(OWN, dtype=np.bool_), np.repeat(which, 2)])
         self._P = self._P[np.ix_(entries, entries)]
         self.lines = self.lines.taken(which)
+
+
+@dataclass(frozen=True, slots=True)
+class MatchingConfig:
+    """Gates."""
+
+    gate: float = 13.8
+    """Largest squared Mahalanobis distance, two degrees of freedom, in [1, 100]; 13.8 lets 99.9 % pass."""
+    against: float = 14.0
+    """The same of a line against all others, in [1, 100]."""
+    overlap: float = 0.5
+    """Share of the seen line that lies on the map's, in [0, 1]."""
+    slack: float = 0.1
+    """By how much the ends of the map's lines may be off [m], in [0, 1]."""
+    apart: float = 0.04
+    """Two candidates this far apart across are different [m], in [0, 1]."""
+    turn: float = 0.35
+    """Largest difference in direction that's looked at [rad], in [0.01, 1]."""
+    across: float = 1.0
+    """And across [m], in [0.05, 10]."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("gate", 1.0, 100.0), ("against", 1.0, 100.0), ("overlap", 0.0, 1.0), ("slack", 0.0, 1.0),
+            ("apart", 0.0, 1.0), ("turn", 0.01, 1.0), ("across", 0.05, 10.0),
+        ):  # fmt: skip
+            number_in(name, getattr(self, name), low, high)
+
+
+def matched(filter_: LineFilter, seen: Lines, config: MatchingConfig, turned: float = 0.0) -> Sights:
+    """Say which of the filter's lines those of a scan, in the robot's frame, are; without those that are none."""
+    i, j = _candidates(filter_, seen, config)
+    pairs = Sights(seen.taken(i), j, turned)
+    if not len(i):
+        return pairs
+    found = filter_.innovation(pairs)
+    z = np.stack([found.off, found.turn], axis=-1)
+    d2 = np.einsum("ka,kab,kb->k", z, np.linalg.inv(filter_.doubts(found, pairs)), z)
+    chosen = np.array(_unambiguous(i, d2, found.off, config), dtype=np.int64)
+    return against_others(filter_, pairs.taken(chosen), config.against)
+
+
+def _candidates(
+    filter_: LineFilter, seen: Lines, config: MatchingConfig
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of lines that face the same way, near each other, one beside the other."""
+    known = filter_.lines
+    placed = seen.moved(filter_.posture)
+    turn = all_wrapped(placed.poses[:, None, 2] - known.poses[:, 2])
+    delta = placed.poses[:, None, :2] - known.poses[:, :2]
+    along = np.sum(delta * known.directions, axis=-1)
+    off = np.sum(delta * known.normals, axis=-1)
+    low = np.maximum(along + placed.spans[:, :1], known.spans[:, 0] - config.slack)
+    high = np.minimum(along + placed.spans[:, 1:], known.spans[:, 1] + config.slack)
+    # The end of a map's line isn't known while it's being built: what lies beside the shorter of both counts.
+    whole = np.minimum(placed.lengths[:, None], known.lengths) if filter_.building else placed.lengths[:, None]
+    beside = high - low >= config.overlap * whole
+    i, j = np.nonzero((np.abs(turn) < config.turn) & (np.abs(off) < config.across) & beside)
+    return i, j
+
+
+def _unambiguous(i: NDArray[np.int64], d2: Array, off: Array, config: MatchingConfig) -> list[int]:
+    """The best pair of each seen line, where no other place could be it as well."""
+    chosen = []
+    for line in np.unique(i):
+        mine = np.flatnonzero((i == line) & (d2 < config.gate))
+        if not len(mine):
+            continue
+        best = int(mine[np.argmin(d2[mine])])
+        if (np.abs(off[mine] - off[best]) <= config.apart).all():
+            chosen.append(best)
+    return chosen
+
+
+def against_others(filter_: LineFilter, sights: Sights, most: float) -> Sights:
+    """Leave out, one by one, lines that what is known and all others together contradict.
+
+    Args:
+        filter_: What is known.
+        sights: Lines and whose they are.
+        most: Largest squared distance in own deviations.
+    """
+    found = filter_.innovation(sights)
+    S = filter_.joint(found, sights)
+    z = np.stack([found.off, found.turn], axis=-1).ravel()
+    kept = np.arange(len(sights.of))
+    while len(kept) > 1:
+        rows = (2 * kept[:, None] + (0, 1)).ravel()
+        inverse = np.linalg.inv(S[np.ix_(rows, rows)])
+        y = (inverse @ z[rows]).reshape(-1, 2)
+        k = np.arange(len(kept))
+        blocks = inverse.reshape(len(kept), 2, len(kept), 2)[k, :, k, :]
+        worst = np.einsum("ka,kab,kb->k", y, np.linalg.inv(blocks), y)
+        at = int(np.argmax(worst))
+        if worst[at] <= most:
+            break
+        kept = np.delete(kept, at)
+    return sights.taken(kept)
+
+
+CLOSE = 0.03
+"""A beam that ends so near where it should, or within three deviations of the noise, is explained [m]."""
+THROUGH = 0.15
+"""One that goes so much too far, and more than five deviations, contradicts [m]."""
+MOST_BEAMS = 91
+"""Beams of a scan that are looked at."""
+
+
+class Evidence(NamedTuple):
+    """Shares of the beams."""
+
+    explained: float
+    """End at the map's first line."""
+    before: float
+    """End before it."""
+    through: float
+    """Go on behind it."""
+    blank: float
+    """Look where the map has nothing."""
+
+
+def evidence(lines: Lines, points: Points, posture: tuple[float, float, float], noise: float) -> Evidence:
+    """Hold a scan against a map.
+
+    Args:
+        lines: Of the map.
+        points: What was seen, in the robot's frame.
+        posture: Where the robot would be, (x, y, θ) [m, m, rad].
+        noise: Standard deviation of a range [m].
+    """
+    step = max(1, math.ceil(len(points.beams) / MOST_BEAMS))
+    ranges = points.ranges[::step]
+    if not len(ranges):
+        return Evidence(0.0, 0.0, 0.0, 1.0)
+    expected = expected_ranges(lines, points.origins[::step], points.ways[::step], posture)
+    return judged(ranges - expected, noise)
+
+
+def expected_ranges(lines: Lines, origins: Array, ways: Array, posture: tuple[float, float, float]) -> Array:
+    """How far beams in the robot's frame would go in a map [m], (k,), inf where they'd meet nothing."""
+    x, y, theta = posture
+    c, s = math.cos(theta), math.sin(theta)
+    turn = np.array([[c, s], [-s, c]])
+    return cast_lines(lines.ends, origins @ turn + (x, y), ways @ turn)
+
+
+def judged(difference: Array, noise: float) -> Evidence:
+    """Shares of beams by how much farther they went than expected [m], (k,), −inf where nothing was."""
+    close, far = max(CLOSE, 3 * noise), max(THROUGH, 5 * noise)
+    explained = float(np.mean(np.abs(difference) <= close))
+    blank = float(np.mean(difference == -np.inf))
+    return Evidence(explained, float(np.mean(difference < -close)) - blank, float(np.mean(difference > far)), blank)

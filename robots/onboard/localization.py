@@ -11,9 +11,7 @@ import numpy as np
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserScan, OdometryTrack, Points, deskewed
 from robots.onboard.line_extraction import Extraction, ExtractionConfig, extract
-from robots.onboard.line_filter import LineFilter, MotionConfig, Sights
-from robots.onboard.line_matching import MatchingConfig, matched
-from robots.onboard.scan_check import Evidence, evidence
+from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, MotionConfig, Sights, evidence, matched
 from vrs.checks import number_in
 from vrs.mobile import wrapped
 from vrs.mobile.kinematics import sinc

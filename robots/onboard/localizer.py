@@ -21,9 +21,9 @@ import numpy as np
 from robots.onboard.global_localization import Answer, Candidate, SearchConfig, locate
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.laser import LaserScan, OdometryTrack
+from robots.onboard.line_filter import evidence
 from robots.onboard.localization import LocalizationConfig, Tracker
-from robots.onboard.scan_check import evidence
-from robots.onboard.surveying import Surveyor
+from robots.onboard.map_building import Surveyor
 from vrs.checks import number_in
 from vrs.model import Array, frozen_array
 

@@ -19,10 +19,9 @@ from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
 from robots.onboard.laser import LaserScan, OdometryTrack
-from robots.onboard.movers import MoversConfig, MoverTracker
+from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.routes import RouteMap
-from robots.onboard.yielding import Yielding, YieldingConfig
 from vrs.mobile.environment import Grid
 from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array

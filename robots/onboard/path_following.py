@@ -25,8 +25,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from robots.drive_limits import IPR_LIMITS
-from robots.onboard.driving import STAND, Drive, kept
+from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from robots.onboard.path import MovingPath, Projection
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError

@@ -8,13 +8,15 @@ q̈ = q''(p) r² + q'(p) ṙ, and these keep the limits. Solves open problem (a)
 
 At every moment the robot has an escape: a certified change of pace that begins at a known p and ends at rest before
 c. It looks for a later one only when it gets there, and takes it if there's none.
+
+`Play` says where the play time is and was. A leg is a part of it: a change of pace, then a steady pace.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -22,14 +24,97 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robots.onboard.legs import STEADY, Leg, along, braking
-from robots.onboard.play import PlayState, play_of
 from vrs.checks import number_in
 from vrs.model import Array, Limits
 from vrs.pacing import TimeScaling, certified, change, rest_after, seems_kept
 from vrs.planning import violation
 from vrs.planning.plan import stacked
 from vrs.timeline import Timeline
+
+
+class PlayState(NamedTuple):
+    """Where play is, at times (k,)."""
+
+    p: Array
+    """Play time, on the timeline [s]."""
+    pace: Array
+    """dp/dt."""
+    rate: Array
+    """d²p/dt² [1/s]."""
+
+
+def play_of(newest_first: Iterable[tuple[float, Callable[[Array], PlayState]]], t: Array) -> PlayState:
+    """Where play is at ascending times [s], (k,), k ≥ 1.
+
+    Args:
+        newest_first: Since when each course counts [s], and what says where play is on it; the oldest counts before
+            that, too. No more are taken than are needed.
+        t: The times.
+    """
+    states: list[PlayState] = []
+    high = len(t)
+    for since, at in newest_first:
+        low = min(int(np.searchsorted(t, since)), high)
+        if high > low:
+            states.append(at(t[low:high]))
+        high = low
+        if high == 0:
+            break
+    if high > 0:
+        states.append(at(t[:high]))
+    states.reverse()
+    return PlayState(*(np.concatenate([state[i] for state in states]) for i in range(3)))
+
+
+class EvenPlay:
+    """Play at an even pace, 1 or none: p = pace · t + D, up to an end."""
+
+    def __init__(self, D: float, pace: float = 1.0, end: float = math.inf) -> None:
+        self.D, self.pace, self.end = D, pace, end
+
+    def at(self, t: Array) -> PlayState:
+        """Where play is at times [s], (k,)."""
+        p = self.pace * np.asarray(t, float) + self.D
+        return PlayState(np.minimum(p, self.end), np.where(p < self.end, self.pace, 0.0), np.zeros_like(p))
+
+    foreseen = at
+
+
+STEADY = TimeScaling((), ())
+"""No change of pace."""
+
+
+class Leg(NamedTuple):
+    """A change of pace, then a steady pace."""
+
+    begin: float
+    """By the robot's clock [s]."""
+    law: TimeScaling
+    p: float
+    """Where the law ends [s]."""
+    pace: float
+    """The steady pace."""
+
+
+def along(leg: Leg, t: Array) -> PlayState:
+    """Where play is at times on a leg, (k,)."""
+    u = t - leg.begin
+    pace, rate = np.empty(len(u)), np.zeros(len(u))
+    pace.fill(leg.pace)
+    if not leg.law.durations:
+        return PlayState(leg.p + leg.pace * u, pace, rate)
+    late = u - leg.law.duration
+    p = leg.p + leg.pace * late
+    changing = late < 0
+    if changing.any():
+        p[changing], pace[changing], rate[changing], _ = leg.law(u[changing])
+    return PlayState(p, pace, rate)
+
+
+def braking(p: float, pace: float, duration: float) -> TimeScaling:
+    """Slow down evenly to a stop."""
+    return TimeScaling((duration,), ((p, pace, -0.5 * pace / duration),))
+
 
 _RAMPS = tuple(np.geomspace(0.05, 2.5, 18).tolist())
 """Durations of a change of pace to try [s]."""

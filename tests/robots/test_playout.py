@@ -11,8 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from robots import puma560
-from robots.onboard.play import PlayState
-from robots.onboard.playout import Playout, PlayoutConfig
+from robots.onboard.playout import Playout, PlayoutConfig, PlayState
 from vrs import Engine, Insertion, JointTarget, MotionCommand, Profile, SteerCommand, Timeline
 from vrs.errors import InvalidValueError
 from vrs.model import Array

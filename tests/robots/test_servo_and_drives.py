@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots.bullet import Payload, Reality
-from robots.bullet.drives import Drives
-from robots.bullet.six import solve_six
+from robots.bullet.drives import Drives, solve_six
 from robots.onboard import Servo, ServoGains
 from vrs.errors import InvalidValueError
 from vrs.model import Array

@@ -12,7 +12,7 @@ from interfaces.runtime.laboratory import Laboratory
 from interfaces.site import Part, Site, drive
 from interfaces.teleop import Reference
 from robots import puma560
-from robots.onboard.play import PlayState
+from robots.onboard.playout import PlayState
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
 from vrs.commands import Command
 from vrs.model import Array

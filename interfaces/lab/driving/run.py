@@ -28,11 +28,10 @@ from interfaces.teleop.architectures.equipment import (
 )
 from robots import ipr
 from robots.bullet.rooms import Room
-from robots.drive_limits import IPR_LIMITS
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.robot import MobileRobot
-from robots.onboard.driving import STAND, Posture
+from robots.onboard.driving import IPR_LIMITS, STAND, Posture
 from robots.onboard.laser import LaserModel
 from vrs.model import Array
 

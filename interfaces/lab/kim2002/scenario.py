@@ -35,7 +35,7 @@ from interfaces.jobs import (
 )
 from interfaces.lab.goals.trial import FIRST_LOOK, Pilot
 from robots.bullet.rooms import Person, Room
-from robots.ipr.cargo import Cargo
+from robots.ipr.body import Cargo
 from robots.ipr.chassis import IPR, Senses
 from robots.ipr.robot import Collision, place
 from robots.onboard.journey import GOING, Goal, JourneyState

@@ -24,7 +24,7 @@ from interfaces.lab.localization.trial import (
     setting,
     wander,
 )
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import plan_map
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.localizer import Localizer
 from robots.onboard.map_building import MapBuilder

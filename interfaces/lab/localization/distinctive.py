@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.ways import Ways
+from robots.ipr.floor_plan import FloorPlan, Ways
 from vrs.model import Array
 
 ALIKE: Final = 0.03

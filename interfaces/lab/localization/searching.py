@@ -14,8 +14,7 @@ from interfaces.lab.localization.distinctive import distinctive
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.plan_map import plan_map
-from robots.ipr.ways import Ways
+from robots.ipr.floor_plan import Ways, plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localizer import Localizer, Status
 from vrs.mobile import wrapped

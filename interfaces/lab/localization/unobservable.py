@@ -11,7 +11,7 @@ from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.localization.accuracy import INSIDE
 from interfaces.lab.localization.trial import body_of, drive, setting
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localizer import Localizer
 from vrs.mobile import clipped

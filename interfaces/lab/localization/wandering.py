@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.ways import Ways
+from robots.ipr.floor_plan import Ways
 from robots.onboard.driving import STAND, Drive
 from vrs.mobile import clipped, wrapped
 from vrs.model import Array

@@ -29,11 +29,10 @@ from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, Driven
 from interfaces.teleop.hosting import HostConfig
 from interfaces.timer import Turning
 from robots.bullet.rooms import Room
-from robots.drive_limits import IPR_LIMITS
 from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses
 from robots.onboard import WatchdogConfig
-from robots.onboard.driving import Posture
+from robots.onboard.driving import IPR_LIMITS, Posture
 from robots.onboard.laser import LaserModel
 from robots.onboard.sensor_watch import SoundPosition
 from vrs.checks import one_of

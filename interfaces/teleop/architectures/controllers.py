@@ -15,9 +15,8 @@ from interfaces.teleop.architectures.segments import Packet
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
-from robots.onboard.path import MovingPath
+from robots.onboard.path import MovingPath, PathGenerator, PathGeneratorConfig
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
-from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
 from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
 from vrs.segment import ArcSegment
 

@@ -20,9 +20,8 @@ from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, 
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
-from robots.onboard.movers import MoversConfig, MoverTracker
+from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
-from robots.onboard.yielding import Yielding, YieldingConfig
 from vrs.mobile import Avoidance, Grid, MobileModel, VirtualEnvironment
 
 CONTROL = 0.05

@@ -12,9 +12,8 @@ from typing import Protocol
 
 from robots.onboard.avoidance import ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.movers import MoverTracker
+from robots.onboard.movers import MoverTracker, Yielding
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor
-from robots.onboard.yielding import Yielding
 from vrs.mobile import Avoidance, VirtualEnvironment, wrapped
 
 CELL_BYTES = 6

@@ -18,8 +18,7 @@ from interfaces.lab.kim2002.paper import ORDER, conclude
 from interfaces.lab.kim2002.scenario import PLEASE, Played, Scenario, Stop, _Play, play
 from interfaces.lab.papers import papers
 from robots.bullet.rooms import Person
-from robots.ipr.body import MobileBody
-from robots.ipr.cargo import Cargo
+from robots.ipr.body import Cargo, MobileBody
 from robots.ipr.chassis import IPR
 from robots.ipr.robot import Collision, place
 from vrs.errors import InvalidValueError

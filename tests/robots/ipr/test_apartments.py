@@ -9,10 +9,8 @@ import pytest
 
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.apartments import ApartmentConfig, apartment, apartment_plan
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import FloorPlan, Ways, plan_map
 from robots.ipr.robot import PLACES, place
-from robots.ipr.ways import Ways
 from robots.onboard.gsp_map import cast_lines
 from vrs.errors import InvalidValueError
 

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.ipr.centre import centre_of, centre_rates
-from robots.ipr.chassis import IPR
+from robots.ipr.chassis import IPR, centre_of, centre_rates
 from vrs.mobile import advanced
 
 SPEEDS = st.floats(-1, 1)

@@ -11,9 +11,8 @@ import pytest
 
 from robots.bullet.camera import SKY, Picture
 from robots.bullet.rooms import EMPTY, read_room
-from robots.ipr.camera import Lens, Look, lens_pose
+from robots.ipr.camera import Lens, Look, Sight, lens_pose
 from robots.ipr.shapes import upright
-from robots.ipr.sight import Sight
 
 LENS = Lens(width=240, height=180, view=math.radians(60.0))
 ROOM = read_room("""room 1

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from robots.onboard.avoidance import SonarMount
-from robots.onboard.free_ways import Outline
+from robots.onboard.avoidance import Outline, SonarMount
 
 IPR = Outline(front=0.30, rear=0.22, half_width=0.225)
 """45 × 52 cm, the axle 4 cm behind the middle."""

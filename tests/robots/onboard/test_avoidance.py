@@ -9,10 +9,8 @@ import random
 import numpy as np
 import pytest
 
-from robots.drive_limits import IPR_LIMITS
-from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
-from robots.onboard.driving import Drive
-from robots.onboard.free_ways import Outline
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
+from robots.onboard.driving import IPR_LIMITS, Drive
 from robots.onboard.path import Arc, MovingPath, Pivot
 from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
 from tests.robots.onboard.driven import Unicycle, assert_kept

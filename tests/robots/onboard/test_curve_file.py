@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robots.onboard.curve import Curve, CurveKind
-from robots.onboard.curve_file import load_curve, read_curve
+from robots.onboard.curve import Curve, CurveKind, load_curve, read_curve
 from vrs.errors import FormatError
 
 GOOD = """# a path

@@ -7,9 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import ipr
-from robots.drive_limits import IPR_LIMITS
 from robots.onboard import AvoidanceConfig, PathFollowingConfig, TrackingConfig
-from robots.onboard.driving import kept
+from robots.onboard.driving import IPR_LIMITS, kept
 from tests.robots.onboard.rooms import IPR, ring
 from vrs.mobile import DriveLimits
 

@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.drive_limits import IPR_LIMITS
-from robots.onboard.detours import way_out
-from robots.onboard.driving import STAND, Drive, Posture, kept
-from robots.onboard.journey import GOING, Goal, Journey, JourneyConfig, JourneyState
+from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture, kept
+from robots.onboard.journey import GOING, Goal, Journey, JourneyConfig, JourneyState, way_out
 from robots.onboard.path_following import PathFollowingConfig
 from robots.onboard.routes import Route, RouteConfig, RouteMap
 from vrs.errors import InvalidValueError

@@ -10,8 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots.onboard.gsp_map import GspMap, Lines
-from robots.onboard.laser import LaserModel, LaserScan, OdometryTrack, beam_angles, deskewed
-from robots.onboard.laser_frame import BEAMS, FrameReader, checksum, decode_scan, encode_scan
+from robots.onboard.laser import (
+    BEAMS,
+    FrameReader,
+    LaserModel,
+    LaserScan,
+    OdometryTrack,
+    beam_angles,
+    checksum,
+    decode_scan,
+    deskewed,
+    encode_scan,
+)
 from robots.onboard.line_filter import LineFilter
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import advanced

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from robots.onboard.gsp_map import GspMap, Lines
-from robots.onboard.line_filter import OWN, LineFilter, MotionConfig, Sights
-from robots.onboard.line_matching import MatchingConfig, matched
+from robots.onboard.line_filter import OWN, LineFilter, MatchingConfig, MotionConfig, Sights, matched
 from robots.onboard.localization import observability
 from robots.onboard.paper_localization import injected_update, mean_update, weighted_update, weights
 from vrs.mobile import advanced

@@ -11,12 +11,12 @@ import pytest
 from robots.bullet.rooms import read_room
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
-from robots.ipr.plan_map import plan_map
+from robots.ipr.floor_plan import plan_map
 from robots.ipr.reality import MobileReality
 from robots.onboard.laser import LaserModel
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig, Tracker
-from robots.onboard.surveying import Surveyor
+from robots.onboard.map_building import Surveyor
 
 ROOM = read_room(
     "room 1\nsize 6 4\nstart 2 2 0\nwall 0 0  6 0\nwall 6 0  6 4\nwall 6 4  0 4\nwall 0 4  0 0\n"

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots.onboard.driving import Posture
-from robots.onboard.path import Arc, MovingPath, Pivot
-from robots.onboard.path_generator import PathGenerator, PathGeneratorConfig
+from robots.onboard.path import Arc, MovingPath, PathGenerator, PathGeneratorConfig, Pivot
 from vrs import ArcSegment
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped

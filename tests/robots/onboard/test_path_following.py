@@ -9,7 +9,7 @@ import random
 import numpy as np
 import pytest
 
-from robots.drive_limits import IPR_LIMITS
+from robots.onboard.driving import IPR_LIMITS
 from robots.onboard.path import Arc, MovingPath, Pivot
 from robots.onboard.path_following import (
     FieldLaw,

@@ -9,7 +9,7 @@ import pytest
 
 from robots.onboard.gsp_map import Lines
 from robots.onboard.laser import LaserScan, deskewed
-from robots.onboard.scan_check import CLOSE, THROUGH, evidence, judged
+from robots.onboard.line_filter import CLOSE, THROUGH, evidence, judged
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.04])

@@ -8,10 +8,8 @@ import random
 import numpy as np
 import pytest
 
-from robots.drive_limits import IPR_LIMITS
-from robots.onboard.driving import Posture
-from robots.onboard.known_trajectory import KnownTrajectory
-from robots.onboard.trajectory_tracking import TrackingConfig, TrajectoryTracker
+from robots.onboard.driving import IPR_LIMITS, Posture
+from robots.onboard.trajectory_tracking import KnownTrajectory, TrackingConfig, TrajectoryTracker
 from tests.robots.onboard.driven import Unicycle, assert_kept
 from vrs import ArcSegment
 from vrs.errors import InvalidValueError

@@ -7,11 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from robots.drive_limits import IPR_LIMITS
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
-from robots.onboard.driving import STAND, Drive, kept
-from robots.onboard.movers import Mover
-from robots.onboard.yielding import Yielding, YieldingConfig
+from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
+from robots.onboard.movers import Mover, Yielding, YieldingConfig
 from tests.robots.onboard.driven import Unicycle, assert_kept
 from tests.robots.onboard.rooms import IPR, Room, ring
 from vrs.errors import InvalidValueError

@@ -20,12 +20,10 @@ from robots.ipr.chassis import IPR, SonarModel
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import place
 from robots.ipr.sensing import SonarRing
-from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, SonarMount
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.free_ways import Outline
-from robots.onboard.movers import MoversConfig, MoverTracker
+from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
-from robots.onboard.yielding import Yielding, YieldingConfig
 from vrs.mobile import Avoidance, DriveLimits, Grid, VirtualEnvironment, advanced
 
 PEOPLE = int(os.environ.get("VRS_PERSON_SEEDS", "2"))

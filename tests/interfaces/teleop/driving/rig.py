@@ -22,11 +22,10 @@ from interfaces.teleop.driving import (
 )
 from interfaces.teleop.hosting import HostConfig
 from robots import ipr
-from robots.drive_limits import IPR_LIMITS
 from robots.ipr.bare import BareBody
 from robots.ipr.position import FusedPosition
 from robots.onboard import WatchdogConfig
-from robots.onboard.driving import Posture
+from robots.onboard.driving import IPR_LIMITS, Posture
 from robots.onboard.journey import Journey
 from robots.onboard.routes import RouteConfig, RouteMap
 

@@ -12,8 +12,7 @@ from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.teleop.architectures import ARCHITECTURES, DriveOrders, Packet
 from interfaces.teleop.driving.operator import HOLDS, MOVING, NOT_MET
 from interfaces.teleop.driving.robot import TOO_FAR
-from robots.drive_limits import IPR_LIMITS
-from robots.onboard.driving import Posture
+from robots.onboard.driving import IPR_LIMITS, Posture
 from tests.interfaces.teleop.driving.rig import CONTROL, MODEL, TURN, Rig
 
 

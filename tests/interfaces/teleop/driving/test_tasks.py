@@ -25,8 +25,7 @@ from interfaces.link import Conditions, LinkConditions, delay_profile, loss_mode
 from interfaces.teleop.architectures import DriveOrders, Packet
 from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
 from interfaces.teleop.tasks import Doing, Go, Halt
-from robots.drive_limits import IPR_LIMITS
-from robots.onboard.driving import STAND, Drive, Posture
+from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
 
