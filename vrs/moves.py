@@ -26,7 +26,7 @@ from vrs.planning.rounding import braking, continuous, starting
 from vrs.segment import State
 from vrs.timeline import Timeline
 
-HASTY = "planned with all of the limits: the arm is too fast for the command's pace or acceleration"
+FULL_LIMITS_NOTE = "planned with all of the limits: the arm is too fast for the command's pace or acceleration"
 
 _CONTINUOUS = 0.5
 """Share of the acceleration that moves of a continuous path take: two of them overlap."""
@@ -60,7 +60,7 @@ def move(command: MotionCommand, model: RobotModel, limits: Limits, state: State
         made, q, note = _planned(command, speed, model, allowed, start)
         return made, (q, note)
 
-    made, (q, note), hasty = _eased(command, limits, state, plan)
+    made, (q, note), hasty = _within_scaled_limits(command, limits, state, plan)
     return made, q, joined(note, hasty)
 
 
@@ -76,7 +76,7 @@ def join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tuple
     def plan(speed: float, allowed: Limits, state: State) -> tuple[Plan, str]:
         return planning.run_up(q, state, speed, command.profile, allowed)
 
-    made, note, hasty = _eased(command, limits, goal, plan)
+    made, note, hasty = _within_scaled_limits(command, limits, goal, plan)
     return made, joined(note, hasty)
 
 
@@ -85,7 +85,7 @@ def is_plain(command: MotionCommand) -> bool:
     return command.pace == 1.0 and command.acceleration == 1.0 and command.deviation < inf
 
 
-def _eased(
+def _within_scaled_limits(
     command: MotionCommand,
     limits: Limits,
     state: State,
@@ -93,8 +93,8 @@ def _eased(
 ) -> tuple[Plan, _Rest, str]:
     """Plan within a command's share of the limits, at its pace; else, from a moving arm, within all of them."""
     pace = command.pace
-    allowed = eased(limits, command.acceleration * (_CONTINUOUS if command.deviation == inf else 1.0))
-    quick = _quickened(state, pace)
+    allowed = scale_limits(limits, command.acceleration * (_CONTINUOUS if command.deviation == inf else 1.0))
+    quick = _time_scaled(state, pace)
     moving = bool(state.qd.any() or state.qdd.any())
     if not moving or _keeps(quick, allowed, command.profile):
         try:
@@ -105,7 +105,7 @@ def _eased(
         else:
             return (made if pace == 1.0 or not len(made) else slowed(made, 1.0 / pace)), rest, ""
     made, rest = plan(command.speed * pace, limits, state)
-    return made, rest, HASTY
+    return made, rest, FULL_LIMITS_NOTE
 
 
 def _keeps(state: State, limits: Limits, profile: Profile) -> bool:
@@ -116,14 +116,14 @@ def _keeps(state: State, limits: Limits, profile: Profile) -> bool:
 
 
 @lru_cache(maxsize=64)
-def eased(limits: Limits, share: float) -> Limits:
+def scale_limits(limits: Limits, share: float) -> Limits:
     """Limits with a share of their acceleration and jerk; the same value for the same limits, which is kept."""
     if share == 1.0:
         return limits
     return replace(limits, qdd_max=share * limits.qdd_max, qddd_max=share * limits.qddd_max)
 
 
-def _quickened(state: State, pace: float) -> State:
+def _time_scaled(state: State, pace: float) -> State:
     """A state as it is where time runs 1/pace times as fast."""
     return state if pace == 1.0 else State(state.q, state.qd / pace, state.qdd / (pace * pace))
 
@@ -249,7 +249,7 @@ class Passer:
             return self._at(max(self._before(found.delta), begin), found.plan, found.delta, notes)
         again = None
         if self.before is not None and self.before.deviation < inf and (self.now is None or begin >= self.now):
-            again = self.slower_first(eased(limits, 0.5), begin)
+            again = self.slower_first(scale_limits(limits, 0.5), begin)
         if again is not None:
             slow, more = again
             found = continuous(slow, onward, inf, (braking(slow, limits, known), ready), limits, jerk=self.jerky)
