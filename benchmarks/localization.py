@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from interfaces.lab.localization.trial import Listener, body_of, furnished, setting, wander
+from interfaces.lab.localization.trial import PostureSource, body_of, furnished, setting, wander
 from robots.ipr.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.global_localization import locate
@@ -42,7 +42,7 @@ def recorded() -> tuple[list[Step], tuple[float, float, float]]:
     return steps, start
 
 
-def costs(steps: list[Step], one: Listener) -> list[float]:
+def costs(steps: list[Step], one: PostureSource) -> list[float]:
     """Return the processor time of each scan with the odometry since the one before [s]."""
     found, spent = [], 0.0
     for t, reading, scan in steps:
@@ -83,7 +83,7 @@ def part() -> Part:
 
     steps, start = recorded()
     plan = plan_map(furnished(0, ROOM))
-    makers: dict[str, Callable[[], Listener]] = {
+    makers: dict[str, Callable[[], PostureSource]] = {
         "track on a floor-plan map": lambda: Localizer(plan, start),
         "build a map": lambda: MapBuilder(start),
         "the paper's update": lambda: PaperLocalizer(plan, start),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
 from interfaces.lab.tipsuwan.gain import behind_a_network
-from interfaces.lab.tipsuwan.run import Control, Setting, agent, network_of, run
+from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, network_of, run
 from interfaces.lab.tipsuwan.s_paths import START, s_path
 from interfaces.middleware import GainScheduler, default_network, optimal_way, train
 from robots.onboard.driving import Drive, Posture
@@ -45,7 +45,7 @@ def part() -> Part:
     """Measure."""
     from benchmarks.results import Bar, Cost, Part, Result
 
-    network, curve, setting = default_network(), s_path(0), Setting()
+    network, curve, setting = default_network(), s_path(0), NetworkRunSetting()
     by_network, by_root = GainScheduler(0.25, network), GainScheduler(0.25)
     driving, posture = Drive(1.0, 0.5), Posture(*START)
     wanted = [driving]
@@ -60,7 +60,7 @@ def part() -> Part:
         found = costs(action)
         return Result(what, Cost(statistics.median(found), found[round(0.99 * BLOCKS) - 1]), bar=Bar(median=asked))
 
-    def whole_run(control: Control) -> Result:
+    def whole_run(control: NetworkControl) -> Result:
         taken = median_seconds(lambda: run(curve, agent(control, curve, setting), network_of(0), setting=setting))
         return Result(f"a run of 15 s by {control.value}, kinematic robot", Cost(1e6 * taken))
 
@@ -74,6 +74,9 @@ def part() -> Part:
             row("the exact root alone", lambda drive: optimal_way(drive.w, 0.25)),
             row("the quadratic-curve tracker, for comparison", lambda _: tracker.control(posture)),
             Result("training the network", Cost(1e6 * median_seconds(lambda: train(seed=1), 1))),
-            *(whole_run(control) for control in (Control.DIRECT, Control.NETWORK, Control.PREDICTIVE)),
+            *(
+                whole_run(control)
+                for control in (NetworkControl.DIRECT, NetworkControl.NETWORK, NetworkControl.PREDICTIVE)
+            ),
         ),
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces.link import delay_profile
 from interfaces.recording import open_recording
-from interfaces.recording.headless import Frames
+from interfaces.recording.headless import PlaybackFrames
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
 from interfaces.recording.runs import RunRecorder
@@ -27,7 +27,7 @@ recorder.finish()
 
 def watched(playback: Playback, seconds: float) -> list[float]:
     """Places that are shown in so many seconds of the viewer's time: here they pass at once."""
-    frames = Frames(playback, rate=50.0, begun=0.0)
+    frames = PlaybackFrames(playback, rate=50.0, begun=0.0)
     shown = (frames.next(now=0.02 * k) for k in range(round(50 * seconds) + 1))
     return [found[1].t for found in shown if found is not None]
 

@@ -77,7 +77,7 @@ class LiveEdge:
 
 
 @dataclass(frozen=True, slots=True)
-class _Run:
+class _Running:
     """Running from a place at a rate."""
 
     since: float
@@ -103,7 +103,7 @@ class _Run:
 class _Chase:
     """Closing a gap to the live edge: a cubic in time, that ends without a gap and at its pace."""
 
-    before: _Run
+    before: _Running
     """What it does until it begins."""
     since: float
     duration: float
@@ -138,7 +138,7 @@ class PlayHead:
             span: Start and end of the timeline [s]; None while that isn't known.
         """
         self._live, self._span = live, span
-        self._motion: _Run | _Chase | None = None
+        self._motion: _Running | _Chase | None = None
         self._mode = Mode.LIVE
         self._loop: tuple[float, float] | None = None
         self.rate = 1.0
@@ -183,11 +183,11 @@ class PlayHead:
         span = self._span()
         return None if span is None else span[0]
 
-    def _run(self, now: float, place: float, rate: float) -> _Run:
+    def _run(self, now: float, place: float, rate: float) -> _Running:
         """A run from a place, bound by the loop unless it has left that behind."""
         loop = self._loop
         bound = loop is not None and (place <= loop[1] if rate > 0 else place >= loop[0])
-        return _Run(now, place, rate, loop if bound and rate else None)
+        return _Running(now, place, rate, loop if bound and rate else None)
 
     def _within(self, place: float, live: float) -> float:
         span = self._span()
@@ -256,7 +256,7 @@ class PlayHead:
         place = self.position(now)
         self._loop = None
         if place is not None and self._mode is Mode.PLAYING:
-            self._motion = _Run(now, place, self.rate)
+            self._motion = _Running(now, place, self.rate)
 
     def rewind(self, *, now: float, rate: float = 1.0) -> None:
         """Run backwards at a rate above 0, 10 at most."""
@@ -308,7 +308,7 @@ class PlayHead:
             self._motion, self._mode = None, Mode.LIVE
             return now
         rate, since = self._pace(now), now + wait
-        before = _Run(now, place, rate)
+        before = _Running(now, place, rate)
         live = live + wait
         gap = live - self._within(place + rate * wait, live)
         duration = max(QUICKEST, 1.5 * abs(gap) / (FASTEST - 2.0))

@@ -146,7 +146,7 @@ def _print(
 ) -> None:
     import asyncio
 
-    from interfaces.recording.headless import Frames, lines, play
+    from interfaces.recording.headless import PlaybackFrames, lines, play
     from vrs.clock import WallClock
 
     def say(line: str) -> None:
@@ -156,7 +156,7 @@ def _print(
     playback.read_marks()
     if at is not None and rate is None and span is None:
         playback.seek(at, now=0.0)
-        found = Frames(playback, rate=frames, begun=0.0).next(now=0.0)
+        found = PlaybackFrames(playback, rate=frames, begun=0.0).next(now=0.0)
         assert found is not None
         for line in lines(*found, as_json=as_json):
             say(line)
@@ -167,7 +167,7 @@ def _print(
         end_on_signal(ended)
         now = clock.now()
         begin(playback, at, rate, span, now=now)
-        await play(Frames(playback, rate=frames, begun=now), clock, say, ended, as_json=as_json)
+        await play(PlaybackFrames(playback, rate=frames, begun=now), clock, say, ended, as_json=as_json)
 
     asyncio.run(printed())
 

@@ -11,7 +11,7 @@ from interfaces.cli.demo import prepare
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
-    from interfaces.report.verdicts import Verdicts
+    from interfaces.report.verdicts import ClaimReport
 
 
 def reproduce(
@@ -67,7 +67,7 @@ def reproduce(
     chosen = papers(paper)
     more = [found for path in beyond or () for found in read_verdicts(path)]
     prepare(out, "reproduce.html", *(f"{each.name}.json" for each in chosen))
-    written: list[Verdicts] = []
+    written: list[ClaimReport] = []
     for each in chosen:
         study = Study(seed, each.runs if runs is None else runs, each.length if length is None else length)
         reproduction = measured(each, study, workers)

@@ -1,6 +1,6 @@
 """Reproductions of papers: what each claims, measured by running it."""
 
-from interfaces.lab.claims import Claim, Figure, Findings, Paper, Part, Reproduction, Study, Table
+from interfaces.lab.claims import Claim, Figure, Findings, Paper, PaperPart, Reproduction, Study, Table
 from interfaces.lab.papers import PAPERS, papers
 from interfaces.lab.running import reproduce
 
@@ -10,7 +10,7 @@ __all__ = [
     "Figure",
     "Findings",
     "Paper",
-    "Part",
+    "PaperPart",
     "Reproduction",
     "Study",
     "Table",

@@ -103,7 +103,7 @@ class Findings:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PaperPart:
     """Something to be measured, in cases that don't depend on each other."""
 
     title: str
@@ -114,7 +114,7 @@ class Part:
     cases: tuple[str, ...] = ("",)
 
     @classmethod
-    def single(cls, title: str, work: Callable[[Study, str], Findings]) -> Part:
+    def single(cls, title: str, work: Callable[[Study, str], Findings]) -> PaperPart:
         """A part whose one case makes the findings itself."""
         return cls(title, work, _only)
 
@@ -131,7 +131,7 @@ class Paper:
     name: str
     """As the command line spells it."""
     citation: str
-    parts: tuple[Part, ...]
+    parts: tuple[PaperPart, ...]
     runs: int = 10
     """Behind each random figure, unless said otherwise."""
     length: float = 20.0

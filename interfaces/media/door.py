@@ -51,7 +51,7 @@ LARGEST: Final = 40_000
 """Characters of a message at most."""
 
 
-class _Ask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _MediaAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a page asks for."""
 
     do: str
@@ -198,7 +198,7 @@ class _Page:
         try:
             if len(text) > LARGEST:
                 raise InvalidValueError("message", f"{len(text)} characters", f"up to {LARGEST}")
-            answer = await self._do(msgspec.json.decode(text, type=_Ask))
+            answer = await self._do(msgspec.json.decode(text, type=_MediaAsk))
         except msgspec.MsgspecError:
             answer = {"kind": "problem", "text": "this isn't a message that is known here"}
         except VrsError as error:
@@ -206,7 +206,7 @@ class _Page:
         if answer:
             self._reply(json.dumps(answer))
 
-    async def _do(self, ask: _Ask) -> dict[str, Any]:
+    async def _do(self, ask: _MediaAsk) -> dict[str, Any]:
         media = self._media
         if ask.do == "watch":
             return {"kind": "answer", "sdp": await media.watch(self, ask.offer)}

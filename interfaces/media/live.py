@@ -12,7 +12,7 @@ from interfaces.media.coding import missing
 from interfaces.media.offer import OfferError
 from interfaces.media.presenter import Presenter
 from interfaces.media.speech import PROGRAM, SpeechError, cleaned, program
-from interfaces.media.voice import Playout
+from interfaces.media.voice import VoicePlayout
 from robots.bullet.rooms import Room
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
@@ -56,7 +56,7 @@ class LiveMedia:
         """What there's no video and sound for want of; empty with the whole extra."""
         video = config.video and not self.missing
         self.camera = LiveCamera(CameraConfig(config.rate, config.lens, config.pan_tilt, video), room, clock, stand)
-        self._playout = Playout()
+        self._playout = VoicePlayout()
         audible = video and program() is not None
         self.presenter = Presenter(clock, self._playout, screen=screen, audible=audible)
         """Says and shows what jobs, or people, want."""

@@ -27,7 +27,7 @@ from interfaces.media.camera import LiveCamera
 from interfaces.media.coding import SOUND_PERIOD, SOUND_RATE, VIDEO_CLOCK
 from interfaces.media.messages import Taken
 from interfaces.media.offer import OfferError, canonical
-from interfaces.media.voice import Playout
+from interfaces.media.voice import VoicePlayout
 from vrs.clock import Clock
 
 VIDEO: Final = "video/VP8"
@@ -85,7 +85,7 @@ class SoundTrack(MediaStreamTrack):
 
     kind = "audio"
 
-    def __init__(self, playout: Playout, clock: Clock) -> None:
+    def __init__(self, playout: VoicePlayout, clock: Clock) -> None:
         super().__init__()
         self._playout, self._clock = playout, clock
         self._origin, self._count = clock.now(), 0
@@ -109,7 +109,7 @@ class SoundTrack(MediaStreamTrack):
 class Peer:
     """One browser that watches and listens."""
 
-    def __init__(self, camera: LiveCamera, playout: Playout, clock: Clock) -> None:
+    def __init__(self, camera: LiveCamera, playout: VoicePlayout, clock: Clock) -> None:
         self._camera = camera
         self.connection = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self._video = VideoTrack()

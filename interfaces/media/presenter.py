@@ -8,7 +8,7 @@ from typing import Final
 
 from interfaces.media.coding import encode_sound
 from interfaces.media.speech import SpeechConfig, SpeechError, cleaned, reading_time, shortened, spoken
-from interfaces.media.voice import Playout
+from interfaces.media.voice import VoicePlayout
 from vrs.clock import Clock
 
 MOST_WAITING: Final = 8
@@ -24,7 +24,7 @@ class Presenter:
     def __init__(
         self,
         clock: Clock,
-        playout: Playout,
+        playout: VoicePlayout,
         *,
         screen: Callable[[str], None] = lambda _: None,
         speech: SpeechConfig | None = None,

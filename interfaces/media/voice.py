@@ -15,7 +15,7 @@ LEAD: Final = 0.1
 """What is to be said begins so much later [s], so that nobody who listens misses its beginning."""
 
 
-class Playout:
+class VoicePlayout:
     """Which packet is heard at which time, by everybody alike."""
 
     def __init__(self) -> None:

@@ -27,7 +27,7 @@ Kinds: TypeAlias = tuple[type[msgspec.Struct], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class RecordingChannel:
     """A channel; its number in a file is its place in `CHANNELS`, from 1."""
 
     topic: str
@@ -58,27 +58,29 @@ class Channel:
 _SESSION = m.Begin, m.Dropped, m.End
 _COMMANDS = m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry
 CHANNELS: Final = (
-    Channel("/session", "vrs.Session", _SESSION, (*_SESSION, d.RoomEntry), many=False),
-    Channel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
-    Channel(
+    RecordingChannel("/session", "vrs.Session", _SESSION, (*_SESSION, d.RoomEntry), many=False),
+    RecordingChannel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
+    RecordingChannel(
         "/timeline",
         "vrs.Timeline",
         (m.HistoryEntry, m.ChangeEntry),
         (d.ArcHistory, d.ArcChange),
         many=False,
     ),
-    Channel("/virtual/joints", "vrs.VirtualJoints", (m.VirtualSample,), ()),
-    Channel("/real/joints", "vrs.RealJoints", (m.RealSample,), ()),
-    Channel("/virtual/pose", "foxglove.PoseInFrame", (VirtualPose,), (VirtualPose,), "PoseInFrame.json"),
-    Channel("/real/pose", "foxglove.PoseInFrame", (RealPose,), (RealPose,), "PoseInFrame.json"),
-    Channel("/tf", "foxglove.FrameTransforms", (FrameTransforms,), (FrameTransforms,), "FrameTransforms.json"),
-    Channel("/link", "vrs.Packet", (m.LinkEntry,), (m.LinkEntry,)),
-    Channel("/events", "vrs.Event", (m.EventEntry,), (m.EventEntry,), many=False),
-    Channel("/virtual/posture", "vrs.VirtualPosture", (), (d.VirtualPosture,)),
-    Channel("/real/posture", "vrs.RealPosture", (), (d.RealPosture,)),
-    Channel("/real/measured", "vrs.MeasuredPosture", (), (d.MeasuredPosture,)),
-    Channel("/virtual/estimated", "vrs.EstimatedPosture", (), (d.EstimatedPosture,)),
-    Channel("/environment", "vrs.Cells", (), (d.CellsEntry,), many=False),
+    RecordingChannel("/virtual/joints", "vrs.VirtualJoints", (m.VirtualSample,), ()),
+    RecordingChannel("/real/joints", "vrs.RealJoints", (m.RealSample,), ()),
+    RecordingChannel("/virtual/pose", "foxglove.PoseInFrame", (VirtualPose,), (VirtualPose,), "PoseInFrame.json"),
+    RecordingChannel("/real/pose", "foxglove.PoseInFrame", (RealPose,), (RealPose,), "PoseInFrame.json"),
+    RecordingChannel(
+        "/tf", "foxglove.FrameTransforms", (FrameTransforms,), (FrameTransforms,), "FrameTransforms.json"
+    ),
+    RecordingChannel("/link", "vrs.Packet", (m.LinkEntry,), (m.LinkEntry,)),
+    RecordingChannel("/events", "vrs.Event", (m.EventEntry,), (m.EventEntry,), many=False),
+    RecordingChannel("/virtual/posture", "vrs.VirtualPosture", (), (d.VirtualPosture,)),
+    RecordingChannel("/real/posture", "vrs.RealPosture", (), (d.RealPosture,)),
+    RecordingChannel("/real/measured", "vrs.MeasuredPosture", (), (d.MeasuredPosture,)),
+    RecordingChannel("/virtual/estimated", "vrs.EstimatedPosture", (), (d.EstimatedPosture,)),
+    RecordingChannel("/environment", "vrs.Cells", (), (d.CellsEntry,), many=False),
 )
 """Every channel of a recording."""
 

@@ -11,11 +11,11 @@ from typing import Any
 from interfaces.recording.driving.tables import mobile_tables
 from interfaces.recording.kinds import ARM
 from interfaces.recording.recording import Recording
-from interfaces.recording.tables import Table, arm_tables
+from interfaces.recording.tables import RecordingTable, arm_tables
 from vrs.errors import FormatError, InvalidValueError
 
 
-def tables(recording: Recording) -> tuple[Table, ...]:
+def tables(recording: Recording) -> tuple[RecordingTable, ...]:
     """A recording's tables: `docs/recording.md` describes their columns.
 
     Raises:
@@ -24,7 +24,7 @@ def tables(recording: Recording) -> tuple[Table, ...]:
     return arm_tables(recording) if recording.kind is ARM else mobile_tables(recording)
 
 
-def write_csv(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
+def write_csv(found: Iterable[RecordingTable], folder: Path) -> tuple[Path, ...]:
     """Write tables as CSV: commas, a head, floats to the last digit, nothing where there's no value.
 
     Args:
@@ -40,7 +40,7 @@ def write_csv(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
     return tuple(_written(folder, "csv", table, _csv) for table in found)
 
 
-def write_parquet(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
+def write_parquet(found: Iterable[RecordingTable], folder: Path) -> tuple[Path, ...]:
     """Write tables as Parquet, the columns' units in their metadata; see `write_csv`.
 
     Raises:
@@ -55,7 +55,7 @@ def write_parquet(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
         raise InvalidValueError("--parquet", str(folder), allowed) from None
     kinds = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
 
-    def write(path: Path, table: Table) -> None:
+    def write(path: Path, table: RecordingTable) -> None:
         fields, arrays = [], []
         for column in table.columns:
             kind = kinds[column.kind]
@@ -66,7 +66,7 @@ def write_parquet(found: Iterable[Table], folder: Path) -> tuple[Path, ...]:
     return tuple(_written(folder, "parquet", table, write) for table in found)
 
 
-def _written(folder: Path, kind: str, table: Table, write: Callable[[Path, Table], None]) -> Path:
+def _written(folder: Path, kind: str, table: RecordingTable, write: Callable[[Path, RecordingTable], None]) -> Path:
     path = folder / f"{table.name}.{kind}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ def _written(folder: Path, kind: str, table: Table, write: Callable[[Path, Table
     return path
 
 
-def _csv(path: Path, table: Table) -> None:
+def _csv(path: Path, table: RecordingTable) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([column.name for column in table.columns])

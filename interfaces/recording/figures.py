@@ -15,7 +15,7 @@ from interfaces.recording.messages import OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, rerun
 from interfaces.recording.runs import extras_of
-from interfaces.recording.track import GAP, REAL, Track, gap_lengths, not_measured
+from interfaces.recording.track import GAP, REAL, SampleTrack, gap_lengths, not_measured
 from interfaces.runs.attribution import Attribution, OffsetOutcome
 from interfaces.runs.events import waits
 from interfaces.runs.offset import ADAPTIVE
@@ -34,7 +34,7 @@ MOST_ROWS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Figures:
+class RunFigures:
     """A run as its recording has it."""
 
     run: TwinRun
@@ -46,7 +46,7 @@ class Figures:
     """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
 
 
-def figures(recording: Recording) -> Figures:
+def figures(recording: Recording) -> RunFigures:
     """Everything that a run's summary and report are made of.
 
     Raises:
@@ -55,7 +55,7 @@ def figures(recording: Recording) -> Figures:
     reading = _Reading(recording)
     run = reading.run()
     attributions, offsets = reading.extras()
-    return Figures(run, attributions, offsets, (*reading.damage(), *reading.missing))
+    return RunFigures(run, attributions, offsets, (*reading.damage(), *reading.missing))
 
 
 def twin_run(recording: Recording) -> TwinRun:
@@ -146,7 +146,7 @@ class _Reading:
             samples=self._samples(track, alone, shown),
         )
 
-    def _grid(self, track: Track) -> Array:
+    def _grid(self, track: SampleTrack) -> Array:
         """User times of the run [s], (k,): even ones."""
         step, known = self.begin.step, track.t
         if not len(known):
@@ -169,7 +169,7 @@ class _Reading:
         t: Array = start + step * np.arange(first, last + 1, dtype=np.float64)
         return t
 
-    def _real(self, track: Track, t: Array) -> tuple[Array, Array, Array]:
+    def _real(self, track: SampleTrack, t: Array) -> tuple[Array, Array, Array]:
         """Play time [s], (k,), measured joints and references [rad], (k, n), at times [s], (k,)."""
         rows = len(t)
         if np.array_equal(track.t[:rows], t):
@@ -181,7 +181,7 @@ class _Reading:
             raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
         return np.maximum.accumulate(play), q, reference
 
-    def _samples(self, track: Track, alone: Timeline, shown: Timeline) -> Samples | None:
+    def _samples(self, track: SampleTrack, alone: Timeline, shown: Timeline) -> Samples | None:
         """See `TwinRun.samples`; of very many, some."""
         if self.begin.sampled is None:
             return None

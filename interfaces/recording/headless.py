@@ -11,7 +11,7 @@ from typing import Any, Final, TypeAlias
 
 from interfaces.playhead import Mode
 from interfaces.recording.marks import Mark
-from interfaces.recording.playback import Frame, Moment, Playback
+from interfaces.recording.playback import Playback, PlaybackFrame, PlaybackMoment
 from vrs.clock import Clock
 from vrs.model import Array
 
@@ -24,7 +24,7 @@ Passed: TypeAlias = tuple[Sequence[Mark], ...]
 """The marks that each recording passed since the frame before."""
 
 
-class Frames:
+class PlaybackFrames:
     """The frames of a play-back on an even grid of the user's time, each with the marks that were passed."""
 
     def __init__(self, playback: Playback, *, rate: float, begun: float) -> None:
@@ -45,7 +45,7 @@ class Frames:
         """The user's time of the next frame [s]."""
         return self._begun + self._beat / self._rate
 
-    def next(self, *, now: float) -> tuple[float, Moment, Passed] | None:
+    def next(self, *, now: float) -> tuple[float, PlaybackMoment, Passed] | None:
         """The newest frame that is due: it shows the place when it was due, however late it's asked for.
 
         Args:
@@ -100,7 +100,7 @@ class Frames:
 
 
 async def play(
-    frames: Frames, clock: Clock, say: Callable[[str], None], ended: asyncio.Event, *, as_json: bool
+    frames: PlaybackFrames, clock: Clock, say: Callable[[str], None], ended: asyncio.Event, *, as_json: bool
 ) -> None:
     """Print frames as time goes by, until there's nothing to come or somebody ends it.
 
@@ -126,7 +126,7 @@ async def play(
             return
 
 
-def lines(at: float, moment: Moment, passed: Passed, *, as_json: bool) -> Iterator[str]:
+def lines(at: float, moment: PlaybackMoment, passed: Passed, *, as_json: bool) -> Iterator[str]:
     """A frame as lines: one of JSON, or one for people and one for each mark.
 
     Args:
@@ -154,7 +154,7 @@ def lines(at: float, moment: Moment, passed: Passed, *, as_json: bool) -> Iterat
         yield line
 
 
-def _facts(frame: Frame, marks: Sequence[Mark]) -> dict[str, Any]:
+def _facts(frame: PlaybackFrame, marks: Sequence[Mark]) -> dict[str, Any]:
     return {
         "t": frame.t,
         "q_virtual": None if frame.q_virtual is None else frame.q_virtual.tolist(),

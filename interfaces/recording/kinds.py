@@ -10,7 +10,7 @@ from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POST
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class RecordingKind:
     """A kind of robot, as recordings know it."""
 
     name: str
@@ -25,13 +25,13 @@ class Kind:
     """Of how far the real robot is from the virtual one: `rad` or `m`."""
 
 
-ARM: Final = Kind("an arm", "arm", VIRTUAL, REAL, "rad")
+ARM: Final = RecordingKind("an arm", "arm", VIRTUAL, REAL, "rad")
 """Joints, and polynomials on its timeline."""
-MOBILE: Final = Kind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m")
+MOBILE: Final = RecordingKind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m")
 """Postures, and arcs on its timeline."""
 
 
-def kind_of(begin: Begin) -> Kind:
+def kind_of(begin: Begin) -> RecordingKind:
     """The kind of a recording's robot."""
     return ARM if begin.drive is None else MOBILE
 

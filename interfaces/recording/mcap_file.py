@@ -49,7 +49,7 @@ def _taken(builder: RecordBuilder) -> bytes:
     return data
 
 
-class _Block:
+class _MessageBlock:
     """Messages that wait to be written together."""
 
     def __init__(self) -> None:
@@ -86,7 +86,7 @@ class McapFile:
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._compressor = zstandard.ZstdCompressor(compression_params=_PARAMETERS)
-        self._few, self._many = _Block(), _Block()
+        self._few, self._many = _MessageBlock(), _MessageBlock()
         self._open: dict[int, bool] = {}
         self._places = bytearray()
         self._counts: dict[int, int] = {}
@@ -123,7 +123,7 @@ class McapFile:
             RecordingError: If the sink doesn't take it.
         """
         few, many = self._few, self._many
-        self._few, self._many = _Block(), _Block()
+        self._few, self._many = _MessageBlock(), _MessageBlock()
         data = b""
         for block in (few, many):
             if block.indexes:
@@ -131,7 +131,7 @@ class McapFile:
         if data:
             self._put(data)
 
-    def _packed(self, block: _Block, at: int) -> bytes:
+    def _packed(self, block: _MessageBlock, at: int) -> bytes:
         """A block as it stands in the file from a byte on, with its index."""
         records = bytes(block.records)
         packed = self._compressor.compress(records)

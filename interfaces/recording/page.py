@@ -17,7 +17,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from interfaces.playhead import Mode
 from interfaces.recording.kinds import shows
 from interfaces.recording.marks import Mark, MarkKind
-from interfaces.recording.playback import Moment, Playback, Track
+from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack
 from interfaces.recording.stages import stage_of
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import HEADERS, files
@@ -54,52 +54,64 @@ class _Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     """What a page asks for."""
 
 
-class _Play(_Wish, frozen=True, tag="play"):
+class _PlayWish(_Wish, frozen=True, tag="play"):
     rate: float | None = None
 
 
-class _Pause(_Wish, frozen=True, tag="pause"):
+class _PauseWish(_Wish, frozen=True, tag="pause"):
     pass
 
 
-class _Toggle(_Wish, frozen=True, tag="toggle"):
+class _ToggleWish(_Wish, frozen=True, tag="toggle"):
     pass
 
 
-class _Rate(_Wish, frozen=True, tag="rate"):
+class _RateWish(_Wish, frozen=True, tag="rate"):
     rate: float
 
 
-class _Step(_Wish, frozen=True, tag="step"):
+class _StepWish(_Wish, frozen=True, tag="step"):
     by: float
 
 
-class _Seek(_Wish, frozen=True, tag="seek"):
+class _SeekWish(_Wish, frozen=True, tag="seek"):
     t: float
 
 
-class _Skip(_Wish, frozen=True, tag="skip"):
+class _SkipWish(_Wish, frozen=True, tag="skip"):
     by: float
 
 
-class _Loop(_Wish, frozen=True, tag="loop"):
+class _LoopWish(_Wish, frozen=True, tag="loop"):
     start: float
     end: float
 
 
-class _Unloop(_Wish, frozen=True, tag="unloop"):
+class _UnloopWish(_Wish, frozen=True, tag="unloop"):
     pass
 
 
-class _Live(_Wish, frozen=True, tag="live"):
+class _LiveWish(_Wish, frozen=True, tag="live"):
     pass
 
 
-class _ToMark(_Wish, frozen=True, tag="mark"):
+class _ToMarkWish(_Wish, frozen=True, tag="mark"):
     back: bool = False
 
 
-_Any: TypeAlias = _Play | _Pause | _Toggle | _Rate | _Step | _Seek | _Skip | _Loop | _Unloop | _Live | _ToMark
+_Any: TypeAlias = (
+    _PlayWish
+    | _PauseWish
+    | _ToggleWish
+    | _RateWish
+    | _StepWish
+    | _SeekWish
+    | _SkipWish
+    | _LoopWish
+    | _UnloopWish
+    | _LiveWish
+    | _ToMarkWish
+)
 _decoder = msgspec.json.Decoder(_Any)
 
 
@@ -186,7 +198,7 @@ class ReplayPage:
             self._told = now
             self._tell(moment, now)
 
-    def _tell(self, moment: Moment, now: float) -> None:
+    def _tell(self, moment: PlaybackMoment, now: float) -> None:
         before = self.board.version
         if now >= self._marked + MARKED:
             self._marked = now
@@ -219,34 +231,34 @@ class ReplayPage:
     def _do(self, wish: _Any, now: float) -> None:
         playback = self.playback
         match wish:
-            case _Play(rate):
+            case _PlayWish(rate):
                 playback.play(now=now, rate=rate)
-            case _Pause():
+            case _PauseWish():
                 playback.pause(now=now)
-            case _Toggle():
+            case _ToggleWish():
                 (playback.play if playback.mode is Mode.PAUSED else playback.pause)(now=now)
-            case _Rate(rate):
+            case _RateWish(rate):
                 playback.set_rate(rate, now=now)
                 if playback.mode is not Mode.PAUSED:
                     playback.play(now=now)
-            case _Step(by):
+            case _StepWish(by):
                 playback.step(by, now=now)
-            case _Seek(t):
+            case _SeekWish(t):
                 playback.seek(t, now=now)
-            case _Skip(by):
+            case _SkipWish(by):
                 playback.seek(playback.place(now=now) + by, now=now)
-            case _Loop(start, end):
+            case _LoopWish(start, end):
                 playback.set_loop(start, end, now=now)
-            case _Unloop():
+            case _UnloopWish():
                 playback.clear_loop(now=now)
-            case _Live():
+            case _LiveWish():
                 playback.go_live(now=now)
-            case _ToMark(back):
+            case _ToMarkWish(back):
                 playback.seek_mark(back=back, now=now)
         self._told = float("-inf")
 
 
-def grouped(track: Track, start: float, end: float) -> list[dict[str, Any]]:
+def grouped(track: PlaybackTrack, start: float, end: float) -> list[dict[str, Any]]:
     """The marks of a recording for a seek bar: those of one kind that are too near are one.
 
     Args:
@@ -281,7 +293,7 @@ def _recordings(playback: Playback) -> list[dict[str, Any]]:
     return [_recording(track, name, playback.growing) for track, name in zip(tracks, names, strict=True)]
 
 
-def _recording(track: Track, name: str, growing: bool) -> dict[str, Any]:
+def _recording(track: PlaybackTrack, name: str, growing: bool) -> dict[str, Any]:
     recording = track.recording
     session = recording.session
     # A file that is being written isn't cut.
@@ -300,7 +312,7 @@ def _recording(track: Track, name: str, growing: bool) -> dict[str, Any]:
     }
 
 
-def _state(playback: Playback, moment: Moment) -> dict[str, Any]:
+def _state(playback: Playback, moment: PlaybackMoment) -> dict[str, Any]:
     head = playback.head
     panes = []
     for track, frame in zip(playback.tracks, moment.frames, strict=True):

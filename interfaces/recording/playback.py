@@ -48,7 +48,7 @@ class Align(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class PlaybackFrame:
     """What one recording shows at an instant."""
 
     t: float
@@ -74,12 +74,12 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moment:
+class PlaybackMoment:
     """What is shown at an instant."""
 
     t: float
     """On the first recording's timeline [s]."""
-    frames: tuple[Frame, ...]
+    frames: tuple[PlaybackFrame, ...]
     """One for each recording."""
 
 
@@ -109,7 +109,7 @@ class _AtEqualTime:
         return float(np.abs(q_real - q).max()) if np.isfinite(q).all() else None
 
 
-class Track:
+class PlaybackTrack:
     """A recording in a play-back."""
 
     def __init__(self, recording: Recording, shift: float) -> None:
@@ -148,7 +148,7 @@ class Track:
         start, end = self.recording.span
         return start + self.shift, end + self.shift
 
-    def frame(self, t: float) -> Frame:
+    def frame(self, t: float) -> PlaybackFrame:
         """What is there at a time of the play-back [s]."""
         own = t - self.shift
         recording = self.recording
@@ -156,12 +156,12 @@ class Track:
         q_virtual = self._known(recording.virtual, own)
         q_real = self._known(recording.real, own)
         if q_real is None:
-            return Frame(own, q_virtual, None, None, None, unit)
+            return PlaybackFrame(own, q_virtual, None, None, None, unit)
         play = self._read(lambda: self._follower.play(own))
         error = None if play is None else self._read(lambda: self._follower.error(own, q_real, play))
-        return Frame(own, q_virtual, q_real, play, error, unit)
+        return PlaybackFrame(own, q_virtual, q_real, play, error, unit)
 
-    def committed(self, frame: Frame) -> Committed | None:
+    def committed(self, frame: PlaybackFrame) -> Committed | None:
         """Where the real robot was going, as the plan was known then; None where it isn't there."""
         if frame.play is None:
             return None
@@ -193,7 +193,9 @@ class Playback:
         if not 1 <= len(recordings) <= 2:
             raise InvalidValueError("recordings", len(recordings), "1 or 2")
         check_alike(recordings)
-        self.tracks = tuple(Track(recording, _shift(recordings[0], recording, align)) for recording in recordings)
+        self.tracks = tuple(
+            PlaybackTrack(recording, _shift(recordings[0], recording, align)) for recording in recordings
+        )
         self._edge = LiveEdge()
         self.growing = False
         """Whether a file is being written."""
@@ -295,7 +297,7 @@ class Playback:
             raise InvalidValueError("live", "go live", "a recording that is being written")
         return self.head.go_live(now=now)
 
-    def advance(self, *, now: float) -> Moment:
+    def advance(self, *, now: float) -> PlaybackMoment:
         """What is shown now [s]."""
         self._look(now)
         for track in self.tracks:
@@ -305,9 +307,9 @@ class Playback:
             self.head.pause(now=now)
         return self.moment(place)
 
-    def moment(self, t: float) -> Moment:
+    def moment(self, t: float) -> PlaybackMoment:
         """What is shown at a time [s]."""
-        return Moment(t, tuple(track.frame(t) for track in self.tracks))
+        return PlaybackMoment(t, tuple(track.frame(t) for track in self.tracks))
 
     def read_marks(self) -> None:
         """Read all marks now, however long it takes."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from interfaces.recording.damage import Damage
 from interfaces.recording.driving.messages import CellsEntry, RoomEntry
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
-from interfaces.recording.kinds import Kind, kind_of, references
+from interfaces.recording.kinds import RecordingKind, kind_of, references
 from interfaces.recording.log import Log
 from interfaces.recording.messages import (
     Anchor,
@@ -30,8 +30,8 @@ from interfaces.recording.messages import (
     ReceiptEntry,
 )
 from interfaces.recording.scan import NUMBERS, Blocks
-from interfaces.recording.source import Source
-from interfaces.recording.track import Track, Tracks
+from interfaces.recording.source import FileSource
+from interfaces.recording.track import SampleTrack, Tracks
 from interfaces.runs.twin_run import Event, Packet
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
@@ -67,7 +67,7 @@ class Recording:
     def __init__(self, path: Path) -> None:
         """See `open_recording`."""
         self.path = path
-        self._source = Source(path)
+        self._source = FileSource(path)
         try:
             self._blocks = Blocks(self._source)
             self._logs = {topic: Log(self._blocks, topic, str(path)) for topic in NUMBERS}
@@ -77,7 +77,7 @@ class Recording:
                 raise FormatError(str(path), "isn't a recording, or the block that it begins with is destroyed")
             self.session: Begin = begin
             """How the run was set up."""
-            self.kind: Kind = kind_of(begin)
+            self.kind: RecordingKind = kind_of(begin)
             """What its robot is."""
             self._tracks = Tracks(self._blocks, len(begin.q), references(begin), str(path))
             self._chain, self._applied = Chain(str(path)), 0
@@ -319,7 +319,7 @@ class Recording:
         found = self._tracks.at(self.kind.real, np.atleast_1d(moments), column)
         return found if moments.ndim else found[0]
 
-    def track(self, topic: str, since: float = -math.inf, until: float = math.inf) -> Track:
+    def track(self, topic: str, since: float = -math.inf, until: float = math.inf) -> SampleTrack:
         """The samples of a robot, both ends included [s]; only blocks that are needed are read.
 
         Raises:

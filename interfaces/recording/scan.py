@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from interfaces.recording.block import HEAD, LARGEST, MARK, MARK_AT, Unpacker, contents, head_of, messages
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.damage import Damage
-from interfaces.recording.source import Source
+from interfaces.recording.source import FileSource
 from interfaces.recording.summary import MAGIC, Places, Summary, read_summary
 from vrs.errors import FormatError
 from vrs.model import Array
@@ -54,7 +54,7 @@ class _Gap(NamedTuple):
 class Blocks:
     """The blocks of one file, in its order."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: FileSource) -> None:
         """Find them.
 
         Raises:

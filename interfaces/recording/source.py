@@ -9,7 +9,7 @@ from pathlib import Path
 from vrs.errors import FormatError
 
 
-class Source:
+class FileSource:
     """Reads a file by place; errors of the disk are errors of the format."""
 
     def __init__(self, path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Protocol
 from interfaces.recording.driving.stage import DriveStage
 from interfaces.recording.engines import mobile_model
 from interfaces.recording.kinds import ARM
-from interfaces.recording.playback import Frame
+from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.twins import TwinScene
@@ -21,7 +21,7 @@ class Stage(Protocol):
     def scene(self) -> TwinScene:
         """What pages look at."""
 
-    def show(self, frame: Frame, committed: Committed | None, *, now: float) -> None:
+    def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
 
 
@@ -32,7 +32,7 @@ class ArmStage:
         self._model = recording.model
         self.scene: MeshcatScene = MeshcatScene(recording.model)
 
-    def show(self, frame: Frame, committed: Committed | None, *, now: float) -> None:
+    def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """See `Stage`."""
         links = self._model.links
         assert frame.q_virtual is not None

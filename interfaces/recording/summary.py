@@ -8,7 +8,7 @@ from array import array
 from dataclasses import dataclass
 
 from interfaces.recording.block import CHANNEL, DATA_END, LARGEST, RECORD, channel_of
-from interfaces.recording.source import Source
+from interfaces.recording.source import FileSource
 from vrs.errors import FormatError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -62,7 +62,7 @@ class Summary:
     """Of all bytes up to there; None where there's none."""
 
 
-def read_summary(source: Source) -> Summary | None:
+def read_summary(source: FileSource) -> Summary | None:
     """Read the index of a file.
 
     Returns:

@@ -21,7 +21,7 @@ _POSE = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"), ("qx", ""), ("qy", ""), ("qz"
 _STAMPS = ("issued_at", "asked_at", "execute_at", "end")
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of a table."""
 
     name: str
@@ -34,14 +34,14 @@ class Column(NamedTuple):
     """None where there's none."""
 
 
-class Table(NamedTuple):
+class RecordingTable(NamedTuple):
     """A table; its columns are of one length."""
 
     name: str
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
 
 
-def arm_tables(recording: Recording) -> tuple[Table, ...]:
+def arm_tables(recording: Recording) -> tuple[RecordingTable, ...]:
     """An arm's tables; see `tables`."""
     return (
         _virtual(recording),
@@ -56,34 +56,35 @@ def arm_tables(recording: Recording) -> tuple[Table, ...]:
     )
 
 
-def table(name: str, *columns: Column | Sequence[Column]) -> Table:
+def table(name: str, *columns: TableColumn | Sequence[TableColumn]) -> RecordingTable:
     """A table of columns, and of lists of them."""
-    found: list[Column] = []
+    found: list[TableColumn] = []
     for column in columns:
-        found += [column] if isinstance(column, Column) else column
-    return Table(name, tuple(found))
+        found += [column] if isinstance(column, TableColumn) else column
+    return RecordingTable(name, tuple(found))
 
 
-def seconds(name: str, values: Sequence[float | None]) -> Column:
+def seconds(name: str, values: Sequence[float | None]) -> TableColumn:
     """A column of times."""
-    return Column(f"{name}_s", "s", float, values)
+    return TableColumn(f"{name}_s", "s", float, values)
 
 
-def _joints(name: str, q: Array) -> list[Column]:
-    return [Column(f"{name}{i}_rad", RADIANS, float, column.tolist()) for i, column in enumerate(q.T, start=1)]
+def _joints(name: str, q: Array) -> list[TableColumn]:
+    return [TableColumn(f"{name}{i}_rad", RADIANS, float, column.tolist()) for i, column in enumerate(q.T, start=1)]
 
 
-def _pose(X: Array) -> list[Column]:
+def _pose(X: Array) -> list[TableColumn]:
     """Position and unit quaternion of poses, (k, 4, 4); NaN where they aren't known."""
     known = np.isfinite(X).all(axis=(1, 2))
     values = np.full((len(X), 7), np.nan)
     values[known, :3], values[known, 3:] = X[known, :3, 3], quaternions(X[known, :3, :3])
     return [
-        Column(name, unit, float, column.tolist()) for (name, unit), column in zip(_POSE, values.T, strict=True)
+        TableColumn(name, unit, float, column.tolist())
+        for (name, unit), column in zip(_POSE, values.T, strict=True)
     ]
 
 
-def _tool(recording: Recording, q: Array) -> list[Column]:
+def _tool(recording: Recording, q: Array) -> list[TableColumn]:
     X = np.full((len(q), 4, 4), np.nan)
     known = np.isfinite(q).all(axis=1)
     if known.any():
@@ -91,13 +92,13 @@ def _tool(recording: Recording, q: Array) -> list[Column]:
     return _pose(X)
 
 
-def _virtual(recording: Recording) -> Table:
+def _virtual(recording: Recording) -> RecordingTable:
     t = recording.track(VIRTUAL).t
     q = recording.virtual(t)
     return table("virtual", seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
 
 
-def _real(recording: Recording) -> Table:
+def _real(recording: Recording) -> RecordingTable:
     track = recording.track(REAL)
     return table(
         "real",
@@ -109,7 +110,7 @@ def _real(recording: Recording) -> Table:
     )
 
 
-def commands_table(recording: Recording) -> Table:
+def commands_table(recording: Recording) -> RecordingTable:
     """What the operator's engine was told."""
     entries = recording.commands
     receipts = [entry.receipt if isinstance(entry, CommandEntry) else None for entry in entries]
@@ -124,16 +125,16 @@ def commands_table(recording: Recording) -> Table:
     )
     return table(
         "commands",
-        Column("number", "", int, [entry.number for entry in entries]),
+        TableColumn("number", "", int, [entry.number for entry in entries]),
         seconds("at", [entry.at for entry in entries]),
-        Column("command", "", str, [_kind(entry) for entry in entries]),
-        Column("command_id", "", int, told("command_id")),
-        Column("status", "", str, [None if status is None else str(status) for status in told("status")]),
+        TableColumn("command", "", str, [_kind(entry) for entry in entries]),
+        TableColumn("command_id", "", int, told("command_id")),
+        TableColumn("status", "", str, [None if status is None else str(status) for status in told("status")]),
         [seconds(name, told(name)) for name in _STAMPS],
         _joints("q", q),
-        Column("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
-        Column("reason", "", str, [_reason(entry) for entry in entries]),
-        Column("content", "", str, [_content(entry) for entry in entries]),
+        TableColumn("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
+        TableColumn("reason", "", str, [_reason(entry) for entry in entries]),
+        TableColumn("content", "", str, [_content(entry) for entry in entries]),
     )
 
 
@@ -156,7 +157,7 @@ def _content(entry: CommandEntry | Anchor) -> str | None:
     return msgspec.json.encode(entry.command).decode()
 
 
-def receipts_table(recording: Recording) -> Table:
+def receipts_table(recording: Recording) -> RecordingTable:
     """The newest truth about each command at each site."""
     rows = [("virtual", receipt) for receipt in recording.receipts("virtual")]
     rows += [("real", receipt) for receipt in recording.receipts("real")]
@@ -166,18 +167,18 @@ def receipts_table(recording: Recording) -> Table:
 
     return table(
         "receipts",
-        Column("site", "", str, [site for site, _ in rows]),
-        Column("command_id", "", int, told("command_id")),
-        Column("status", "", str, [str(status) for status in told("status")]),
+        TableColumn("site", "", str, [site for site, _ in rows]),
+        TableColumn("command_id", "", int, told("command_id")),
+        TableColumn("status", "", str, [str(status) for status in told("status")]),
         [seconds(name, told(name)) for name in _STAMPS],
         seconds("shift", told("shift")),
-        Column("superseded_by", "", int, told("superseded_by")),
-        Column("undone", "", bool, told("undone")),
-        Column("reason", "", str, told("reason")),
+        TableColumn("superseded_by", "", int, told("superseded_by")),
+        TableColumn("undone", "", bool, told("undone")),
+        TableColumn("reason", "", str, told("reason")),
     )
 
 
-def _segments(recording: Recording) -> Table:
+def _segments(recording: Recording) -> RecordingTable:
     """The newest timeline, a row a segment and joint."""
     rows: list[tuple[int, float, float, int | None, int, list[float]]] = []
     for number, segment in enumerate(arm_timeline(recording.timeline).segments):
@@ -186,13 +187,13 @@ def _segments(recording: Recording) -> Table:
     most = max((len(row[-1]) for row in rows), default=1)
     return table(
         "segments",
-        Column("segment", "", int, [row[0] for row in rows]),
+        TableColumn("segment", "", int, [row[0] for row in rows]),
         seconds("start", [row[1] for row in rows]),
         seconds("duration", [row[2] for row in rows]),
-        Column("command_id", "", int, [row[3] for row in rows]),
-        Column("joint", "", int, [row[4] for row in rows]),
+        TableColumn("command_id", "", int, [row[3] for row in rows]),
+        TableColumn("joint", "", int, [row[4] for row in rows]),
         [
-            Column(
+            TableColumn(
                 f"c{k}_{_power(k, '_per_')}", _power(k, "/"), float, [(row[5] + [0.0] * most)[k] for row in rows]
             )
             for k in range(most)
@@ -205,52 +206,52 @@ def _power(k: int, per: str) -> str:
     return RADIANS if k == 0 else f"{RADIANS}{per}s{k if k > 1 else ''}"
 
 
-def edits_table(recording: Recording) -> Table:
+def edits_table(recording: Recording) -> RecordingTable:
     """The timelines that the virtual robot had."""
     edits = recording.edits
     return table(
         "edits",
-        Column("edit", "", int, [edit.number for edit in edits]),
+        TableColumn("edit", "", int, [edit.number for edit in edits]),
         seconds("at", [edit.at for edit in edits]),
-        Column("version", "", int, [edit.timeline.version for edit in edits]),
-        Column("command_id", "", int, [edit.command_id for edit in edits]),
+        TableColumn("version", "", int, [edit.timeline.version for edit in edits]),
+        TableColumn("command_id", "", int, [edit.command_id for edit in edits]),
         seconds("end", [edit.timeline.end for edit in edits]),
     )
 
 
-def _packets(recording: Recording) -> Table:
+def _packets(recording: Recording) -> RecordingTable:
     packets = recording.packets
     return table(
         "packets",
-        Column("command_id", "", int, [packet.command_id for packet in packets]),
-        Column("real_id", "", int, [packet.real_id for packet in packets]),
+        TableColumn("command_id", "", int, [packet.command_id for packet in packets]),
+        TableColumn("real_id", "", int, [packet.real_id for packet in packets]),
         seconds("sent", [packet.sent for packet in packets]),
         seconds("arrived", [packet.arrived for packet in packets]),
-        Column("lost", "", bool, [packet.lost for packet in packets]),
+        TableColumn("lost", "", bool, [packet.lost for packet in packets]),
     )
 
 
-def link_table(recording: Recording) -> Table:
+def link_table(recording: Recording) -> RecordingTable:
     """Packets of the link."""
     entries = recording.link
     sized = any(entry.size for entry in entries)
     return table(
         "link",
-        Column("direction", "", str, [entry.direction for entry in entries]),
+        TableColumn("direction", "", str, [entry.direction for entry in entries]),
         seconds("sent", [entry.sent for entry in entries]),
         seconds("arrived", [entry.arrived for entry in entries]),
-        Column("lost", "", bool, [entry.lost for entry in entries]),
-        Column("attempts", "", int, [entry.attempts for entry in entries]),
-        [Column("size_byte", "byte", int, [entry.size for entry in entries])] if sized else [],
+        TableColumn("lost", "", bool, [entry.lost for entry in entries]),
+        TableColumn("attempts", "", int, [entry.attempts for entry in entries]),
+        [TableColumn("size_byte", "byte", int, [entry.size for entry in entries])] if sized else [],
     )
 
 
-def events_table(recording: Recording) -> Table:
+def events_table(recording: Recording) -> RecordingTable:
     """What else happened."""
     events = recording.events
     return table(
         "events",
         seconds("t", [event.t for event in events]),
-        Column("kind", "", str, [event.kind for event in events]),
-        Column("text", "", str, [event.text for event in events]),
+        TableColumn("kind", "", str, [event.kind for event in events]),
+        TableColumn("text", "", str, [event.text for event in events]),
     )

@@ -37,7 +37,7 @@ _DECODERS: dict[str, msgspec.json.Decoder[Any]] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Track:
+class SampleTrack:
     """Samples, ascending in time; arrays of m rows, read-only."""
 
     t: Array
@@ -85,9 +85,9 @@ class Tracks:
 
     def __init__(self, blocks: Blocks, dof: int, told: int, where: str) -> None:
         self._blocks, self._dof, self._told, self._where = blocks, dof, told, where
-        self._near: dict[str, tuple[float, float, int, Track]] = {}
+        self._near: dict[str, tuple[float, float, int, SampleTrack]] = {}
 
-    def between(self, topic: str, since: float, until: float) -> Track:
+    def between(self, topic: str, since: float, until: float) -> SampleTrack:
         """The samples of a time, both ends included [s].
 
         Raises:
@@ -107,7 +107,7 @@ class Tracks:
             places += [index] * len(samples)
         return self._track(found, places, since, until)
 
-    def _track(self, samples: list[Any], places: list[int], since: float, until: float) -> Track:
+    def _track(self, samples: list[Any], places: list[int], since: float, until: float) -> SampleTrack:
         n, told = self._dof, self._told
         if any(len(sample.q) != n for sample in samples):
             raise FormatError(self._where, f"a sample that hasn't {n} joints")
@@ -128,7 +128,9 @@ class Tracks:
         kept = kept[(t[kept] >= since) & (t[kept] <= until)]
         if len(kept) > 1:
             kept = kept[np.append(np.diff(t[kept]) > 0, True)]
-        return Track(*(frozen_array(column[kept]) for column in (t, q, play, reference, edit, np.array(places))))
+        return SampleTrack(
+            *(frozen_array(column[kept]) for column in (t, q, play, reference, edit, np.array(places)))
+        )
 
     def at(self, topic: str, t: Array, column: str) -> Array:
         """Values at times, linear between neighbours.
@@ -151,7 +153,7 @@ class Tracks:
                 found[part] = self._interpolated(topic, track, t[part], column)
         return found
 
-    def _around(self, topic: str, first: float, last: float) -> Track:
+    def _around(self, topic: str, first: float, last: float) -> SampleTrack:
         known = self._near.get(topic)
         if (
             known is not None
@@ -165,7 +167,7 @@ class Tracks:
         self._near[topic] = since, until, len(self._blocks), track
         return track
 
-    def _interpolated(self, topic: str, track: Track, t: Array, column: str) -> Array:
+    def _interpolated(self, topic: str, track: SampleTrack, t: Array, column: str) -> Array:
         values: Array = getattr(track, column)
         found: Array = np.full((len(t), *values.shape[1:]), np.nan)
         if not len(track.t):
@@ -188,13 +190,13 @@ class Tracks:
         return found
 
 
-def gap_lengths(track: Track, t: Array) -> Array:
+def gap_lengths(track: SampleTrack, t: Array) -> Array:
     """How long each span was in which nothing was measured [s], within times [s], (k,)."""
     outside = np.array([track.t[0] - t[0], t[-1] - track.t[-1]])
     return np.concatenate((track.gaps[:, 1] - track.gaps[:, 0], outside[outside > 1e-6]))
 
 
-def not_measured(track: Track, t: Array) -> list[str]:
+def not_measured(track: SampleTrack, t: Array) -> list[str]:
     """Says for how long nothing was measured within times [s], (k,), if there's such a time."""
     lengths = gap_lengths(track, t)
     if not len(lengths):

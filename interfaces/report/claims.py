@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from interfaces.lab.claims import interval_said, said
 from interfaces.report.markup import table
-from interfaces.report.verdicts import Json, Verdicts
+from interfaces.report.verdicts import ClaimReport, Json
 from vrs.errors import FormatError
 
 PAGE: Final = "reproduce.html"
@@ -23,7 +23,7 @@ HEAD: Final = ("claim", "", "expected", "measured", "interval", "source")
 """Of the table; the verdict has no name."""
 
 
-def write_claims(out: Path, papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> Path:
+def write_claims(out: Path, papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> Path:
     """Write the page and its JSON into an existing directory.
 
     Args:
@@ -45,7 +45,7 @@ def write_claims(out: Path, papers: Sequence[Verdicts], beyond: Sequence[Verdict
     return out / PAGE
 
 
-def to_json(papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> str:
+def to_json(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> str:
     """Every claim as JSON; equal findings give equal texts."""
     document = {
         "schema": SCHEMA,
@@ -57,7 +57,7 @@ def to_json(papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _plain(found: Verdicts) -> dict[str, Any]:
+def _plain(found: ClaimReport) -> dict[str, Any]:
     return {
         "name": found.name,
         "title": found.title,
@@ -67,7 +67,7 @@ def _plain(found: Verdicts) -> dict[str, Any]:
     }
 
 
-def render(papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> str:
+def render(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> str:
     """The page as one HTML text; equal findings give equal texts."""
     everything = (*papers, *beyond)
     total, held = sum(found.total for found in everything), sum(found.held for found in everything)
@@ -81,11 +81,11 @@ def render(papers: Sequence[Verdicts], beyond: Sequence[Verdicts] = ()) -> str:
     )
 
 
-def _sums(found: Sequence[Verdicts]) -> str:
+def _sums(found: Sequence[ClaimReport]) -> str:
     return f'<div class="sums">{"".join(map(_sum, found))}</div>'
 
 
-def _sum(found: Verdicts) -> str:
+def _sum(found: ClaimReport) -> str:
     share = 100.0 * found.held / max(found.total, 1)
     return (
         f'<a class="card sum" href="#{escape(found.name)}"><b>{found.held}<small> of {found.total} hold</small></b>'
@@ -93,7 +93,7 @@ def _sum(found: Verdicts) -> str:
     )
 
 
-def _section(found: Verdicts) -> str:
+def _section(found: ClaimReport) -> str:
     whole = " whole" if found.held == found.total else ""
     facts = "".join(f"<li><span>{escape(name)}</span>{escape(value)}</li>" for name, value in found.facts)
     timings = f"<h4>Speed of this machine</h4>{_claims(found.timings)}" if found.timings else ""
@@ -124,7 +124,7 @@ def _row(claim: Json) -> str:
     )
 
 
-def _tables(found: Verdicts) -> str:
+def _tables(found: ClaimReport) -> str:
     shown = [
         f"<details><summary>{escape(each['title'])}</summary>"
         f"{table(each['columns'], [[_blank(cell) for cell in row] for row in each['rows']])}</details>"
@@ -133,7 +133,7 @@ def _tables(found: Verdicts) -> str:
     return "".join(shown)
 
 
-def _pictures(found: Verdicts) -> str:
+def _pictures(found: ClaimReport) -> str:
     shown = []
     for title, svg in found.figures:
         data = base64.b64encode(svg.encode("utf-8")).decode("ascii")

@@ -17,7 +17,7 @@ COLUMNS: Final = ("claim", "source", "expected", "measured", "interval", "holds"
 
 
 @dataclass(frozen=True, slots=True)
-class Verdicts:
+class ClaimReport:
     """The claims of one paper, study or benchmark."""
 
     name: str
@@ -44,7 +44,7 @@ class Verdicts:
         return sum(bool(claim["holds"]) for claim in (*self.claims, *self.timings))
 
 
-def read_verdicts(path: Path) -> tuple[Verdicts, ...]:
+def read_verdicts(path: Path) -> tuple[ClaimReport, ...]:
     """Read a study's `PAPER.json` with the figures beside it, or the `results.json` of the benchmarks.
 
     Raises:
@@ -64,10 +64,10 @@ def read_verdicts(path: Path) -> tuple[Verdicts, ...]:
         raise FormatError(str(path), f"isn't a reproduction or a benchmark's results: {error!r}") from None
 
 
-def _study(path: Path, document: Json) -> Verdicts:
+def _study(path: Path, document: Json) -> ClaimReport:
     length = f"{document['length_s']:g} s"
     facts = ("seed", str(document["seed"])), ("runs", str(document["runs"])), ("length", length)
-    return Verdicts(
+    return ClaimReport(
         document["paper"],
         document["citation"],
         facts,
@@ -89,9 +89,9 @@ def _svg(path: Path) -> str:
         raise FormatError(str(path), f"can't be read: {error.strerror}") from None
 
 
-def _benchmark(name: str, part: Json) -> Verdicts:
+def _benchmark(name: str, part: Json) -> ClaimReport:
     asked = [_measured(name, result) for result in part["results"] if result["holds"] is not None]
-    return Verdicts(name, part["title"], (("pace of the machine", f"{part['pace_us']:.0f} µs"),), tuple(asked))
+    return ClaimReport(name, part["title"], (("pace of the machine", f"{part['pace_us']:.0f} µs"),), tuple(asked))
 
 
 def _measured(name: str, result: Json) -> Json:

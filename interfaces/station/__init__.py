@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from interfaces.station.panels import Panel, Place
+from interfaces.station.panels import Panel, PanelPlace
 
-__all__ = ["Panel", "Place"]
+__all__ = ["Panel", "PanelPlace"]

@@ -60,7 +60,7 @@ class BoundsConfig:
             number_in(name, getattr(self, name), low, high)
 
 
-class Bounds:
+class RequestBounds:
     """Stands before NiceGUI's application."""
 
     def __init__(

@@ -15,9 +15,9 @@ from nicegui import Client, core, ui
 from nicegui.element import Element
 from starlette.routing import BaseRoute, Mount
 
-from interfaces.station.bounds import Bounds
+from interfaces.station.bounds import RequestBounds
 from interfaces.station.files import route
-from interfaces.station.panels import PANELS, Panel, Place
+from interfaces.station.panels import PANELS, Panel, PanelPlace
 
 TITLE: Final = "VRS teleop"
 KEEP: Final = 30.0
@@ -58,7 +58,7 @@ class Station:
             self._app, title=TITLE, dark=None, tailwind=False, show_welcome_message=False,
             gzip_middleware_factory=None, binding_refresh_interval=None,
         )  # fmt: skip
-        self._bounds = Bounds(self._app, "/", _make_room)
+        self._bounds = RequestBounds(self._app, "/", _make_room)
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -82,20 +82,24 @@ class Station:
 
 def _boxes(panels: Iterable[Panel]) -> str:
     """The empty boxes that the panels' scripts fill."""
-    cards = dict.fromkeys(Place, "")
+    cards = dict.fromkeys(PanelPlace, "")
     for panel in panels:
         inner = _box(f"panel-{panel.name}", f"panel panel-{panel.name}")
         cards[panel.place] += _box(f"card-{panel.name}", "card", inner)
-    side = _box("tabs", "tabs") + _box("tab-panels", "tab-panels", cards[Place.SIDE])
+    side = _box("tabs", "tabs") + _box("tab-panels", "tab-panels", cards[PanelPlace.SIDE])
     work = (
-        _box("pane-box", "pane-box", cards[Place.PANE]) + _box("splitter", "splitter") + _box("side", "side", side)
+        _box("pane-box", "pane-box", cards[PanelPlace.PANE])
+        + _box("splitter", "splitter")
+        + _box("side", "side", side)
     )
-    header = f'<h1 class="name"><div>{TITLE}</div></h1>' + _box("bar-panels", "bar-panels", cards[Place.HEADER])
+    header = f'<h1 class="name"><div>{TITLE}</div></h1>' + _box(
+        "bar-panels", "bar-panels", cards[PanelPlace.HEADER]
+    )
     return (
         _box("bar", "bar", header)
         + _box("work", "work", work)
-        + _box("strip-box", "strip-box", cards[Place.STRIP])
-        + _box("nowhere", "nowhere", cards[Place.NOWHERE])
+        + _box("strip-box", "strip-box", cards[PanelPlace.STRIP])
+        + _box("nowhere", "nowhere", cards[PanelPlace.NOWHERE])
     )
 
 

@@ -9,7 +9,7 @@ from typing import Final
 from vrs.errors import InvalidValueError
 
 
-class Place(enum.StrEnum):
+class PanelPlace(enum.StrEnum):
     """Where a panel stands."""
 
     HEADER = "header"
@@ -36,7 +36,7 @@ class Panel:
     """Of the panel and of its files; small letters."""
     title: str
     """On its tab."""
-    place: Place
+    place: PanelPlace
     icon: str = ""
     """Of its tab, as Material Icons name it."""
 
@@ -46,35 +46,35 @@ class Panel:
 
 
 PANELS: Final[tuple[Panel, ...]] = (
-    Panel("pane", "3D view", Place.PANE),
-    Panel("drag", "Dragging the tool", Place.NOWHERE),
-    Panel("link", "Connection", Place.HEADER),
-    Panel("control", "Control", Place.HEADER),
-    Panel("theme", "Light or dark", Place.HEADER),
-    Panel("stop", "Stop", Place.HEADER),
-    Panel("jog", "Jog", Place.SIDE, icon="open_with"),
-    Panel("receipts", "Receipts", Place.SIDE, icon="receipt_long"),
-    Panel("plots", "Plots", Place.SIDE, icon="show_chart"),
-    Panel("terminal", "Terminal", Place.SIDE, icon="terminal"),
-    Panel("network", "Link", Place.SIDE, icon="network_check"),
-    Panel("record", "Record", Place.SIDE, icon="fiber_manual_record"),
-    Panel("strip", "Timeline", Place.STRIP),
-    Panel("hints", "Hints", Place.NOWHERE),
+    Panel("pane", "3D view", PanelPlace.PANE),
+    Panel("drag", "Dragging the tool", PanelPlace.NOWHERE),
+    Panel("link", "Connection", PanelPlace.HEADER),
+    Panel("control", "Control", PanelPlace.HEADER),
+    Panel("theme", "Light or dark", PanelPlace.HEADER),
+    Panel("stop", "Stop", PanelPlace.HEADER),
+    Panel("jog", "Jog", PanelPlace.SIDE, icon="open_with"),
+    Panel("receipts", "Receipts", PanelPlace.SIDE, icon="receipt_long"),
+    Panel("plots", "Plots", PanelPlace.SIDE, icon="show_chart"),
+    Panel("terminal", "Terminal", PanelPlace.SIDE, icon="terminal"),
+    Panel("network", "Link", PanelPlace.SIDE, icon="network_check"),
+    Panel("record", "Record", PanelPlace.SIDE, icon="fiber_manual_record"),
+    Panel("strip", "Timeline", PanelPlace.STRIP),
+    Panel("hints", "Hints", PanelPlace.NOWHERE),
 )
 """What the page has, in the order of its tabs and of the keyboard."""
 
 MOBILE_PANELS: Final[tuple[Panel, ...]] = (
-    Panel("floor", "3D view", Place.PANE),
-    Panel("link", "Connection", Place.HEADER),
-    Panel("control", "Control", Place.HEADER),
-    Panel("theme", "Light or dark", Place.HEADER),
-    Panel("stop", "Stop", Place.HEADER),
-    Panel("drive", "Drive", Place.SIDE, icon="gamepad"),
-    Panel("map", "Map", Place.SIDE, icon="map"),
-    Panel("jobs", "Jobs", Place.SIDE, icon="checklist"),
-    Panel("camera", "Camera", Place.SIDE, icon="videocam"),
-    Panel("deviation", "Plots", Place.SIDE, icon="show_chart"),
-    Panel("network", "Link", Place.SIDE, icon="network_check"),
-    Panel("hints", "Hints", Place.NOWHERE),
+    Panel("floor", "3D view", PanelPlace.PANE),
+    Panel("link", "Connection", PanelPlace.HEADER),
+    Panel("control", "Control", PanelPlace.HEADER),
+    Panel("theme", "Light or dark", PanelPlace.HEADER),
+    Panel("stop", "Stop", PanelPlace.HEADER),
+    Panel("drive", "Drive", PanelPlace.SIDE, icon="gamepad"),
+    Panel("map", "Map", PanelPlace.SIDE, icon="map"),
+    Panel("jobs", "Jobs", PanelPlace.SIDE, icon="checklist"),
+    Panel("camera", "Camera", PanelPlace.SIDE, icon="videocam"),
+    Panel("deviation", "Plots", PanelPlace.SIDE, icon="show_chart"),
+    Panel("network", "Link", PanelPlace.SIDE, icon="network_check"),
+    Panel("hints", "Hints", PanelPlace.NOWHERE),
 )
 """What a mobile robot's page has."""

@@ -47,7 +47,7 @@ SENT_AT_ONCE: Final = 4
 """Downloads at once."""
 
 
-class _Ask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _RecordAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a page asks for."""
 
     do: str
@@ -159,7 +159,7 @@ class Recordings:
         try:
             if refusal := self._access.refusal(Role.VIEWER, shown):
                 return _said(403, refusal)
-            ask = msgspec.json.decode(await _body(request), type=_Ask)
+            ask = msgspec.json.decode(await _body(request), type=_RecordAsk)
             role = Role.VIEWER if ask.do == "copy" else Role.OPERATOR
             if refusal := self._access.refusal(role, shown):
                 return _said(403, refusal)
@@ -173,7 +173,7 @@ class Recordings:
         except VrsError as error:
             return _said(409 if isinstance(error, RecordingError) else 400, str(error))
 
-    async def _do(self, ask: _Ask) -> dict[str, Any]:
+    async def _do(self, ask: _RecordAsk) -> dict[str, Any]:
         match ask.do:
             case "begin":
                 await self.begin(ask.name)

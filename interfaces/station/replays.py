@@ -42,10 +42,12 @@ class _Key(NamedTuple):
     align: Align
 
 
-class _Replay:
+class _SharedReplay:
     """One play-back, or why there's none; pages that ask for the same share it, and its play head."""
 
-    def __init__(self, key: _Key, allowed: Callable[[str | None], bool], open_: Callable[[_Replay], None]) -> None:
+    def __init__(
+        self, key: _Key, allowed: Callable[[str | None], bool], open_: Callable[[_SharedReplay], None]
+    ) -> None:
         self.key = key
         self.board = Newest(BEGIN)
         self.page: ReplayPage | None = None
@@ -82,7 +84,7 @@ class Replays:
             allowed: Whether a token lets one look.
         """
         self._shelf, self._clock, self._allowed = shelf, clock, allowed
-        self._replays: dict[_Key, _Replay] = {}
+        self._replays: dict[_Key, _SharedReplay] = {}
         self._running = False
 
     @property
@@ -135,7 +137,7 @@ class Replays:
                 return
         await websocket.close()
 
-    def _asked(self, query: Mapping[str, str]) -> _Replay:
+    def _asked(self, query: Mapping[str, str]) -> _SharedReplay:
         key = _key(query)
         for name in key.names:
             self._shelf.path(name)
@@ -143,14 +145,14 @@ class Replays:
         if replay is None:
             if len(self._replays) >= _WAITING:
                 raise InvalidValueError("replays", len(self._replays) + 1, f"at most {_WAITING}")
-            replay = self._replays[key] = _Replay(key, self._allowed, self._start)
+            replay = self._replays[key] = _SharedReplay(key, self._allowed, self._start)
         return replay
 
-    def _forget(self, replay: _Replay) -> None:
+    def _forget(self, replay: _SharedReplay) -> None:
         if self._replays.get(replay.key) is replay:
             del self._replays[replay.key]
 
-    def _start(self, replay: _Replay) -> None:
+    def _start(self, replay: _SharedReplay) -> None:
         if self.open >= MOST:
             idle = [one for one in self._replays.values() if one.task is not None and not one.board.readers]
             if not idle:
@@ -162,7 +164,7 @@ class Replays:
         if self._running:
             replay.task = asyncio.create_task(self._play(replay))
 
-    async def _play(self, replay: _Replay) -> None:
+    async def _play(self, replay: _SharedReplay) -> None:
         """Open it, play it while somebody looks, close it."""
         try:
             paths = [self._shelf.path(name) for name in replay.key.names]
@@ -174,7 +176,7 @@ class Replays:
             replay.page = None
             self._forget(replay)
 
-    async def _show(self, replay: _Replay, playback: Playback) -> None:
+    async def _show(self, replay: _SharedReplay, playback: Playback) -> None:
         def first(now: float) -> None:
             if playback.growing:
                 playback.seek(playback.span[1], now=now)

@@ -38,7 +38,7 @@ def checked_name(name: object) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ShelfEntry:
     """A recording in the directory."""
 
     name: str
@@ -65,7 +65,7 @@ class Shelf:
     def __init__(self, directory: Path) -> None:
         """Look at a directory, which needn't be there yet."""
         self.directory = directory
-        self._known: OrderedDict[tuple[str, int, int], Entry] = OrderedDict()
+        self._known: OrderedDict[tuple[str, int, int], ShelfEntry] = OrderedDict()
 
     def place(self, name: object) -> Path:
         """Where a new recording goes; the directory is made if it's missing.
@@ -95,7 +95,7 @@ class Shelf:
             raise InvalidValueError("recording", checked, "one that is listed")
         return path
 
-    def entries(self, growing: str | None = None) -> tuple[list[Entry], int]:
+    def entries(self, growing: str | None = None) -> tuple[list[ShelfEntry], int]:
         """What is there, the newest first, and how many more there are. Takes a while: call it in a thread.
 
         Args:
@@ -117,7 +117,7 @@ class Shelf:
             key = name, state.st_size, state.st_mtime_ns
             known = self._known.get(key)
             if known is None:
-                known = Entry(name, state.st_size, state.st_mtime)
+                known = ShelfEntry(name, state.st_size, state.st_mtime)
                 if left > 0 and name != growing:
                     left -= 1
                     known = self._known[key] = _looked_into(self.directory / name, known)
@@ -127,14 +127,14 @@ class Shelf:
         return entries, max(len(found) - LISTED, 0)
 
 
-def _looked_into(path: Path, entry: Entry) -> Entry:
+def _looked_into(path: Path, entry: ShelfEntry) -> ShelfEntry:
     facts = entry.name, entry.size, entry.changed
     if entry.size > LOOKED_INTO:
-        return Entry(*facts, problem="too large for this page: vrs replay opens it", playable=False)
+        return ShelfEntry(*facts, problem="too large for this page: vrs replay opens it", playable=False)
     try:
         with open_recording(path) as recording:
             start, end = recording.span
             session, damage = recording.session, recording.damage
-            return Entry(*facts, session.began, end - start, str(damage) if damage else "")
+            return ShelfEntry(*facts, session.began, end - start, str(damage) if damage else "")
     except FormatError as error:
-        return Entry(*facts, problem=str(error).removeprefix(f"{path}: "), playable=False)
+        return ShelfEntry(*facts, problem=str(error).removeprefix(f"{path}: "), playable=False)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import _status
-from interfaces.lab import PAPERS, Claim, Findings, Paper, Part, Study, Table, papers, reproduce
+from interfaces.lab import PAPERS, Claim, Findings, Paper, PaperPart, Study, Table, papers, reproduce
 from interfaces.lab.doulgeri import agreement, broadcasting, causality, delays, dragging, encoding, jitter, segments
 from interfaces.lab.output import rich_tables, write
 from interfaces.lab.running import joined
@@ -40,14 +40,14 @@ def add_up(study: Study, found: tuple[float, ...]) -> Findings:
     return Findings(claims, tables, (), (Claim("quick", "", "≤ 1", 0.5, True),))
 
 
-TOY = Paper("toy", "Nobody: Nothing", (Part("toy", double, add_up, ("1", "3")),))
+TOY = Paper("toy", "Nobody: Nothing", (PaperPart("toy", double, add_up, ("1", "3")),))
 
 
-def only(name: str) -> Part:
+def only(name: str) -> PaperPart:
     return next(part for part in PAPERS["doulgeri"].parts if name in part.title)
 
 
-def measured(part: Part, study: Study = SMALL) -> Findings:
+def measured(part: PaperPart, study: Study = SMALL) -> Findings:
     return part.conclude(study, tuple(part.work(study, case) for case in part.cases))
 
 

@@ -39,7 +39,7 @@ SOURCE: Final = f"Section VII, (e); {OWN_BAR}"
 CASES: Final = ("late", "blocked", "lossless", "lossy")
 
 
-class Seen(NamedTuple):
+class AgreementResult(NamedTuple):
     """One run."""
 
     agreed: float
@@ -81,7 +81,7 @@ def _watch(lab: Laboratory, since: float) -> tuple[float, Array, Array]:
     return float(agreed), np.array(t), np.array(gaps)
 
 
-def _seen(lab: Laboratory, since: float, unlinked: float) -> Seen:
+def _seen(lab: Laboratory, since: float, unlinked: float) -> AgreementResult:
     agreed, t, gaps = _watch(lab, since)
     made: list[Correction] = lab.operator.corrections
     after = [c.t - since for c in made if c.t >= since]
@@ -91,7 +91,7 @@ def _seen(lab: Laboratory, since: float, unlinked: float) -> Seen:
         np.abs(timeline.sample(grid, derivative=k) / top).max()
         for k, top in ((1, limits.qd_max), (2, limits.qdd_max))
     ]
-    return Seen(
+    return AgreementResult(
         agreed,
         min(after, default=np.inf),
         tuple(float(np.abs(c.error).max()) for c in made),
@@ -120,7 +120,7 @@ def _give(lab: Laboratory, acts: tuple[Act, ...]) -> float:
     return max(act.t for act in acts)
 
 
-def talk(seed: int, length: float, way: Conditions, D: float | None) -> Seen:
+def talk(seed: int, length: float, way: Conditions, D: float | None) -> AgreementResult:
     """Commands for some seconds, then quiet."""
     acts = script(np.random.default_rng((seed, 20)), length)
     lab = _lab(seed, way, D)
@@ -131,7 +131,7 @@ def talk(seed: int, length: float, way: Conditions, D: float | None) -> Seen:
     return seen._replace(unlinked=apart(plain, lab.robot.engine.timeline, lab.now))
 
 
-def block(seed: int) -> Seen:
+def block(seed: int) -> AgreementResult:
     """The real arm is held in the middle of a move."""
     rng = np.random.default_rng((seed, 22))
     lab = _lab(seed, Conditions(delay=ConstantDelay("constant", DELAY)), None)
@@ -149,7 +149,7 @@ def block(seed: int) -> Seen:
     return seen._replace(unlinked=apart(before, lab.robot.engine.timeline, lab.now))
 
 
-def work(study: Study, case: str) -> list[Seen]:
+def work(study: Study, case: str) -> list[AgreementResult]:
     """Measure a case for every seed."""
     seeds = range(study.seed + 700, study.seed + 700 + study.runs)
     length = min(study.length, 15.0)
@@ -163,7 +163,7 @@ def work(study: Study, case: str) -> list[Seen]:
 
 def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     """How soon they agree, and by how much the virtual robot was corrected."""
-    cases: dict[str, list[Seen]] = dict(zip(CASES, found, strict=True))
+    cases: dict[str, list[AgreementResult]] = dict(zip(CASES, found, strict=True))
     claims: list[Claim] = []
     names = {
         "late": f"commands late by {DELAY + SHORT:g} s at the robot",
@@ -260,7 +260,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     return Findings(tuple(claims), (table,), (picture,))
 
 
-def _paint(canvas: Canvas, cases: dict[str, list[Seen]]) -> None:
+def _paint(canvas: Canvas, cases: dict[str, list[AgreementResult]]) -> None:
     axes = canvas.subplots(1, 2, sharey=True)
     titles = ("after the last of some late commands", "after the real arm was blocked")
     for ax, case, title in zip(axes, ("late", "blocked"), titles, strict=True):

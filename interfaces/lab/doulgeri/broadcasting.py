@@ -10,7 +10,7 @@ import numpy as np
 from interfaces import Designer, Viewer
 from interfaces.broadcast import Broadcaster
 from interfaces.lab.claims import Claim, Findings, Study, Table
-from interfaces.lab.doulgeri.script import HOME, MODEL, Joined, target
+from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, target
 from interfaces.lab.drawing import REAL, VIRTUAL, draw
 from interfaces.messages import Broadcast, Form, Reply
 from interfaces.ports import RemotePort
@@ -48,7 +48,7 @@ class Arrivals:
 def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
     """All rates at once, on one engine that moves; then the time that a frame takes."""
     rng = np.random.default_rng((study.seed, 4))
-    joined = Joined(0.0)
+    joined = ScriptedSite(0.0)
     broadcasters = [joined.site.broadcast(rate) for rate in RATES]
     taps: dict[int, list[Arrivals]] = {rate: [] for rate in RATES}
     for rate in RATES:

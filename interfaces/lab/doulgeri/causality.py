@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces import Designer
 from interfaces.lab.claims import Claim, Findings, Study
-from interfaces.lab.doulgeri.script import HOME, MODEL, Joined, script, target
+from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, script, target
 from interfaces.link import Conditions, ConstantDelay, LinkConditions
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
@@ -50,7 +50,7 @@ def late(lateness: Lateness) -> tuple[Receipt, float, float]:
 def over_a_link(D: float, seed: int, length: float) -> tuple[int, int, int]:
     """Commands in time by the transformed inequality, those it tells rightly, and how many there were."""
     rng = np.random.default_rng(seed)
-    joined = Joined(D)
+    joined = ScriptedSite(D)
     designer = Designer(joined.connect(D_F, D_B))
     joined.add(designer)
     ahead = []

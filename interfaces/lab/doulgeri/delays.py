@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces import Designer, Viewer
 from interfaces.lab.claims import Claim, Findings, Study, Table
-from interfaces.lab.doulgeri.script import Joined, arrivals, target
+from interfaces.lab.doulgeri.script import ScriptedSite, arrivals, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
 from interfaces.messages import Broadcast, Form, FrameStatus, Outcome, Reply
@@ -34,7 +34,7 @@ NANOSECONDS: Final = 5e-9
 """The engine's clock reads whole nanoseconds [s]."""
 
 
-class Setting(NamedTuple):
+class OffsetSetting(NamedTuple):
     """A clock offset, and how far ahead frames are."""
 
     title: str
@@ -54,15 +54,15 @@ class Setting(NamedTuple):
 
 
 SETTINGS: Final = {
-    "0": Setting("D = 0", 0.0, 0.0, "Fig. 4"),
-    "-Df": Setting("D = −D_f", -D_F, 0.0, "Fig. 5"),
-    "-Df, predicted": Setting("D = −D_f, frames for t_c + D_f + D_b", -D_F, D_F + D_B, "Section IV-A"),
-    "+Db": Setting("D = +D_b", D_B, 0.0, "Fig. 6"),
+    "0": OffsetSetting("D = 0", 0.0, 0.0, "Fig. 4"),
+    "-Df": OffsetSetting("D = −D_f", -D_F, 0.0, "Fig. 5"),
+    "-Df, predicted": OffsetSetting("D = −D_f, frames for t_c + D_f + D_b", -D_F, D_F + D_B, "Section IV-A"),
+    "+Db": OffsetSetting("D = +D_b", D_B, 0.0, "Fig. 6"),
 }
 CASES: Final = (*SETTINGS, "leads")
 
 
-class Seen(NamedTuple):
+class DelayResult(NamedTuple):
     """One run."""
 
     lateness: tuple[float, ...]
@@ -79,7 +79,7 @@ class Seen(NamedTuple):
     """Share of the frames in whose lead a command was carried out."""
 
 
-class Sent(NamedTuple):
+class LinkTraffic(NamedTuple):
     """What crossed the link, for the timing diagrams; users' time but where it says otherwise [s]."""
 
     commands: tuple[tuple[float, float], ...]
@@ -106,10 +106,10 @@ class Tap:
             self.outcomes.setdefault(message.number, message.made_at)
 
 
-def run(setting: Setting, seed: int, length: float) -> tuple[Seen, Sent]:
+def run(setting: OffsetSetting, seed: int, length: float) -> tuple[DelayResult, LinkTraffic]:
     """Commands that come at random, each to be carried out at once, over constant delays."""
     rng = np.random.default_rng(seed)
-    joined = Joined(setting.D)
+    joined = ScriptedSite(setting.D)
     broadcaster = joined.site.broadcast(RATE, lead=setting.lead)
     port = joined.connect(D_F, D_B)
     designer, viewer = Designer(port), Viewer(port, rate=RATE, form=Form.FRAMES)
@@ -132,7 +132,7 @@ def run(setting: Setting, seed: int, length: float) -> tuple[Seen, Sent]:
     busy = [i for i, frame in enumerate(tap.frames) if 1.0 + setting.lead <= frame[1] - setting.D <= 1.0 + length]
     verdicts = [broadcaster.status(tap.numbers[i]) for i in busy]
     share = float(np.mean([v is not None and v.status is FrameStatus.FALSIFIED for v in verdicts]))
-    seen = Seen(
+    seen = DelayResult(
         tuple(late),
         float(np.mean(postponed)) if postponed else 0.0,
         (float(ages.min()), float(ages.mean()), float(ages.max())),
@@ -140,7 +140,7 @@ def run(setting: Setting, seed: int, length: float) -> tuple[Seen, Sent]:
         share,
         foretold([tap.frames[i] for i in busy], began),
     )
-    return seen, Sent(
+    return seen, LinkTraffic(
         tuple(zip(issued.tolist(), (tap.outcomes[i.number] for i in designer.history), strict=True)),
         tuple(tap.frames),
     )
@@ -158,7 +158,7 @@ def foretold(frames: list[tuple[float, float, float]], began: np.ndarray) -> flo
 def leads(seed: int, length: float) -> tuple[float, ...]:
     """Share of falsified frames for each lead, all broadcast at once, D = −D_f."""
     rng = np.random.default_rng(seed)
-    joined = Joined(-D_F)
+    joined = ScriptedSite(-D_F)
     broadcasters = [joined.site.broadcast(RATE, lead=lead) for lead in LEADS]
     designer = Designer(joined.connect(D_F, D_B))
     joined.add(designer)
@@ -185,7 +185,7 @@ def conclude(study: Study, found: tuple[object, ...]) -> Findings:
     diagrams = []
     for case, result in zip(SETTINGS, found, strict=False):
         setting = SETTINGS[case]
-        seen, sent = cast("tuple[list[Seen], Sent]", result)
+        seen, sent = cast("tuple[list[DelayResult], LinkTraffic]", result)
         claims += _claims(study, setting, seen)
         rows.append(_row(study, setting, seen))
         diagrams.append((setting, sent))
@@ -222,7 +222,7 @@ def conclude(study: Study, found: tuple[object, ...]) -> Findings:
     return Findings(tuple(claims), (table,), pictures)
 
 
-def _claims(study: Study, setting: Setting, seen: list[Seen]) -> list[Claim]:
+def _claims(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> list[Claim]:
     late = np.concatenate([s.lateness for s in seen])
     off = float(np.abs(late - setting.lateness).max())
     low, high = min(s.ages[0] for s in seen), max(s.ages[2] for s in seen)
@@ -288,7 +288,7 @@ def _equals(share: Estimate, expected: float) -> bool:
     return share.low <= expected <= share.high or abs(share.value - expected) <= 0.1 * expected
 
 
-def _row(study: Study, setting: Setting, seen: list[Seen]) -> tuple[float | str, ...]:
+def _row(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> tuple[float | str, ...]:
     late = np.concatenate([s.lateness for s in seen])
     share = bootstrap([100 * s.falsified for s in seen], study.seed)
     return (
@@ -347,14 +347,14 @@ def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
     legend(ax, place="upper left")
 
 
-def _paint(canvas: Canvas, diagrams: list[tuple[Setting, Sent]]) -> None:
+def _paint(canvas: Canvas, diagrams: list[tuple[OffsetSetting, LinkTraffic]]) -> None:
     rows = canvas.subplots(len(diagrams), 1, sharex=True)
     for ax, (setting, sent) in zip(rows, diagrams, strict=True):
         _timing(ax, setting, sent)
     rows[-1].set_xlabel("time from the issue of the command, s")
 
 
-def _timing(ax: Axes, setting: Setting, sent: Sent) -> None:
+def _timing(ax: Axes, setting: OffsetSetting, sent: LinkTraffic) -> None:
     """A command from the user's line to the engine's, and a frame back; each line has its own clock."""
     issued, came = sent.commands[0]
     arrived = came - setting.D - issued

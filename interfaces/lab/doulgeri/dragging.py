@@ -36,7 +36,7 @@ SOURCE: Final = f"Section VII, (c); {OWN_BAR}"
 OVER: Final = 1e-9
 
 
-class Seen(NamedTuple):
+class DraggingResult(NamedTuple):
     """One run of dragging."""
 
     following: float
@@ -76,7 +76,7 @@ def hand(rng: np.random.Generator, length: float) -> tuple[Array, Array]:
     return p, np.gradient(p, PERIOD, axis=0)
 
 
-def drag(seed: int, length: float) -> Seen:
+def drag(seed: int, length: float) -> DraggingResult:
     """A hand drags the virtual tool for some seconds."""
     rng = np.random.default_rng((seed, 9))
     offsets, speeds = hand(rng, length)
@@ -110,7 +110,7 @@ def drag(seed: int, length: float) -> Seen:
     distance = np.linalg.norm(virtual - pointer, axis=1)
     aside = np.linalg.norm(tool(operator.engine.timeline.sample(play.p)) - real, axis=1)
     used = (np.abs(reference.qd) / limits.qd_max).max(), (np.abs(reference.qdd) / limits.qdd_max).max()
-    return Seen(
+    return DraggingResult(
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
         _lag(t, pointer, virtual, 1.0),
@@ -133,12 +133,12 @@ def _lag(t: ArrayLike, hand: ArrayLike, tool: ArrayLike, longest: float) -> floa
     return np.inf if lag is None else lag
 
 
-def work(study: Study, case: str) -> Seen | None:
+def work(study: Study, case: str) -> DraggingResult | None:
     """Drag with one hand; None where that's more than there are runs."""
     return drag(study.seed + int(case), min(study.length, 10.0)) if int(case) < study.runs else None
 
 
-def conclude(study: Study, found: tuple[Seen | None, ...]) -> Findings:
+def conclude(study: Study, found: tuple[DraggingResult | None, ...]) -> Findings:
     """Claims for all hands together, a table with a row a hand."""
     seen = [s for s in found if s is not None]
     following = bootstrap([s.following for s in seen], study.seed)
@@ -199,7 +199,7 @@ def conclude(study: Study, found: tuple[Seen | None, ...]) -> Findings:
     return Findings(claims, (Table("dragging", title, columns, rows),), (picture,))
 
 
-def _paint(canvas: Canvas, seen: Seen) -> None:
+def _paint(canvas: Canvas, seen: DraggingResult) -> None:
     left, right = canvas.subplots(1, 2, width_ratios=(1.0, 1.5))
     middle = seen.hand[0]
     for points, colour, style, name in (

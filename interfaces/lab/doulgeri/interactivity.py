@@ -9,7 +9,7 @@ import numpy as np
 from interfaces import Designer, Viewer
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.agreement import AGREE, apart
-from interfaces.lab.doulgeri.script import HOME, Joined, target
+from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.messages import Form
 from interfaces.playhead import FASTEST, QUICKEST, Mode
@@ -33,11 +33,11 @@ OVER: Final = 1e-6
 EDITS: Final = ("retime", "cancel", "via", "pace", "stop", "resume", "undo")
 
 
-class Session:
+class InteractiveSession:
     """A designer, viewers of both forms, and one who looks at the past, all far from the engine."""
 
     def __init__(self) -> None:
-        self.joined = Joined(-D_F)
+        self.joined = ScriptedSite(-D_F)
         self.joined.site.broadcast(RATE, lead=D_F + D_B)
         port = self.joined.connect(D_F, D_B)
         self.designer = Designer(port)
@@ -86,7 +86,7 @@ def edits(rng: np.random.Generator) -> dict[str, float]:
     """Each kind of edit under way, a session each: how long until the committed path shows it [s]."""
     shown: dict[str, float] = {}
     for kind in EDITS:
-        session = Session()
+        session = InteractiveSession()
         session.move(rng, 0.0)
         session.issue(MotionCommand(target(rng), execute_at=session.joined.engine.timeline.end + 0.5, speed=0.3))
         if kind == "resume":
@@ -123,7 +123,7 @@ class Scrubbed(NamedTuple):
 
 def scrub(rng: np.random.Generator) -> Scrubbed:
     """Seek, pause and go live, while commands come."""
-    session = Session()
+    session = InteractiveSession()
     for _ in range(8):
         session.move(rng, 0.0)
         session.joined.run(session.now + 1.0)
@@ -166,7 +166,7 @@ def scrub(rng: np.random.Generator) -> Scrubbed:
 def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
     """Measure what our interfaces do."""
     rng = np.random.default_rng((study.seed, 12))
-    session = Session()
+    session = InteractiveSession()
     shown = []
     for _ in range(study.runs):
         shown.append(session.move(rng, 0.0))

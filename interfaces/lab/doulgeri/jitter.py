@@ -37,7 +37,7 @@ OVER: Final = 1e-9
 SOURCE: Final = f"Section VII, (a); {OWN_BAR}"
 
 
-class Seen(NamedTuple):
+class JitterResult(NamedTuple):
     """One run with one way of choosing the offset."""
 
     mean: float
@@ -76,7 +76,7 @@ class Trace(NamedTuple):
     """How long they took [s]."""
 
 
-def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Seen, Trace]:
+def run(profile: str, seed: int, length: float, D: float | None) -> tuple[JitterResult, Trace]:
     """Both sites over datagrams with that delay each way.
 
     Args:
@@ -115,7 +115,7 @@ def _done(lab: Laboratory, sent: int) -> bool:
     return report is not None and report.executed >= sent and report.play > max(t.end for t in timelines)
 
 
-def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Seen:
+def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> JitterResult:
     limits = MODEL.limits
     play, reference = played(lab)
     leader, follower = tool(replay(acts).timeline.sample(lab.t)), tool(reference.q)
@@ -140,7 +140,7 @@ def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Se
     assert path.path_error_mean is not None
     assert path.path_error_p95 is not None
     assert path.path_error_max is not None
-    return Seen(
+    return JitterResult(
         path.path_error_mean,
         path.path_error_p95,
         path.path_error_max,
@@ -182,8 +182,8 @@ class Result(NamedTuple):
 
     D: float
     """The fixed offset [s]."""
-    adaptive: tuple[Seen, ...]
-    fixed: tuple[Seen, ...]
+    adaptive: tuple[JitterResult, ...]
+    fixed: tuple[JitterResult, ...]
     traces: tuple[Trace, Trace]
     """Of the first run."""
 
@@ -324,7 +324,7 @@ def _differences(results: dict[str, Result], field: str) -> Array:
     ]).T  # fmt: skip
 
 
-def _row(study: Study, case: str, how: str, D: float, seen: tuple[Seen, ...]) -> tuple[Any, ...]:
+def _row(study: Study, case: str, how: str, D: float, seen: tuple[JitterResult, ...]) -> tuple[Any, ...]:
     late = bootstrap([s.time_difference for s in seen], study.seed)
     return (
         case,

@@ -87,7 +87,7 @@ def tool(q: Array) -> Array:
     return points
 
 
-class Joined:
+class ScriptedSite:
     """A site and its clients, in virtual time; `now` is the users' [s]."""
 
     def __init__(self, D: float, q: Array = HOME) -> None:

@@ -26,7 +26,7 @@ FIGURES: Final = ("path_error_mean", "time_difference_mean")
 
 
 @dataclass(frozen=True, slots=True)
-class Attribution:
+class DriveAttribution:
     """A figure of a case, taken apart."""
 
     figure: str
@@ -38,7 +38,7 @@ class Attribution:
     """With all causes off."""
 
 
-def attributed(case: Case, whole: PathComparison | None = None) -> tuple[Attribution, ...]:
+def attributed(case: Case, whole: PathComparison | None = None) -> tuple[DriveAttribution, ...]:
     """Run a case with ever fewer causes of error.
 
     Args:
@@ -56,7 +56,7 @@ def attributed(case: Case, whole: PathComparison | None = None) -> tuple[Attribu
     for figure in FIGURES:
         values: Sequence[float] = [getattr(one, figure) or 0.0 for one in found]
         parts = tuple(a - b for a, b in pairwise(values))
-        made.append(Attribution(figure, values[0], parts, values[-1]))
+        made.append(DriveAttribution(figure, values[0], parts, values[-1]))
     return tuple(made)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LineLeg:
     """To be pursued."""
 
     points: tuple[tuple[float, float], ...]
@@ -17,7 +17,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class TurnLeg:
     """On the spot."""
 
     heading: float
@@ -25,7 +25,7 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class Pause:
+class PauseLeg:
     """Standing."""
 
     duration: float
@@ -33,7 +33,7 @@ class Pause:
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class GoalLeg:
     """A place to get to, by whatever way."""
 
     point: tuple[float, float]
@@ -42,7 +42,7 @@ class Goal:
     """After so long [s] he gives up, and goes on to the next."""
 
 
-Leg = Line | Turn | Pause | Goal
+Leg = LineLeg | TurnLeg | PauseLeg | GoalLeg
 
 
 def share_of(points: Sequence[tuple[float, float]], i: int, x: float, y: float) -> float:

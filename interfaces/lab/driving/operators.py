@@ -15,7 +15,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from interfaces.lab.driving.legs import Goal, Leg, Line, Pause, Turn, point_ahead, share_of, way_left
+from interfaces.lab.driving.legs import GoalLeg, Leg, LineLeg, PauseLeg, TurnLeg, point_ahead, share_of, way_left
 from interfaces.plugin import checked, is_own, own
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import one_of
@@ -103,17 +103,17 @@ class StyledOperator:
     def _wanted(self, t: float, posture: Posture) -> Drive | None:
         """What the leg asks for; None where it's done."""
         leg = self._leg
-        if isinstance(leg, Pause):
+        if isinstance(leg, PauseLeg):
             return STAND if t - self._begun < leg.duration else None
-        if isinstance(leg, Turn):
+        if isinstance(leg, TurnLeg):
             error = wrapped(leg.heading - posture.theta)
             if abs(error) < _TURNED:
                 return None
             w = min(TURN, math.sqrt(2 * 0.5 * TURN_ACCELERATION * abs(error)), 2.0 * abs(error))
             return Drive(0.0, math.copysign(w, error))
-        return self._head_for(leg, t, posture) if isinstance(leg, Goal) else self._pursue(leg, t, posture)
+        return self._head_for(leg, t, posture) if isinstance(leg, GoalLeg) else self._pursue(leg, t, posture)
 
-    def _head_for(self, goal: Goal, t: float, posture: Posture) -> Drive | None:
+    def _head_for(self, goal: GoalLeg, t: float, posture: Posture) -> Drive | None:
         """Straight on, as far as he knows; on the spot where it's far aside."""
         dx, dy = goal.point[0] - posture.x, goal.point[1] - posture.y
         left = math.hypot(dx, dy)
@@ -125,7 +125,7 @@ class StyledOperator:
         v = min(self._speed(t), math.sqrt(2 * 0.8 * ACCELERATION * left))
         return Drive(v * (1.0 - abs(error) / math.radians(90)), 1.2 * error + self._shaken(v))
 
-    def _pursue(self, line: Line, t: float, posture: Posture) -> Drive | None:
+    def _pursue(self, line: LineLeg, t: float, posture: Posture) -> Drive | None:
         points = line.points
         x, y, theta = posture
         # The nearest point of the line, from where it was on.
@@ -169,7 +169,7 @@ def _figure_eight(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]
         while True:
             first = [(radius * math.sin(a), side * radius * (1 - math.cos(a))) for a in angle]
             second = [(radius * math.sin(a), -side * radius * (1 - math.cos(a))) for a in angle[1:]]
-            yield Line(_curve([*first, *second]))
+            yield LineLeg(_curve([*first, *second]))
 
     return Posture(0.0, 0.0, 0.0), "", legs()
 
@@ -183,12 +183,12 @@ def _corridor(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]]:
         corner = [(13.0 + radius * (math.sin(a) - 1), 1.0 + radius * (1 - math.cos(a))) for a in angle]
         there = [(1.0, 1.0), (4.5, 1.0 + abs(side)), (8.5, 1.0 - side), *corner, (13.0, 6.8)]
         while True:
-            yield Line(_curve(there))
-            yield Pause(float(rng.uniform(0.5, 2.0)))
-            yield Turn(-math.pi / 2)
-            yield Line(_curve(there[::-1]))
-            yield Pause(float(rng.uniform(0.5, 2.0)))
-            yield Turn(0.0)
+            yield LineLeg(_curve(there))
+            yield PauseLeg(float(rng.uniform(0.5, 2.0)))
+            yield TurnLeg(-math.pi / 2)
+            yield LineLeg(_curve(there[::-1]))
+            yield PauseLeg(float(rng.uniform(0.5, 2.0)))
+            yield TurnLeg(0.0)
 
     return Posture(1.0, 1.0, 0.0), "lane", legs()
 
@@ -204,7 +204,7 @@ def _slalom(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]]:
         back = [(float(a), 3.9) for a in np.linspace(10.4, 1.2, 47)]
         turn = [(1.2 - 0.7 * math.sin(a), 3.2 + 0.7 * math.cos(a)) for a in np.linspace(0.2, math.pi, 10)]
         while True:
-            yield Line(_curve([*there, *loop, *back, *turn]))
+            yield LineLeg(_curve([*there, *loop, *back, *turn]))
 
     return Posture(1.2, 2.5, 0.0), "slalom", legs()
 
@@ -217,18 +217,18 @@ def _docking(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]]:
         at = 1
         x, y = berths[at]
         while True:
-            yield Line(_curve([(x, y), (x - 1.4, y)]), reverse=True)
-            yield Pause(float(rng.uniform(0.2, 1.0)))
+            yield LineLeg(_curve([(x, y), (x - 1.4, y)]), reverse=True)
+            yield PauseLeg(float(rng.uniform(0.2, 1.0)))
             at = int(rng.choice([k for k in range(len(berths)) if k != at]))
             X, Y = berths[at]
             mid = (float(rng.uniform(1.2, 2.0)), 0.5 * (y + Y))
-            yield Turn(math.atan2(mid[1] - y, mid[0] - (x - 1.4)))
-            yield Line(_curve([(x - 1.4, y), mid]))
-            yield Turn(math.atan2(Y - mid[1], X - 1.4 - mid[0]))
-            yield Line(_curve([mid, (X - 1.4, Y)]))
-            yield Turn(0.0)
-            yield Line(_curve([(X - 1.4, Y), (X, Y)]))
-            yield Pause(float(rng.uniform(0.5, 2.0)))
+            yield TurnLeg(math.atan2(mid[1] - y, mid[0] - (x - 1.4)))
+            yield LineLeg(_curve([(x - 1.4, y), mid]))
+            yield TurnLeg(math.atan2(Y - mid[1], X - 1.4 - mid[0]))
+            yield LineLeg(_curve([mid, (X - 1.4, Y)]))
+            yield TurnLeg(0.0)
+            yield LineLeg(_curve([(X - 1.4, Y), (X, Y)]))
+            yield PauseLeg(float(rng.uniform(0.5, 2.0)))
             x, y = X, Y
 
     return Posture(5.0, 2.2, 0.0), "berths", legs()
@@ -242,9 +242,9 @@ def _wander(rng: np.random.Generator) -> tuple[Posture, str, Iterator[Leg]]:
         while True:
             ends = (8.9, 11.4) if right else (1.1, 3.6)
             for low, high in ((5.6, 6.9), ends):
-                yield Goal((float(rng.uniform(low, high)), float(rng.uniform(1.5, 4.5))), 25.0)
+                yield GoalLeg((float(rng.uniform(low, high)), float(rng.uniform(1.5, 4.5))), 25.0)
             if rng.random() < 0.3:
-                yield Pause(float(rng.uniform(0.5, 2.0)))
+                yield PauseLeg(float(rng.uniform(0.5, 2.0)))
             right = not right
 
     return Posture(1.5, 3.05, 0.0), "fig13", legs()

@@ -11,7 +11,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from interfaces.lab.driving.attribution import CAUSES, Attribution
+from interfaces.lab.driving.attribution import CAUSES, DriveAttribution
 from interfaces.lab.driving.sweep import Group, grouped, paired
 from interfaces.lab.output import write_files
 from interfaces.lab.statistics import LEVEL, RANGE, Estimate
@@ -40,9 +40,9 @@ def _estimate(found: Estimate | None) -> dict[str, Any] | None:
     return value if found.level == LEVEL else value | {"level": found.level}
 
 
-def attributions(chosen: Sequence[Case], found: Sequence[tuple[Attribution, ...]]) -> list[dict[str, Any]]:
+def attributions(chosen: Sequence[Case], found: Sequence[tuple[DriveAttribution, ...]]) -> list[dict[str, Any]]:
     """What each cause does, means over seeds, an entry a combination and figure, as JSON takes them."""
-    groups: dict[tuple[tuple[str, ...], str], list[Attribution]] = {}
+    groups: dict[tuple[tuple[str, ...], str], list[DriveAttribution]] = {}
     for case, parts in zip(chosen, found, strict=True):
         for one in parts:
             groups.setdefault((case.group, one.figure), []).append(one)

@@ -82,10 +82,10 @@ def run(case: Case, driver: Operator | None = None, witness: Witness | None = No
         np.random.default_rng([case.seed, 2]),
     )
     with make_robot(case, driver.start, case.room or driver.room) as body:
-        return _Run(case, driver, link, body, witness).whole()
+        return _DrivingRun(case, driver, link, body, witness).whole()
 
 
-class _Run:
+class _DrivingRun:
     """A run while it goes on."""
 
     def __init__(

@@ -10,7 +10,7 @@ import numpy as np
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, draw
-from interfaces.lab.goals.trial import Found
+from interfaces.lab.goals.trial import MeasuredTrip
 from robots.bullet.rooms import Block, Column, Room
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ DRAWN = 4
 """Trips of each group that are drawn; those that went wrong first."""
 
 
-def maps(found: Sequence[Found]) -> list[Figure]:
+def maps(found: Sequence[MeasuredTrip]) -> list[Figure]:
     """A picture of each group's trips."""
     figures = []
     for group in dict.fromkeys(one.group for one in found):
@@ -34,7 +34,7 @@ def maps(found: Sequence[Found]) -> list[Figure]:
     return figures
 
 
-def _maps(canvas: Canvas, found: Sequence[Found]) -> None:
+def _maps(canvas: Canvas, found: Sequence[MeasuredTrip]) -> None:
     axes = np.ravel(canvas.subplots(math.ceil(len(found) / 2), min(len(found), 2), squeeze=False))
     for ax, one in zip(axes, found, strict=False):
         draw_trip(ax, one)
@@ -44,7 +44,7 @@ def _maps(canvas: Canvas, found: Sequence[Found]) -> None:
     canvas.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8.0, labelcolor=INK)
 
 
-def draw_trip(ax: Axes, one: Found) -> None:
+def draw_trip(ax: Axes, one: MeasuredTrip) -> None:
     """Draw the room and the way that was driven in it."""
     trip, goal = one.trip, one.setting.goal
     draw_room(ax, one.setting.room)

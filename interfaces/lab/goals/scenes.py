@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.lab.goals.trial import Setting, seen_all
+from interfaces.lab.goals.trial import TripSetting, seen_all
 from robots.bullet.rooms import Room
 from robots.ipr.apartments import ApartmentConfig, apartment
 from robots.ipr.chassis import IPR
@@ -43,25 +43,25 @@ Rng = np.random.Generator
 Point = tuple[float, float]
 
 
-def setting(group: str, seed: int, number: int) -> Setting:
+def setting(group: str, seed: int, number: int) -> TripSetting:
     """The number-th trip of a group."""
     return _MAKERS[group](seed, number)
 
 
-def _furniture(seed: int, number: int) -> Setting:
+def _furniture(seed: int, number: int) -> TripSetting:
     return _in_an_apartment(seed, number, 1)
 
 
-def _people(seed: int, number: int) -> Setting:
+def _people(seed: int, number: int) -> TripSetting:
     return _in_an_apartment(seed, number, 2, people=1 + number % 2)
 
 
-def _physics(seed: int, number: int) -> Setting:
+def _physics(seed: int, number: int) -> TripSetting:
     made = _round(seed, number) if number % 3 == 2 else _furniture(seed, number)
     return replace(made, robot="ipr")
 
 
-def _in_an_apartment(seed: int, number: int, group: int, people: int = 0) -> Setting:
+def _in_an_apartment(seed: int, number: int, group: int, people: int = 0) -> TripSetting:
     """A trip in the first apartment that has room for one."""
     rng = _rng(seed, number, group)
     for k in range(_APARTMENTS):
@@ -72,7 +72,7 @@ def _in_an_apartment(seed: int, number: int, group: int, people: int = 0) -> Set
     raise InvalidValueError("apartments", f"{_APARTMENTS} of them", "one with room for a trip")
 
 
-def _round(seed: int, number: int) -> Setting:
+def _round(seed: int, number: int) -> TripSetting:
     """One of three doors on a round is closed for good, and it's on the way that the map has."""
     rng = _rng(seed, number, 3)
     home = _home()
@@ -83,7 +83,7 @@ def _round(seed: int, number: int) -> Setting:
     return _drawn(room, rng, (seed, 3, number), through=(door.x, door.y))
 
 
-def _late(seed: int, number: int) -> Setting:
+def _late(seed: int, number: int) -> TripSetting:
     """The bedroom's door opens after a while."""
     rng = _rng(seed, number, 4)
     home = _home()
@@ -94,7 +94,7 @@ def _late(seed: int, number: int) -> Setting:
     return _drawn(room, rng, (seed, 4, number), through=_doorway(home, only), truth=after)
 
 
-def _shut(seed: int, number: int) -> Setting:
+def _shut(seed: int, number: int) -> TripSetting:
     """The bedroom's door stays closed."""
     rng = _rng(seed, number, 6)
     home = _home()
@@ -103,7 +103,7 @@ def _shut(seed: int, number: int) -> Setting:
     return _drawn(room, rng, (seed, 6, number), through=_doorway(home, only), truth=opened)
 
 
-_MAKERS: Final[dict[str, Callable[[int, int], Setting]]] = {
+_MAKERS: Final[dict[str, Callable[[int, int], TripSetting]]] = {
     FURNITURE: _furniture,
     ROUND: _round,
     LATE: _late,
@@ -144,7 +144,7 @@ def _with_doors(room: Room, timetables: dict[int, tuple[tuple[float, float], ...
 
 def _drawn(
     room: Room, rng: Rng, seed: tuple[int, ...], *, through: Point | None = None, truth: Room | None = None
-) -> Setting:
+) -> TripSetting:
     """A trip that is possible.
 
     Args:
@@ -169,7 +169,7 @@ def _drawn(
         if not _leads(mapped, start, goal, through) or not isinstance(whole.route(start, goal), Route):
             continue
         headings = rng.uniform(-math.pi, math.pi, 2).tolist()
-        return Setting(room, (*start, headings[0]), Goal(*goal, headings[1]), seed)
+        return TripSetting(room, (*start, headings[0]), Goal(*goal, headings[1]), seed)
     raise InvalidValueError("room", room.name, "one with room for a trip")
 
 

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Paper, Part, Reproduction, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Paper, PaperPart, Reproduction, Study, Table
 from interfaces.lab.goals.pictures import maps
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND, SHUT, TITLES, setting
 from interfaces.lab.goals.shortest import Shortest
-from interfaces.lab.goals.trial import Found, seen_all, travel
+from interfaces.lab.goals.trial import MeasuredTrip, seen_all, travel
 from interfaces.lab.output import to_json, write_files
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.ipr.chassis import IPR
@@ -38,18 +38,18 @@ def study_of(goals: int) -> Paper:
     counts[FURNITURE] = max(1, goals - counts[ROUND] - counts[LATE])
     asked = tuple(f"{group}:{k}" for group in ASKED for k in range(counts[group]))
     others = [
-        Part(group, measure, conclude, tuple(f"{group}:{k}" for k in range(counts[group])))
+        PaperPart(group, measure, conclude, tuple(f"{group}:{k}" for k in range(counts[group])))
         for group, conclude in ((SHUT, conclude_shut), (PEOPLE, conclude_people), (PHYSICS, conclude_physics))
     ]
     return Paper(
         "goals",
         "Kim, Han, Kim, Kim, Internet-Based Personal Robot System using Map-Based Localization, 2002, section 4.1",
-        (Part("goals", measure, conclude_asked, asked), *others),
+        (PaperPart("goals", measure, conclude_asked, asked), *others),
         runs=GOALS,
     )
 
 
-def measure(study: Study, case: str) -> Found:
+def measure(study: Study, case: str) -> MeasuredTrip:
     """A trip; the case is its group and number."""
     group, number = case.split(":")
     chosen = setting(group, study.seed, int(number))
@@ -59,10 +59,10 @@ def measure(study: Study, case: str) -> Found:
     mapped, true = (
         Shortest(room, radius).length(begin, end) for room in (chosen.room.known(), seen_all(chosen.room))
     )
-    return Found(group, chosen, travel(chosen), mapped, true)
+    return MeasuredTrip(group, chosen, travel(chosen), mapped, true)
 
 
-def conclude_asked(study: Study, found: tuple[Found, ...]) -> Findings:
+def conclude_asked(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     """What the issue asks for, of the goals among furniture and doors."""
     _, touched = _count(found)
     known = _ratios(found)
@@ -96,7 +96,7 @@ def conclude_asked(study: Study, found: tuple[Found, ...]) -> Findings:
     return Findings(claims, (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_shut(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: ARG001
+def conclude_shut(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  # noqa: ARG001
     """Where there's no way the robot says so."""
     clear = sum(one.trip.state is JourneyState.FAILED and "way" in one.trip.reason for one in found)
     total = len(found)
@@ -107,13 +107,13 @@ def conclude_shut(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: 
     return Findings((claim,), (_each(found),), tuple(maps(found)))
 
 
-def conclude_people(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: ARG001
+def conclude_people(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  # noqa: ARG001
     """Among people who stop for nobody nothing is asked of touches: they run into robots that stand."""
     table = Table("with people", TITLES[PEOPLE], COLUMNS, (_row(PEOPLE, found),))
     return Findings((), (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_physics(study: Study, found: tuple[Found, ...]) -> Findings:  # noqa: ARG001
+def conclude_physics(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  # noqa: ARG001
     """The same with physics."""
     _, touched = _count(found)
     claims = (
@@ -130,23 +130,23 @@ COLUMNS: Final = (
 """Of the table of groups; medians unless they say otherwise."""
 
 
-def _reached(found: Sequence[Found], least: int, where: str = "") -> Claim:
+def _reached(found: Sequence[MeasuredTrip], least: int, where: str = "") -> Claim:
     reached, _ = _count(found)
     what = f"goals of {len(found)}{where} reached within 5 cm and 2 deg"
     return Claim(what, OWN_BAR, f"≥ {least}", reached, reached >= least)
 
 
-def _count(found: Sequence[Found]) -> tuple[int, int]:
+def _count(found: Sequence[MeasuredTrip]) -> tuple[int, int]:
     """Goals that were reached, and on whose way something was touched."""
     return sum(one.trip.arrived for one in found), sum(bool(one.trip.touched) for one in found)
 
 
-def _ratios(found: Sequence[Found]) -> list[float]:
+def _ratios(found: Sequence[MeasuredTrip]) -> list[float]:
     """Of those routes whose length can be compared."""
     return [one.ratio for one in found if math.isfinite(one.ratio)]
 
 
-def _row(group: str, found: Sequence[Found]) -> tuple[Cell, ...]:
+def _row(group: str, found: Sequence[MeasuredTrip]) -> tuple[Cell, ...]:
     trips = [one.trip for one in found]
     there = [trip for trip in trips if trip.arrived]
     ratios = _ratios(found)
@@ -172,14 +172,14 @@ EACH: Final = (
 """Of the table of trips."""
 
 
-def _each(found: Sequence[Found]) -> Table:
+def _each(found: Sequence[MeasuredTrip]) -> Table:
     group = "goals" if len({one.group for one in found}) > 1 else found[0].group
     rows = tuple(_trip(one) for one in found)
     title = "trip by trip" if group == "goals" else f"{TITLES[group]}: trip by trip"
     return Table(f"trips: {group}", title, EACH, rows)
 
 
-def _trip(one: Found) -> tuple[Cell, ...]:
+def _trip(one: MeasuredTrip) -> tuple[Cell, ...]:
     trip, start, goal = one.trip, one.setting.start, one.setting.goal
     lengths = (length if math.isfinite(length) else None for length in (trip.planned, one.mapped, one.true))
     things = ", ".join(dict.fromkeys(touch.thing for touch in trip.touched))

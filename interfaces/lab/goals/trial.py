@@ -30,7 +30,7 @@ NOISES = (0.01, 0.02)
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class TripSetting:
     """Who is to go where."""
 
     room: Room
@@ -74,11 +74,11 @@ class Trip:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class MeasuredTrip:
     """A trip, and the yardsticks of its length."""
 
     group: str
-    setting: Setting
+    setting: TripSetting
     trip: Trip
     mapped: float
     """Length of the shortest way on the map [m]."""
@@ -91,7 +91,7 @@ class Found:
         return self.trip.planned / self.mapped if math.isfinite(self.mapped) else math.nan
 
 
-def body_of(setting: Setting, reality: MobileReality | None = None) -> MobileRobot:
+def body_of(setting: TripSetting, reality: MobileReality | None = None) -> MobileRobot:
     """The robot where it begins, with laser and sonars."""
     noise = NOISES[setting.seed[-1] % len(NOISES)]
     senses = Senses(camera=None, laser=LaserModel(noise=noise))
@@ -103,7 +103,7 @@ def body_of(setting: Setting, reality: MobileReality | None = None) -> MobileRob
     return MobileBody("ipr", setting.start, room=setting.room, reality=reality, rng=rng, senses=senses)
 
 
-class Pilot:
+class TrialPilot:
     """Drives a robot with its navigator, on the posture that its laser gives; notes what happens."""
 
     def __init__(self, body: MobileRobot) -> None:
@@ -138,10 +138,10 @@ class Pilot:
         return self._before
 
 
-def travel(setting: Setting) -> Trip:
+def travel(setting: TripSetting) -> Trip:
     """Let a robot look about, tell it where to go, and drive until it's there or gives up."""
     with body_of(setting) as body:
-        pilot = Pilot(body)
+        pilot = TrialPilot(body)
         while body.time < FIRST_LOOK - 1e-9:
             pilot.step()
         begun, goal = body.time, setting.goal

@@ -44,7 +44,7 @@ CASES: Final = tuple(f"{robot} {profile}" for robot in ROBOTS for profile in PRO
 SECTION: Final = "Section 4"
 
 
-class Seen(NamedTuple):
+class ArchitectureResult(NamedTuple):
     """Figures of a run."""
 
     path: PathComparison
@@ -67,10 +67,10 @@ class Seen(NamedTuple):
         return self.path.path_error_max or 0.0
 
 
-class Found(NamedTuple):
+class ArchitectureSummary(NamedTuple):
     """Of one robot under one network."""
 
-    runs: dict[str, tuple[Seen, ...]]
+    runs: dict[str, tuple[ArchitectureResult, ...]]
     """By composition, a run a seed."""
     first: dict[str, DriveRun]
     """The first seed's runs, for pictures; none but where one is drawn."""
@@ -93,12 +93,12 @@ def case_of(robot: str, profile: str, architecture: str, transport: Transport, s
     return Case(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
 
 
-def seen(drive: DriveRun) -> Seen:
+def seen(drive: DriveRun) -> ArchitectureResult:
     """Sum up a run."""
     match = drive.match()
     driven = match.distance[match.t <= drive.case.length]
     late = match.time_difference[1]
-    return Seen(
+    return ArchitectureResult(
         summed_up(match), _growth(driven), _growth(late), drive.collisions, drive.limits_passed()
     )  # fmt: skip
 
@@ -112,10 +112,10 @@ DRAWN: Final = ("model thu", "micro thu")
 """Cases whose first runs are drawn: like Figures 11, 12 and 15, 16."""
 
 
-def work(study: Study, case: str) -> Found:
+def work(study: Study, case: str) -> ArchitectureSummary:
     """All compositions and seeds of a case."""
     robot, profile = case.split()
-    runs: dict[str, tuple[Seen, ...]] = {}
+    runs: dict[str, tuple[ArchitectureResult, ...]] = {}
     first: dict[str, DriveRun] = {}
     for architecture, transport in COMPOSITIONS:
         found = []
@@ -125,12 +125,12 @@ def work(study: Study, case: str) -> Found:
             if k == 0 and case in DRAWN:
                 first[name(architecture, transport)] = drive
         runs[name(architecture, transport)] = tuple(found)
-    return Found(runs, first)
+    return ArchitectureSummary(runs, first)
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """The paper's claims, then ours."""
-    found: dict[str, Found] = dict(zip(CASES, results, strict=True))
+    found: dict[str, ArchitectureSummary] = dict(zip(CASES, results, strict=True))
     figures = []
     for case in DRAWN:
         robot, profile = case.split()
@@ -140,7 +140,12 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(claims, (_table(found),), tuple(figures))
 
 
-def _pooled(found: dict[str, Found], cases: Sequence[str], who: str, value: Callable[[Seen], float]) -> Array:
+def _pooled(
+    found: dict[str, ArchitectureSummary],
+    cases: Sequence[str],
+    who: str,
+    value: Callable[[ArchitectureResult], float],
+) -> Array:
     """A figure of every run of some cases, (seeds, cases): a seed's operator and his way are the same in all."""
     return np.array([[value(one) for one in found[case].runs[who]] for case in cases]).T
 
@@ -151,7 +156,7 @@ def _above_zero(text: str, source: str, values: Array, seed: int) -> Claim:
     return Claim(text, source, "over 0", estimate.value, estimate.low > 0, estimate.interval)
 
 
-def _papers(study: Study, found: dict[str, Found]) -> tuple[Claim, ...]:
+def _papers(study: Study, found: dict[str, ArchitectureSummary]) -> tuple[Claim, ...]:
     of = partial(_pooled, found)
     sim, micro, heavy = ([f"{robot} {profile}" for profile in PROFILES] for robot in ROBOTS)
     real, slow = (*micro, *heavy), [case for case in sim if not case.endswith("domain")]
@@ -214,7 +219,7 @@ SHARES: Final = {"mon": 0.75, "wed": 0.6, "thu": 0.6}
 class _Asked:
     """Claims about one robot under one network, as they are asked."""
 
-    def __init__(self, study: Study, profile: str, runs: dict[str, tuple[Seen, ...]]) -> None:
+    def __init__(self, study: Study, profile: str, runs: dict[str, tuple[ArchitectureResult, ...]]) -> None:
         self.claims: list[Claim] = []
         self.runs, self._seed, self._profile = runs, study.seed, profile
 
@@ -225,35 +230,35 @@ class _Asked:
         asked = f"{bar:.4g} at most"
         self.claims.append(Claim(f"{self._profile}: {text}", OWN_BAR, asked, value, value <= bar, interval))
 
-    def more(self, text: str, first: str, second: str, value: Callable[[Seen], float]) -> None:
+    def more(self, text: str, first: str, second: str, value: Callable[[ArchitectureResult], float]) -> None:
         """A figure of the first must be above that of the second, seed by seed."""
         pairs = zip(self.runs[first], self.runs[second], strict=True)
         found = bootstrap([value(a) - value(b) for a, b in pairs], self._seed)
         text = f"{self._profile}: {text}: {first} − {second}"
         self.claims.append(Claim(text, OWN_BAR, "over 0", found.value, found.low > 0, found.interval))
 
-    def mean(self, who: str, value: Callable[[Seen], float]) -> float:
+    def mean(self, who: str, value: Callable[[ArchitectureResult], float]) -> float:
         """A figure's mean over seeds."""
         return float(np.mean([value(one) for one in self.runs[who]]))
 
-    def median(self, who: str, value: Callable[[Seen], float]) -> Estimate:
+    def median(self, who: str, value: Callable[[ArchitectureResult], float]) -> Estimate:
         """A figure's median over seeds."""
         return bootstrap([value(one) for one in self.runs[who]], self._seed, median)
 
 
-def _largest(one: Seen) -> float:
+def _largest(one: ArchitectureResult) -> float:
     return 100 * one.worst
 
 
-def _late(one: Seen) -> float:
+def _late(one: ArchitectureResult) -> float:
     return one.late
 
 
-def _speed(one: Seen) -> float:
+def _speed(one: ArchitectureResult) -> float:
     return 100 * (one.path.speed_error or 0.0)
 
 
-def _ours(study: Study, found: dict[str, Found]) -> list[Claim]:
+def _ours(study: Study, found: dict[str, ArchitectureSummary]) -> list[Claim]:
     """What III and `timeline` must show on the 75 kg robot, network by network."""
     claims: list[Claim] = []
     for profile in PROFILES:
@@ -292,7 +297,7 @@ def _kept(asked: _Asked, who: str, *, slow: bool, share: bool) -> None:
     asked.most(f"{who}: collisions and limits passed", 0, broken)
 
 
-def _table(found: dict[str, Found]) -> Table:
+def _table(found: dict[str, ArchitectureSummary]) -> Table:
     rows = []
     for case in CASES:
         robot, profile = case.split()

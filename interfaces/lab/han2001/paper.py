@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from interfaces.lab.claims import Paper, Part
+from interfaces.lab.claims import Paper, PaperPart
 from interfaces.lab.han2001 import architectures, filtering, information
 
 PAPER: Final = Paper(
@@ -12,9 +12,9 @@ PAPER: Final = Paper(
     "Han, Kim, Kim, Kim: Internet Control Architecture for Internet-Based Personal Robot, "
     "Autonomous Robots 10, 2001",
     (
-        Part.single("Information loss", information.work),
-        Part.single("Command filter", filtering.work),
-        Part("Architectures", architectures.work, architectures.conclude, architectures.CASES),
+        PaperPart.single("Information loss", information.work),
+        PaperPart.single("Command filter", filtering.work),
+        PaperPart("Architectures", architectures.work, architectures.conclude, architectures.CASES),
     ),
     length=120.0,
 )

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.jobs import Stage
-from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Paper, Part, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Paper, PaperPart, Study, Table
 from interfaces.lab.drawing import BAD, INK, MUTED, REAL, draw
 from interfaces.lab.goals.pictures import draw_room
-from interfaces.lab.kim2002.scenario import HELLO, JOBS, PLEASE, Played, Scenario, home, play
+from interfaces.lab.kim2002.scenario import HELLO, JOBS, PLEASE, Scenario, ScenarioResult, home, play
 from interfaces.lab.localization.accuracy import conclude_rooms, measure_room
 from interfaces.lab.statistics import bootstrap
 
@@ -35,13 +35,13 @@ ROOMS: Final = ("0", "1")
 """Of the localization."""
 
 
-def measure(study: Study, case: str) -> tuple[Played, ...]:
+def measure(study: Study, case: str) -> tuple[ScenarioResult, ...]:
     """Each `TOGETHER`-th run from the case's number on."""
     numbers = range(int(case), study.runs, TOGETHER)
     return tuple(play(Scenario(int(np.random.SeedSequence([study.seed, k]).generate_state(1)[0]))) for k in numbers)
 
 
-def conclude(study: Study, measured: tuple[tuple[Played, ...], ...]) -> Findings:
+def conclude(study: Study, measured: tuple[tuple[ScenarioResult, ...], ...]) -> Findings:
     """What the paper says of its scenario."""
     found = [measured[k % TOGETHER][k // TOGETHER] for k in range(study.runs)]
     total = len(found)
@@ -65,21 +65,21 @@ def _count(total: int, what: str, good: Sequence[bool]) -> Claim:
     return Claim(what.format(total), SECTION, f"{total}", sum(good), all(good))
 
 
-def _at_a(one: Played) -> bool:
+def _at_a(one: ScenarioResult) -> bool:
     return len(one.stops) == len([job for job in JOBS if job.word == "MOVE"]) and one.stops[-1].off <= NEAR
 
 
-def _posture(study: Study, name: str, k: int, found: Sequence[Played]) -> Claim:
+def _posture(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:
     errors = [100 * one.stops[k].off if len(one.stops) > k else math.inf for one in found]
     return _bounded(f"position error at {name} [cm]: mean", 100 * NEAR, errors, study)
 
 
-def _turn(study: Study, name: str, k: int, found: Sequence[Played]) -> Claim:
+def _turn(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:
     errors = [math.degrees(one.stops[k].turned) if len(one.stops) > k else math.inf for one in found]
     return _bounded(f"heading error at {name} [deg]: mean", NEAR_TURN, errors, study)
 
 
-def _known(study: Study, name: str, k: int, found: Sequence[Played]) -> Claim:
+def _known(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:
     errors = [100 * one.stops[k].lost if len(one.stops) > k else math.inf for one in found]
     return _bounded(f"error of the localization at {name} [cm]: mean", 100 * KNOWN, errors, study)
 
@@ -100,7 +100,7 @@ COLUMNS: Final = (
 """Of the table of runs."""
 
 
-def _table(found: Sequence[Played]) -> Table:
+def _table(found: Sequence[ScenarioResult]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for k, one in enumerate(found):
         offs = [100 * stop.off for stop in one.stops] + [None] * (2 - len(one.stops))
@@ -114,7 +114,7 @@ def _table(found: Sequence[Played]) -> Table:
     return Table("scenario", "the scenario, run by run", COLUMNS, tuple(rows))
 
 
-def _picture(one: Played) -> Figure:
+def _picture(one: ScenarioResult) -> Figure:
     room = home(np.random.default_rng(0))
 
     def paint(canvas: Canvas) -> None:
@@ -135,8 +135,8 @@ PAPER: Final = Paper(
     "kim2002",
     "Kim, Han, Kim, Kim: Internet-Based Personal Robot System using Map-Based Localization",
     (
-        Part("The scenario", measure, conclude, tuple(str(k) for k in range(TOGETHER))),
-        Part("Localization", measure_room, conclude_rooms, ROOMS),
+        PaperPart("The scenario", measure, conclude, tuple(str(k) for k in range(TOGETHER))),
+        PaperPart("Localization", measure_room, conclude_rooms, ROOMS),
     ),
     runs=5,
 )

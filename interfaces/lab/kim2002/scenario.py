@@ -33,7 +33,7 @@ from interfaces.jobs import (
     Voice,
     Wait,
 )
-from interfaces.lab.goals.trial import FIRST_LOOK, Pilot
+from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
 from robots.bullet.rooms import Person, Room
 from robots.ipr.body import Cargo
 from robots.ipr.chassis import IPR, Senses
@@ -71,7 +71,7 @@ class Scenario:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class ScenarioStop:
     """The robot at B, or at A again."""
 
     off: float
@@ -83,7 +83,7 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class ScenarioResult:
     """What happened."""
 
     stage: Stage
@@ -93,7 +93,7 @@ class Played:
     """What the list asked for, in its order."""
     shown: str
     """What was on the screen when the key was pressed."""
-    stops: tuple[Stop, ...]
+    stops: tuple[ScenarioStop, ...]
     """At B and at A."""
     book: tuple[float, float, float] | None
     """Where the book's middle lies at the end, in the robot's frame [m]; None if it was never put on."""
@@ -132,7 +132,7 @@ def home(rng: np.random.Generator) -> Room:
     return replace(room, doors=(front, *inside), people=(guest, walker))
 
 
-def play(scenario: Scenario) -> Played:
+def play(scenario: Scenario) -> ScenarioResult:
     """Run the scenario in PyBullet, in virtual time."""
     from robots.ipr.body import MobileBody
 
@@ -140,15 +140,15 @@ def play(scenario: Scenario) -> Played:
     room = home(rng)
     senses = Senses(camera=None, laser=LaserModel())
     with MobileBody("ipr", room=room, rng=np.random.default_rng([scenario.seed, 2]), senses=senses) as body:
-        return _Play(scenario, room, body).whole()
+        return _ScenarioRun(scenario, room, body).whole()
 
 
-class _Play:
+class _ScenarioRun:
     """A run while it goes on."""
 
     def __init__(self, scenario: Scenario, room: Room, body: MobileBody) -> None:
         self._scenario, self._room, self._body = scenario, room, body
-        self._pilot = Pilot(body)
+        self._pilot = TrialPilot(body)
         self._places = {one.name: Goal(one.x, one.y, one.heading) for one in room.places}
         self._runner = JobRunner()
         self._runner.receive(Load(JobList.of(*JOBS, places=self._places)), now=0.0)
@@ -157,11 +157,11 @@ class _Play:
         """Numbers of the attempts that are carried out; 0 for none."""
         self._asked: list[str] = []
         self._shown = self._shown_at_key = ""
-        self._stops: list[Stop] = []
+        self._stops: list[ScenarioStop] = []
         self._put: tuple[float, float, float] | None = None
         self._passed = math.inf
 
-    def whole(self) -> Played:
+    def whole(self) -> ScenarioResult:
         body, pilot, runner = self._body, self._pilot, self._runner
         begun = brought = pressed = False
         while body.time < LONGEST:
@@ -216,12 +216,12 @@ class _Play:
             case RunArm(attempt):
                 self._runner.receive(Failed(attempt, "there's no arm"), now=now)
 
-    def _stop(self, goal: Goal | None) -> Stop:
+    def _stop(self, goal: Goal | None) -> ScenarioStop:
         assert goal is not None
         assert goal.heading is not None
         x, y, theta = self._body.truth
         told = self._pilot.posture
-        return Stop(
+        return ScenarioStop(
             math.hypot(goal.x - x, goal.y - y), abs(wrapped(goal.heading - theta)),
             math.hypot(told.x - x, told.y - y),
         )  # fmt: skip
@@ -235,11 +235,11 @@ class _Play:
         along, across = abs(c * dx + s * dy - IPR.centre_x), abs(c * dy - s * dx)
         return math.hypot(max(along - IPR.length / 2, 0.0), max(across - IPR.width / 2, 0.0)) - walker.radius
 
-    def _made(self) -> Played:
+    def _made(self) -> ScenarioResult:
         progress, book = self._runner.progress, self._body.cargo[0] if self._body.cargo else None
         on_top = book is not None and book[2] > IPR.height and max(abs(book[0] - IPR.centre_x), abs(book[1])) < 0.2
         slid = math.inf if book is None or self._put is None else math.dist(book[:2], self._put[:2])
-        return Played(
+        return ScenarioResult(
             stage=progress.stage, reason=progress.reason, asked=tuple(self._asked), shown=self._shown_at_key,
             stops=tuple(self._stops), book=book, slid=slid, on_top=on_top, touched=self._body.collisions,
             passed=self._passed, lost=self._pilot.lost, time=self._body.time, track=np.array(self._pilot.track),

@@ -53,7 +53,7 @@ BODIES: Final = ("cubo", "bare")
 
 
 @dataclass(frozen=True, slots=True)
-class Following:
+class FollowingCase:
     """What is run."""
 
     scheme: str = "rsp"
@@ -162,7 +162,7 @@ class PathLeader:
         return round(1000 * (v - half)), round(1000 * (v + half))
 
 
-def make_body(case: Following) -> MobileRobot:
+def make_body(case: FollowingCase) -> MobileRobot:
     """The real robot of a case, at the path's start."""
     rng, reality = np.random.default_rng([case.seed, 1]), MobileReality(dt=0.004)
     if case.body == "bare":
@@ -173,7 +173,7 @@ def make_body(case: Following) -> MobileRobot:
     return CuboBody((0.0, 0.0, 0.0), reality=reality, rng=rng, senses=Senses(sonar=None))
 
 
-def run(case: Following) -> Followed:
+def run(case: FollowingCase) -> Followed:
     """Run a case; the same case gives the same to the last bit.
 
     Raises:
@@ -193,15 +193,15 @@ def run(case: Following) -> Followed:
     )
     link: Link[bytes, bytes] = Link(LinkConditions.symmetric(conditions), np.random.default_rng([case.seed, 2]))
     with make_body(case) as body:
-        return _Run(case, local, robot, link, body, chosen.header).whole()
+        return _FollowingRun(case, local, robot, link, body, chosen.header).whole()
 
 
-class _Run:
+class _FollowingRun:
     """A run while it goes on."""
 
     def __init__(
         self,
-        case: Following,
+        case: FollowingCase,
         local: LocalEnd,
         robot: RobotEnd,
         link: Link[bytes, bytes],

@@ -10,7 +10,7 @@ import numpy as np
 
 from interfaces.lab.claims import Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.drawing import BAD, GOOD, MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.lab.kim2006.following import Followed, Following, run
+from interfaces.lab.kim2006.following import Followed, FollowingCase, run
 from interfaces.lab.statistics import Estimate, bootstrap
 from interfaces.rsp.schemes import SCHEMES
 
@@ -50,7 +50,7 @@ class Pair(NamedTuple):
         return "other" if found.low > 0 else "unclear"
 
 
-class Found(NamedTuple):
+class LinkResult(NamedTuple):
     """One network with one loss."""
 
     delay: str
@@ -71,25 +71,26 @@ def pair(rsp: list[Followed], other: list[Followed]) -> Pair:
     return Pair(tuple(a for a, _ in both), tuple(b for _, b in both))
 
 
-def work(study: Study, case: str) -> list[Found]:
+def work(study: Study, case: str) -> list[LinkResult]:
     """All losses, schemes and seeds of a delay profile."""
     found = []
     for loss in LOSSES:
         runs = {
             name: [
-                run(Following(name, case, loss, study.seed + k, study.length, "bare")) for k in range(study.runs)
+                run(FollowingCase(name, case, loss, study.seed + k, study.length, "bare"))
+                for k in range(study.runs)
             ]
             for name in SCHEMES
         }
         means = {name: tuple(np.mean([one[:8] for one in made], axis=0).tolist()) for name, made in runs.items()}
         pairs = {name: pair(runs["rsp"], made) for name, made in runs.items() if name != "rsp"}
-        found.append(Found(case, loss, means, pairs))
+        found.append(LinkResult(case, loss, means, pairs))
     return found
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """A claim a network and loss, and the table of all schemes."""
-    found: list[Found] = [one for result in results for one in result]
+    found: list[LinkResult] = [one for result in results for one in result]
     claims = tuple(_claim(one) for one in found)
     columns = (
         "delay", "loss", "scheme", "path error [cm]", "largest [cm]", "progress", "age of commands [s]",
@@ -103,7 +104,7 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(claims, (table, _wins(found)), (_drawn(study), _errors(found)))
 
 
-def _claim(one: Found) -> Claim:
+def _claim(one: LinkResult) -> Claim:
     beside = one.pairs["tcp"]
     found = beside.difference
     text = f"{one.delay}, loss {one.loss:g}: path error of RSP − TCP with fixed packets, way that both reached [cm]"
@@ -113,7 +114,7 @@ def _claim(one: Found) -> Claim:
     return Claim(text, SOURCE, "not above 0", 100 * found.value, beside.verdict != "other", ends)
 
 
-def _row(one: Found, name: str) -> tuple[Cell, ...]:
+def _row(one: LinkResult, name: str) -> tuple[Cell, ...]:
     error, largest, progress, age, command, missing, down, up = one.means[name]
     verdict = "" if name == "rsp" else one.pairs[name].verdict.replace("other", name)
     return (
@@ -126,7 +127,7 @@ def _finite(value: float) -> Cell:
     return value if math.isfinite(value) else "never"
 
 
-def _wins(found: list[Found]) -> Table:
+def _wins(found: list[LinkResult]) -> Table:
     """Where each scheme is better than RSP, in what."""
     rows: list[tuple[Cell, ...]] = []
     measures: tuple[tuple[str, Callable[[tuple[float, ...]], float]], ...] = (
@@ -146,13 +147,15 @@ def _wins(found: list[Found]) -> Table:
     return Table("wins", "Where another scheme is better than RSP, by more than 10 %", columns, tuple(rows))
 
 
-def _said(found: list[Found]) -> str:
+def _said(found: list[LinkResult]) -> str:
     return ", ".join(f"{one.delay}/{one.loss:g}" for one in found) or "nowhere"
 
 
 def _drawn(study: Study) -> Figure:
     delay, loss = DRAWN
-    runs = {name: run(Following(name, delay, loss, study.seed, min(study.length, 30.0))) for name in ("rsp", "tcp")}
+    runs = {
+        name: run(FollowingCase(name, delay, loss, study.seed, min(study.length, 30.0))) for name in ("rsp", "tcp")
+    }
 
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
@@ -168,7 +171,7 @@ def _drawn(study: Study) -> Figure:
     return draw("paths", "Path following, Fig. 11", paint, height=4.2)
 
 
-def _errors(found: list[Found]) -> Figure:
+def _errors(found: list[LinkResult]) -> Figure:
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
         names = [f"{one.delay}\n{one.loss:g}" for one in found]

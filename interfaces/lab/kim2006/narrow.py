@@ -7,27 +7,27 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from interfaces.lab.claims import Claim, Findings, Study, Table
-from interfaces.lab.kim2006.following import Following, run
+from interfaces.lab.kim2006.following import FollowingCase, run
 from interfaces.lab.statistics import bootstrap
 
 CASES: Final = ("16", "64", "inf")
 """Bandwidth either way [kbit/s]."""
 
 
-class Found(NamedTuple):
+class BandwidthResult(NamedTuple):
     """Of one bandwidth: T fitted, and fixed at 20 ms."""
 
     fitted: list[tuple[float, ...]]
     fixed: list[tuple[float, ...]]
 
 
-def work(study: Study, case: str) -> Found:
+def work(study: Study, case: str) -> BandwidthResult:
     """All seeds of a bandwidth, a constant delay of 20 ms."""
 
     def made(adaptive: bool) -> list[tuple[float, ...]]:
         return [
             run(
-                Following(
+                FollowingCase(
                     "rsp",
                     "constant:0.02",
                     0.0,
@@ -41,7 +41,7 @@ def work(study: Study, case: str) -> Found:
             for k in range(study.runs)
         ]
 
-    return Found(made(True), made(False))
+    return BandwidthResult(made(True), made(False))
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:

@@ -35,7 +35,7 @@ CURVE: Final = 12.0
 SOURCE: Final = "Section IV-B, Fig. 10"
 
 
-class Sent(NamedTuple):
+class SentPackets(NamedTuple):
     """Packets down in a run."""
 
     t: tuple[float, ...]
@@ -55,7 +55,7 @@ def scenario(t: float, length: float, duty: float) -> bool:
     return math.floor(t % third / T + 0.5) * T >= third * (1.0 - duty) - 1e-9
 
 
-def perform(length: float, duty: float, *, sealed: bool = False) -> Sent:
+def perform(length: float, duty: float, *, sealed: bool = False) -> SentPackets:
     """Let CUBO move lip and arms for a time [s], with music for a share of it; the link is perfect."""
     model, rng = cubo_model(), np.random.default_rng(5)
     keys = Keyring({Rank.OPERATOR: b"k" * 32}) if sealed else None
@@ -82,7 +82,7 @@ def perform(length: float, duty: float, *, sealed: bool = False) -> Sent:
             t.append(now)
             sizes.append(size)
         robot.streams.take(speaker)
-    return Sent(tuple(t), tuple(sizes), robot.streams.missing, robot.streams.overflowed)
+    return SentPackets(tuple(t), tuple(sizes), robot.streams.missing, robot.streams.overflowed)
 
 
 def _exchange(local: LocalCore, robot: RobotCore, now: float) -> list[int]:
@@ -132,7 +132,7 @@ def work(study: Study, case: str) -> Findings:  # noqa: ARG001
     return Findings(claims, (table,), (_sizes(found), _curve(curve, share, measured)))
 
 
-def _sizes(found: Sent) -> Figure:
+def _sizes(found: SentPackets) -> Figure:
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
         ax.step(found.t, found.sizes, where="post", color=VIRTUAL, linewidth=1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from interfaces.lab.claims import Paper, Part
+from interfaces.lab.claims import Paper, PaperPart
 from interfaces.lab.kim2006 import links, narrow, packets
 
 PAPER: Final = Paper(
@@ -12,9 +12,9 @@ PAPER: Final = Paper(
     "Kim, Suh, Kim, Oh: A novel real-time control architecture for Internet-based Thin-client robot; "
     "Simulacrum-based approach",
     (
-        Part.single("Variable packet size", packets.work),
-        Part("Path following", links.work, links.conclude, links.CASES),
-        Part("Narrow links", narrow.work, narrow.conclude, narrow.CASES),
+        PaperPart.single("Variable packet size", packets.work),
+        PaperPart("Path following", links.work, links.conclude, links.CASES),
+        PaperPart("Narrow links", narrow.work, narrow.conclude, narrow.CASES),
     ),
     length=30.0,
 )

@@ -9,14 +9,14 @@ from typing import Final
 import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Study, Table
-from interfaces.lab.localization.pictures import Scene, scenes
+from interfaces.lab.localization.pictures import DrawnDrive, scenes
 from interfaces.lab.localization.trial import (
     CONTROL,
     STILL,
-    Listener,
+    PostureErrors,
+    PostureSource,
     Reckoning,
     Record,
-    Track,
     as_built,
     body_of,
     drive,
@@ -71,8 +71,8 @@ class RoomFound:
     collisions: int
     lines: tuple[int, int]
     """Of the floor-plan map and of the built one."""
-    tracks: dict[str, Track]
-    scene: Scene | None
+    tracks: dict[str, PostureErrors]
+    scene: DrawnDrive | None
     """To be drawn; of the first room."""
 
 
@@ -86,7 +86,7 @@ def measure_room(study: Study, case: str) -> RoomFound:
         builder = MapBuilder(body.truth)
         drive(body, BUILDING * study.length + STILL, wander(first, still=STILL, thorough=True), {"": builder})
     built = builder.built(room.name)
-    scene = Scene(room, plan, built) if number == 0 else None
+    scene = DrawnDrive(room, plan, built) if number == 0 else None
     record = _with_all(study, number, plan, built, scene)
     slow = setting(room, number, SLOW_SWEEP, (study.seed, number, 2))
     with body_of(slow) as body:
@@ -100,13 +100,13 @@ def measure_room(study: Study, case: str) -> RoomFound:
     )  # fmt: skip
 
 
-def _with_all(study: Study, number: int, plan: GspMap, built: GspMap, scene: Scene | None) -> Record:
+def _with_all(study: Study, number: int, plan: GspMap, built: GspMap, scene: DrawnDrive | None) -> Record:
     room = furnished(study.seed, number)
     chosen = setting(room, number, SWEEP, (study.seed, number, 1))
     with body_of(chosen) as body:
         localizer = Localizer(plan, body.truth)
         drawn = as_built(plan, np.random.default_rng([study.seed, number, 3]))
-        everybody: dict[str, Listener] = {
+        everybody: dict[str, PostureSource] = {
             PLAN: localizer,
             AS_BUILT: Localizer(drawn, body.truth),
             BUILT: Localizer(built, body.truth),
@@ -156,7 +156,7 @@ def _honesty(name: str, found: tuple[RoomFound, ...]) -> list[Claim]:
     ]  # fmt: skip
 
 
-def _keeps(name: str, track: Track) -> bool:
+def _keeps(name: str, track: PostureErrors) -> bool:
     bar, turn_bar = BARS.get(name, BARS[PLAN])
     place, turn = np.quantile(track.place, 0.95), np.quantile(track.turn, 0.95)
     return bool(place <= bar and math.degrees(float(turn)) <= turn_bar)
@@ -174,7 +174,7 @@ def _nees(name: str, found: tuple[RoomFound, ...]) -> tuple[float, float]:
     return float(values.mean()), float(np.mean(values <= INSIDE))
 
 
-def _judged(track: Track) -> Array:
+def _judged(track: PostureErrors) -> Array:
     values = track.normalised[SETTLED:]
     return values[np.isfinite(values)]
 

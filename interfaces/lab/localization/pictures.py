@@ -11,7 +11,7 @@ import numpy as np
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw
-from interfaces.lab.localization.trial import Record, Track
+from interfaces.lab.localization.trial import PostureErrors, Record
 from robots.bullet.rooms import Room
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.localizer import Localizer
@@ -31,7 +31,7 @@ COLOURS = (VIRTUAL, "#7b4fa3", GOOD, MUTED, REAL, BAD)
 
 
 @dataclass(slots=True, eq=False)
-class Look:
+class DrawnInstant:
     """An instant that is drawn."""
 
     time: float
@@ -42,14 +42,14 @@ class Look:
 
 
 @dataclass(slots=True, eq=False)
-class Scene:
+class DrawnDrive:
     """A drive to be drawn."""
 
     room: Room
     plan: GspMap
     built: GspMap
     record: Record | None = None
-    looks: list[Look] = field(default_factory=list)
+    looks: list[DrawnInstant] = field(default_factory=list)
 
     def look(self, t: float, localizer: Localizer) -> None:
         """Note what a localizer says at a time [s], each so often."""
@@ -59,10 +59,10 @@ class Scene:
         x, y, theta = tracker.seen_from
         c, s = math.cos(theta), math.sin(theta)
         points = tracker.points.places @ np.array([[c, s], [-s, c]]) + (x, y)
-        self.looks.append(Look(t, tracker.seen_from, np.array(tracker.covariance), points))
+        self.looks.append(DrawnInstant(t, tracker.seen_from, np.array(tracker.covariance), points))
 
 
-def scenes(given: Sequence[Scene]) -> list[Figure]:
+def scenes(given: Sequence[DrawnDrive]) -> list[Figure]:
     """Pictures of the first scene, if there's one."""
     if not given or given[0].record is None:
         return []
@@ -82,7 +82,7 @@ def _lines(ax: Axes, known: GspMap, colour: str, label: str, width: float) -> No
         ax.plot(end[:, 0], end[:, 1], color=colour, linewidth=width, label=label if k == 0 else None)
 
 
-def _map(canvas: Canvas, scene: Scene, record: Record) -> None:
+def _map(canvas: Canvas, scene: DrawnDrive, record: Record) -> None:
     ax = canvas.subplots()
     ax.grid(False)
     _lines(ax, scene.plan, INK, "floor-plan map", 2.4)
@@ -101,7 +101,7 @@ def _map(canvas: Canvas, scene: Scene, record: Record) -> None:
     canvas.legend(loc="outside upper center", ncols=5, fontsize=8.0, labelcolor=INK)
 
 
-def _ellipse(look: Look) -> Array:
+def _ellipse(look: DrawnInstant) -> Array:
     values, vectors = np.linalg.eigh(look.covariance[:2, :2])
     turn = np.linspace(0, math.tau, 49)
     ring = np.column_stack([np.cos(turn), np.sin(turn)]) * np.sqrt(np.maximum(values, 0.0)) * _TWO_SIGMA * SCALE
@@ -125,7 +125,7 @@ def _errors(canvas: Canvas, record: Record) -> None:
     canvas.legend(loc="outside upper center", ncols=5, fontsize=8.0, labelcolor=INK)
 
 
-def _bound(ax: Axes, record: Record, track: Track, of: tuple[int, ...], scale: float) -> None:
+def _bound(ax: Axes, record: Record, track: PostureErrors, of: tuple[int, ...], scale: float) -> None:
     """Two deviations of what the first one says."""
     variance = sum(track.covariances[:, k, k] for k in of)
     ax.fill_between(record.t, 1e-4, 2 * scale * np.sqrt(variance), color=VIRTUAL, alpha=0.12, linewidth=0)

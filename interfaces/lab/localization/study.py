@@ -6,7 +6,7 @@ import csv
 import io
 from pathlib import Path
 
-from interfaces.lab.claims import Paper, Part, Reproduction
+from interfaces.lab.claims import Paper, PaperPart, Reproduction
 from interfaces.lab.localization.accuracy import conclude_rooms, measure_room
 from interfaces.lab.localization.searching import (
     STARTS,
@@ -43,11 +43,11 @@ def study_of(rooms: int, starts: int) -> Paper:
         "localization",
         "Kim, Han, Kim, Kim, Internet-Based Personal Robot System using Map-Based Localization, 2002, section 3",
         (
-            Part("accuracy", measure_room, conclude_rooms, _cases(rooms)),
-            Part("what can't be known", measure_axis, conclude_axes, PLACES),
-            Part("starts anywhere", measure_starts, conclude_starts, groups),
-            Part("symmetric rooms", measure_symmetric, conclude_symmetric, _cases(SYMMETRIC)),
-            Part("carried off", measure_carried, conclude_carried, _cases(min(CARRIED, len(groups)))),
+            PaperPart("accuracy", measure_room, conclude_rooms, _cases(rooms)),
+            PaperPart("what can't be known", measure_axis, conclude_axes, PLACES),
+            PaperPart("starts anywhere", measure_starts, conclude_starts, groups),
+            PaperPart("symmetric rooms", measure_symmetric, conclude_symmetric, _cases(SYMMETRIC)),
+            PaperPart("carried off", measure_carried, conclude_carried, _cases(min(CARRIED, len(groups)))),
         ),
         runs=ROOMS,
         length=LENGTH,

@@ -28,7 +28,7 @@ NOISES = (0.01, 0.02)
 """Of the ranges, in turns [m]."""
 
 
-class Listener(Protocol):
+class PostureSource(Protocol):
     """Whoever says where the robot is."""
 
     @property
@@ -60,7 +60,7 @@ class Reckoning:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class LocalizationSetting:
     """A room and a robot."""
 
     room: Room
@@ -71,7 +71,7 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Track:
+class PostureErrors:
     """What somebody said all along."""
 
     errors: Array
@@ -107,7 +107,7 @@ class Record:
     """[s], (k,)."""
     truth: Array
     """(x, y, θ) [m, m, rad], (k, 3)."""
-    tracks: dict[str, Track]
+    tracks: dict[str, PostureErrors]
     """Of each listener, by name."""
     collisions: int
     """How often the robot or somebody ran into something."""
@@ -127,7 +127,7 @@ def worn(rng: np.random.Generator) -> MobileReality:
     )  # fmt: skip
 
 
-def setting(room: Room, number: int, sweep: float, seed: tuple[int, ...]) -> Setting:
+def setting(room: Room, number: int, sweep: float, seed: tuple[int, ...]) -> LocalizationSetting:
     """A worn robot in a room, its laser with 1 or 2 cm of noise in turns.
 
     Args:
@@ -137,10 +137,10 @@ def setting(room: Room, number: int, sweep: float, seed: tuple[int, ...]) -> Set
         seed: Of the robot and the drive.
     """
     reality = worn(np.random.default_rng([*seed, 1]))
-    return Setting(room, LaserModel(noise=NOISES[number % 2], sweep=sweep), reality, seed)
+    return LocalizationSetting(room, LaserModel(noise=NOISES[number % 2], sweep=sweep), reality, seed)
 
 
-def body_of(chosen: Setting, posture: tuple[float, float, float] | None = None) -> BareBody:
+def body_of(chosen: LocalizationSetting, posture: tuple[float, float, float] | None = None) -> BareBody:
     """The robot at a posture, where the room says unless given."""
     senses = Senses(sonar=None, camera=None, laser=chosen.laser)
     rng = np.random.default_rng([*chosen.seed, 2])
@@ -155,7 +155,7 @@ def drive(
     body: BareBody,
     length: float,
     driver: Driver,
-    listeners: Mapping[str, Listener],
+    listeners: Mapping[str, PostureSource],
     hook: Callable[[float], None] = lambda _: None,
 ) -> Record:
     """Drive about.
@@ -182,7 +182,9 @@ def drive(
         told = driver(body.time, truth)
         body.drive(told.v, told.w, steps)
     table = np.array(rows)
-    tracks = {name: Track(*(np.array(part) for part in zip(*found, strict=True))) for name, found in said.items()}
+    tracks = {
+        name: PostureErrors(*(np.array(part) for part in zip(*found, strict=True))) for name, found in said.items()
+    }
     return Record(table[:, 0], table[:, 1:], tracks, len(body.collisions))
 
 
@@ -196,7 +198,7 @@ def _error(posture: tuple[float, float, float] | None, truth: tuple[float, float
     return np.array([x, y, math.remainder(theta, math.tau)])
 
 
-def wander(chosen: Setting, *, still: float = 0.0, thorough: bool = False) -> Driver:
+def wander(chosen: LocalizationSetting, *, still: float = 0.0, thorough: bool = False) -> Driver:
     """Somebody who drives about in a setting's room, after so long [s]; or everywhere, if he's thorough."""
     rng = np.random.default_rng([*chosen.seed, 3])
     who = Wanderer(chosen.room, rng, still=still, thorough=thorough)

@@ -10,9 +10,9 @@ import numpy as np
 
 from interfaces.lab.claims import Cell, Figure, Findings, Study, Table
 from interfaces.lab.drawing import INK, draw
-from interfaces.lab.tipsuwan.run import Control, Setting, agent, leg, no_delay, run
+from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, leg, no_delay, run
 from interfaces.lab.tipsuwan.s_paths import s_path
-from interfaces.lab.tipsuwan.success import MOST_RATIO, Seen, seen, succeeds
+from interfaces.lab.tipsuwan.success import MOST_RATIO, SuccessResult, seen, succeeds
 from interfaces.link import DelayProfile
 from interfaces.link.delay import CORRELATION_TIME
 
@@ -47,7 +47,7 @@ LETTERS: Final = "; ".join(f"{letter} {why}" for letter, why in WHY.items() if l
 class Varied(NamedTuple):
     """What a row of a map is about."""
 
-    setting: Setting
+    setting: NetworkRunSetting
     t_pred: float | None = None
     """Of the paths at each delay; None for the same paths at all of them [s]."""
     correlation_time: float = CORRELATION_TIME
@@ -56,7 +56,7 @@ class Varied(NamedTuple):
 
 def varied(axis: str, value: float, length: float) -> Varied:
     """Everything as it is fixed but for what an axis varies; runs of a length [s]."""
-    setting = Setting(length=length)
+    setting = NetworkRunSetting(length=length)
     if axis == "T_pred":
         return Varied(setting, t_pred=value)
     if axis == "correlation":
@@ -78,17 +78,17 @@ def _outcome(number: int, tau: float, row: Varied) -> str:
     """One path at one delay: a letter of `WHY`."""
     curve = s_path(number, NOMINAL_T_PRED) if row.t_pred is None else s_path(number, row.t_pred, tau=tau)
 
-    def drive(control: Control, delay: DelayProfile) -> Seen:
+    def drive(control: NetworkControl, delay: DelayProfile) -> SuccessResult:
         return seen(run(curve, agent(control, curve, row.setting), delay, number, setting=row.setting))
 
     network = leg(tau, row.correlation_time)
-    ideal = drive(Control.DIRECT, no_delay())
+    ideal = drive(NetworkControl.DIRECT, no_delay())
     if not ideal.arrived:
         return "n"
-    behind = drive(Control.EXACT, network)
+    behind = drive(NetworkControl.EXACT, network)
     if not behind.arrived:
         return "m"
-    without = drive(Control.DIRECT, network)
+    without = drive(NetworkControl.DIRECT, network)
     if without.arrived:
         return "w"
     return "·" if succeeds(ideal, without, behind) else "e"

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from interfaces.lab.tipsuwan.run import Track
+from interfaces.lab.tipsuwan.run import DriveTrace
 from vrs.model import Array
 
 EVERY: Final = 0.05
@@ -36,7 +36,7 @@ class Reason(enum.StrEnum):
     """It was on its way."""
 
 
-def beside(track: Track) -> tuple[Array, Array]:
+def beside(track: DriveTrace) -> tuple[Array, Array]:
     """Distances to the path's nearest point, left positive [m], and ways along it [m], every 0.05 s, (k,) each.
 
     The way is looked for about where the robot was, so that none is made by a robot that comes across a later part;
@@ -52,7 +52,7 @@ def beside(track: Track) -> tuple[Array, Array]:
     return np.array(away), np.array(ways)
 
 
-class Measures(NamedTuple):
+class PathMeasures(NamedTuple):
     """What is said of a run."""
 
     error: float
@@ -63,14 +63,14 @@ class Measures(NamedTuple):
     """Why it didn't arrive."""
 
 
-def measured(track: Track) -> Measures:
+def measured(track: DriveTrace) -> PathMeasures:
     """Measure a run."""
     away, ways = beside(track)
     progress = 1.0 if track.arrived else float(ways.max()) / track.curve.length
-    return Measures(float(np.abs(away).mean()), progress, _reason(track, away, ways))
+    return PathMeasures(float(np.abs(away).mean()), progress, _reason(track, away, ways))
 
 
-def _reason(track: Track, away: Array, ways: Array) -> Reason:
+def _reason(track: DriveTrace, away: Array, ways: Array) -> Reason:
     """Why the robot didn't arrive, read from its last 5 s."""
     if track.arrived:
         return Reason.ARRIVED
@@ -84,7 +84,7 @@ def _reason(track: Track, away: Array, ways: Array) -> Reason:
     return Reason.STUCK if ways[-1] - ways[-count:][0] < 0.01 * LAST else Reason.SLOW
 
 
-def _sampled(track: Track) -> Array:
+def _sampled(track: DriveTrace) -> Array:
     period = float(track.t[1] - track.t[0]) if len(track.t) > 1 else EVERY
     return track.postures[:: max(round(EVERY / period), 1)]
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Final
 
-from interfaces.lab.claims import Paper, Part
+from interfaces.lab.claims import Paper, PaperPart
 from interfaces.lab.tipsuwan import extent, gain, shorter, success, wrapping
 
 PAPER: Final = Paper(
     "tipsuwan",
     "Tipsuwan, Chow: Model Predictive Path Tracking via Middleware for Networked Mobile Robot over IP Network",
     (
-        Part.single("Gain", gain.work),
-        Part("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES),
-        Part("Success", success.work, success.conclude, success.CASES),
-        Part("Shorter paths", shorter.work, shorter.conclude, shorter.CASES),
-        Part("Where it stops", extent.work, extent.conclude, extent.CASES),
+        PaperPart.single("Gain", gain.work),
+        PaperPart("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES),
+        PaperPart("Success", success.work, success.conclude, success.CASES),
+        PaperPart("Shorter paths", shorter.work, shorter.conclude, shorter.CASES),
+        PaperPart("Where it stops", extent.work, extent.conclude, extent.CASES),
     ),
     length=15.0,
 )

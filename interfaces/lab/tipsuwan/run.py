@@ -56,7 +56,7 @@ _PROBE, _ECHO = 28, 44
 """What they take on the wire [byte]."""
 
 
-class Control(enum.StrEnum):
+class NetworkControl(enum.StrEnum):
     """What drives the robot over the network."""
 
     DIRECT = "direct"
@@ -91,7 +91,7 @@ class Agent(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class NetworkRunSetting:
     """What runs have in common."""
 
     tracker: QuadraticTrackerConfig = field(
@@ -110,7 +110,7 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Track:
+class DriveTrace:
     """What a robot did."""
 
     curve: Curve
@@ -146,21 +146,21 @@ def no_delay() -> DelayProfile:
     return ConstantDelay("none", 0.0)
 
 
-def agent(control: Control, curve: Curve, setting: Setting, robot: str = "kinematic") -> Agent:
+def agent(control: NetworkControl, curve: Curve, setting: NetworkRunSetting, robot: str = "kinematic") -> Agent:
     """Make what drives a robot along a curve."""
-    if control is Control.PREDICTIVE:
+    if control is NetworkControl.PREDICTIVE:
         config = PredictiveConfig(lag=LAGS[one_of("robot", robot, ROBOTS)])
         return PredictiveController(curve, setting.middleware.probing, config)
     return behind(control, QuadraticCurveTracker(curve, setting.tracker).control, setting.middleware)
 
 
-def behind(control: Control, controller: Controller, config: MiddlewareConfig) -> Middleware:
+def behind(control: NetworkControl, controller: Controller, config: MiddlewareConfig) -> Middleware:
     """Put a controller behind the middleware; or, directly on the network, before one that does nothing."""
-    if control is Control.DIRECT:
+    if control is NetworkControl.DIRECT:
         return Middleware(
             controller, MiddlewareConfig(config.epsilon, config.probing, predicts=False, schedules=False)
         )
-    return Middleware(controller, config, network=default_network() if control is Control.NETWORK else None)
+    return Middleware(controller, config, network=default_network() if control is NetworkControl.NETWORK else None)
 
 
 def make_robot(kind: str, start: tuple[float, float, float], period: float, seed: int) -> tuple[MobileRobot, int]:
@@ -191,9 +191,9 @@ def run(
     seed: int = 0,
     *,
     robot: str = "kinematic",
-    setting: Setting | None = None,
+    setting: NetworkRunSetting | None = None,
     start: tuple[float, float, float] = START,
-) -> Track:
+) -> DriveTrace:
     """Let a robot be driven along a curve; the same arguments give the same to the last bit.
 
     Args:
@@ -205,13 +205,13 @@ def run(
         setting: What it has in common with other runs.
         start: Where the robot begins.
     """
-    setting = Setting() if setting is None else setting
+    setting = NetworkRunSetting() if setting is None else setting
     body, steps = make_robot(robot, start, setting.agent.period, seed)
     with body:
-        return _Run(curve, driver, delay, np.random.default_rng([seed, 5]), body, steps, setting).whole()
+        return _NetworkRun(curve, driver, delay, np.random.default_rng([seed, 5]), body, steps, setting).whole()
 
 
-class _Run:
+class _NetworkRun:
     """A run while it goes on: deliveries, probes and sampling times in the order of their times."""
 
     def __init__(
@@ -222,7 +222,7 @@ class _Run:
         rng: np.random.Generator,
         body: MobileRobot,
         steps: int,
-        setting: Setting,
+        setting: NetworkRunSetting,
     ) -> None:
         self._curve, self._driver = curve, driver
         there, back = rng.spawn(2)
@@ -234,7 +234,7 @@ class _Run:
         self._robot = ActionAgent(setting.agent)
         self._end = curve.at(curve.length)
 
-    def whole(self) -> Track:
+    def whole(self) -> DriveTrace:
         period = self._setting.agent.period
         rows: list[tuple[float, ...]] = []
         arrived = False
@@ -254,7 +254,7 @@ class _Run:
             v, w = clipped(drive.v, self._limits.v_max), clipped(drive.w, self._limits.w_max)
             self._body.drive(v, w, self._steps)
         made = np.array(rows)
-        return Track(self._curve, made[:, 0], made[:, 1:4], made[:, 4:6], arrived)
+        return DriveTrace(self._curve, made[:, 0], made[:, 1:4], made[:, 4:6], arrived)
 
     def _until(self, now: float) -> None:
         """Let everything happen that happens on the network and at its other end by now [s]."""

@@ -12,7 +12,16 @@ from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study,
 from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import clustered
 from interfaces.lab.tipsuwan.measures import EVERY, Reason, beside, measured
-from interfaces.lab.tipsuwan.run import ROBOTS, Control, Setting, Track, agent, network_of, no_delay, run
+from interfaces.lab.tipsuwan.run import (
+    ROBOTS,
+    DriveTrace,
+    NetworkControl,
+    NetworkRunSetting,
+    agent,
+    network_of,
+    no_delay,
+    run,
+)
 from interfaces.lab.tipsuwan.s_paths import SLOWEST, T_PRED, predicted_time, s_path
 
 if TYPE_CHECKING:
@@ -29,16 +38,16 @@ SOURCE: Final = f"Section VII, Fig. 7; {OWN_BAR}"
 CASES: Final = tuple(f"{robot} {path}" for robot in ROBOTS for path in range(PATHS))
 IDEAL: Final = "no delay"
 LABELS: Final = {
-    Control.DIRECT: "without middleware",
-    Control.EXACT: "middleware, exact gain",
-    Control.NETWORK: "middleware, network",
-    Control.PREDICTIVE: "model-predictive control",
+    NetworkControl.DIRECT: "without middleware",
+    NetworkControl.EXACT: "middleware, exact gain",
+    NetworkControl.NETWORK: "middleware, network",
+    NetworkControl.PREDICTIVE: "model-predictive control",
 }
-BEHIND: Final = (Control.NETWORK, Control.EXACT)
+BEHIND: Final = (NetworkControl.NETWORK, NetworkControl.EXACT)
 """What success is asked of."""
 
 
-class Seen(NamedTuple):
+class SuccessResult(NamedTuple):
     """Figures of a run."""
 
     arrived: bool
@@ -51,42 +60,44 @@ class Seen(NamedTuple):
     reason: Reason
 
 
-class Found(NamedTuple):
+class PathSuccess(NamedTuple):
     """Of one robot on one path."""
 
     t_pred: float
     """For the longest median round trip [s]."""
-    ideal: Seen
+    ideal: SuccessResult
     """Without delay."""
-    runs: dict[Control, tuple[Seen, ...]]
+    runs: dict[NetworkControl, tuple[SuccessResult, ...]]
     """A run a delay seed."""
-    tracks: dict[str, Track]
+    tracks: dict[str, DriveTrace]
     """Those of the first path and seed, for the picture; none but there."""
 
 
-def seen(track: Track) -> Seen:
+def seen(track: DriveTrace) -> SuccessResult:
     """Sum up a run."""
-    return Seen(track.arrived, float(track.t[-1]), *measured(track))
+    return SuccessResult(track.arrived, float(track.t[-1]), *measured(track))
 
 
-def succeeds(ideal: Seen, without: Seen, behind: Seen) -> bool:
+def succeeds(ideal: SuccessResult, without: SuccessResult, behind: SuccessResult) -> bool:
     """Whether the claim is so: it arrives without delay, not with delay alone, and with middleware well."""
     arrivals = ideal.arrived and behind.arrived and not without.arrived
     return arrivals and behind.error <= MOST_RATIO * without.error
 
 
-def work(study: Study, case: str) -> Found:
+def work(study: Study, case: str) -> PathSuccess:
     """All controls and delay seeds of a robot on a path."""
     robot, path = case.split()
-    found = ran(study, robot, s_path(1000 * study.seed + int(path)), tuple(Control))
+    found = ran(study, robot, s_path(1000 * study.seed + int(path)), tuple(NetworkControl))
     return found if path == "0" else found._replace(tracks={})
 
 
-def ran(study: Study, robot: str, curve: Curve, controls: Sequence[Control]) -> Found:
+def ran(study: Study, robot: str, curve: Curve, controls: Sequence[NetworkControl]) -> PathSuccess:
     """Some controls and all delay seeds of a robot on a path."""
-    setting = Setting(length=study.length)
-    ideal = run(curve, agent(Control.DIRECT, curve, setting), no_delay(), study.seed, robot=robot, setting=setting)
-    runs: dict[Control, list[Seen]] = {}
+    setting = NetworkRunSetting(length=study.length)
+    ideal = run(
+        curve, agent(NetworkControl.DIRECT, curve, setting), no_delay(), study.seed, robot=robot, setting=setting
+    )
+    runs: dict[NetworkControl, list[SuccessResult]] = {}
     tracks = {IDEAL: ideal}
     for k in range(study.seed, study.seed + study.runs):
         for control in controls:
@@ -96,12 +107,12 @@ def ran(study: Study, robot: str, curve: Curve, controls: Sequence[Control]) -> 
             runs.setdefault(control, []).append(seen(track))
             tracks.setdefault(LABELS[control], track)
     found = {control: tuple(them) for control, them in runs.items()}
-    return Found(predicted_time(curve, SLOWEST, setting.middleware.epsilon), seen(ideal), found, tracks)
+    return PathSuccess(predicted_time(curve, SLOWEST, setting.middleware.epsilon), seen(ideal), found, tracks)
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """Shares of success, what became of every control, and Fig. 7."""
-    found: dict[str, Found] = dict(zip(CASES, results, strict=True))
+    found: dict[str, PathSuccess] = dict(zip(CASES, results, strict=True))
     claims: list[Claim] = []
     tables: list[Table] = []
     figures: list[Figure] = []
@@ -115,13 +126,15 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(tuple(claims), tuple(tables), tuple(figures))
 
 
-def _successes(path: Found, control: Control) -> list[float]:
+def _successes(path: PathSuccess, control: NetworkControl) -> list[float]:
     """1 for each delay seed with which the claim is so, else 0."""
-    pairs = zip(path.runs[Control.DIRECT], path.runs[control], strict=True)
+    pairs = zip(path.runs[NetworkControl.DIRECT], path.runs[control], strict=True)
     return [float(succeeds(path.ideal, without, behind)) for without, behind in pairs]
 
 
-def claim(robot: str, control: Control, paths: Sequence[Found], within: tuple[float, float], seed: int) -> Claim:
+def claim(
+    robot: str, control: NetworkControl, paths: Sequence[PathSuccess], within: tuple[float, float], seed: int
+) -> Claim:
     """Whether enough of the runs succeed."""
     # All paths have the same networks, and one that is quick lets a robot without middleware arrive on many.
     shares = clustered(np.transpose([_successes(path, control) for path in paths]), seed)
@@ -135,12 +148,12 @@ def claim(robot: str, control: Control, paths: Sequence[Found], within: tuple[fl
     )
 
 
-def controls(robot: str, paths: Sequence[Found], name: str = "controls", title: str = "") -> Table:
+def controls(robot: str, paths: Sequence[PathSuccess], name: str = "controls", title: str = "") -> Table:
     """A row a control: arrivals, times, errors, and reasons of failure."""
     runs = {IDEAL: [path.ideal for path in paths]}
     for control in paths[0].runs:
         runs[LABELS[control]] = [one for path in paths for one in path.runs[control]]
-    without = np.mean([one.error for one in runs[LABELS[Control.DIRECT]]])
+    without = np.mean([one.error for one in runs[LABELS[NetworkControl.DIRECT]]])
     rows: list[tuple[Cell, ...]] = []
     for label, them in runs.items():
         arrived = [one.seconds for one in them if one.arrived]
@@ -158,20 +171,20 @@ def controls(robot: str, paths: Sequence[Found], name: str = "controls", title: 
     return Table(f"{robot}_{name}", said, columns, tuple(rows))
 
 
-def _paths(robot: str, paths: Sequence[Found]) -> Table:
+def _paths(robot: str, paths: Sequence[PathSuccess]) -> Table:
     """A row a path: its predicted time, the share of success, and how the robot without middleware failed."""
     rows = []
     for k, path in enumerate(paths):
-        without = path.runs[Control.DIRECT]
-        good = np.mean(_successes(path, Control.NETWORK))
+        without = path.runs[NetworkControl.DIRECT]
+        good = np.mean(_successes(path, NetworkControl.NETWORK))
         made = float(np.mean([one.progress for one in without]))
-        slowest = max(one.seconds for one in path.runs[Control.NETWORK])
+        slowest = max(one.seconds for one in path.runs[NetworkControl.NETWORK])
         rows.append((k, path.t_pred, float(good), slowest, made, reasons(without)))
     columns = ("path", "T_pred [s]", "success", "longest with [s]", "path made without", "why not")
     return Table(f"{robot}_paths", f"{robot}: path by path", columns, tuple(rows))
 
 
-def reasons(runs: Sequence[Seen]) -> str:
+def reasons(runs: Sequence[SuccessResult]) -> str:
     """How many runs failed for which reason, the most frequent one first."""
     counted = Counter(one.reason for one in runs if not one.arrived)
     return ", ".join(f"{why} {many}" for why, many in counted.most_common())
@@ -179,18 +192,23 @@ def reasons(runs: Sequence[Seen]) -> str:
 
 COLOURS: Final = {
     IDEAL: GOOD,
-    LABELS[Control.DIRECT]: BAD,
-    LABELS[Control.EXACT]: MUTED,
-    LABELS[Control.NETWORK]: VIRTUAL,
-    LABELS[Control.PREDICTIVE]: REAL,
+    LABELS[NetworkControl.DIRECT]: BAD,
+    LABELS[NetworkControl.EXACT]: MUTED,
+    LABELS[NetworkControl.NETWORK]: VIRTUAL,
+    LABELS[NetworkControl.PREDICTIVE]: REAL,
 }
 
 
-def _figure(robot: str, tracks: dict[str, Track]) -> Figure:
+def _figure(robot: str, tracks: dict[str, DriveTrace]) -> Figure:
     def paint(canvas: Canvas) -> None:
         left, right = canvas.subplots(1, 2)
         left.plot(*tracks[IDEAL].curve.table[1].T, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="path")
-        for name in (LABELS[Control.DIRECT], IDEAL, LABELS[Control.NETWORK], LABELS[Control.PREDICTIVE]):
+        for name in (
+            LABELS[NetworkControl.DIRECT],
+            IDEAL,
+            LABELS[NetworkControl.NETWORK],
+            LABELS[NetworkControl.PREDICTIVE],
+        ):
             track = tracks[name]
             away = 100 * np.abs(beside(track)[0])
             left.plot(*track.postures[:, :2].T, color=COLOURS[name], label=name, linewidth=1.1)

@@ -11,9 +11,18 @@ import numpy as np
 
 from interfaces.lab.claims import Cell, Claim, Findings, Study, Table
 from interfaces.lab.statistics import bootstrap
-from interfaces.lab.tipsuwan.run import LIFTED, ROBOTS, Control, Setting, behind, network_of, no_delay, run
+from interfaces.lab.tipsuwan.run import (
+    LIFTED,
+    ROBOTS,
+    NetworkControl,
+    NetworkRunSetting,
+    behind,
+    network_of,
+    no_delay,
+    run,
+)
 from interfaces.lab.tipsuwan.s_paths import s_path
-from interfaces.lab.tipsuwan.success import Seen, reasons, seen
+from interfaces.lab.tipsuwan.success import SuccessResult, reasons, seen
 from interfaces.middleware import Controller
 from robots.onboard.curve import Curve
 from robots.onboard.path import Arc, MovingPath
@@ -28,15 +37,15 @@ PIECE: Final = 0.05
 PATHS: Final = 4
 
 
-def _tracker(curve: Curve, setting: Setting) -> Controller:
+def _tracker(curve: Curve, setting: NetworkRunSetting) -> Controller:
     return QuadraticCurveTracker(curve, setting.tracker).control
 
 
-def _pursuit(curve: Curve, setting: Setting) -> Controller:  # noqa: ARG001
+def _pursuit(curve: Curve, setting: NetworkRunSetting) -> Controller:  # noqa: ARG001
     return PurePursuit(curve, PurePursuitConfig(SPEED, most_turning=LIFTED.w_max)).control
 
 
-def _field(curve: Curve, setting: Setting) -> Controller:
+def _field(curve: Curve, setting: NetworkRunSetting) -> Controller:
     """The uni-vector controller on a path of arcs along the curve."""
     path = arcs_of(curve)
     config = PathFollowingConfig(period=setting.agent.period, cruise=SPEED, limits=LIFTED)
@@ -55,7 +64,7 @@ def arcs_of(curve: Curve) -> MovingPath:
     return path
 
 
-CONTROLLERS: Final[dict[str, Callable[[Curve, Setting], Controller]]] = {
+CONTROLLERS: Final[dict[str, Callable[[Curve, NetworkRunSetting], Controller]]] = {
     "quadratic curve": _tracker,
     "uni-vector field": _field,
     "pure pursuit": _pursuit,
@@ -64,18 +73,18 @@ CONTROLLERS: Final[dict[str, Callable[[Curve, Setting], Controller]]] = {
 CASES: Final = tuple(f"{robot}/{name}" for robot in ROBOTS for name in CONTROLLERS)
 
 
-def work(study: Study, case: str) -> dict[str, tuple[Seen, ...]]:
+def work(study: Study, case: str) -> dict[str, tuple[SuccessResult, ...]]:
     """A controller on a robot: without delay, with delay alone, and behind the middleware; a run a path each."""
     robot, name = case.split("/")
-    setting = Setting(length=study.length)
-    found: dict[str, list[Seen]] = {}
+    setting = NetworkRunSetting(length=study.length)
+    found: dict[str, list[SuccessResult]] = {}
     for path in range(min(PATHS, study.runs)):
         number = 1000 * study.seed + path
         curve, network = s_path(number), network_of(number)
         for way, control, delay in (
-            ("no delay", Control.DIRECT, no_delay()),
-            ("without", Control.DIRECT, network),
-            ("with", Control.NETWORK, network),
+            ("no delay", NetworkControl.DIRECT, no_delay()),
+            ("without", NetworkControl.DIRECT, network),
+            ("with", NetworkControl.NETWORK, network),
         ):
             driver = behind(control, CONTROLLERS[name](curve, setting), setting.middleware)
             track = run(curve, driver, delay, number, robot=robot, setting=setting)
@@ -85,7 +94,7 @@ def work(study: Study, case: str) -> dict[str, tuple[Seen, ...]]:
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """What the middleware does for each of the controllers."""
-    found: dict[str, dict[str, tuple[Seen, ...]]] = dict(zip(CASES, results, strict=True))
+    found: dict[str, dict[str, tuple[SuccessResult, ...]]] = dict(zip(CASES, results, strict=True))
     claims = tuple(_claim(case, runs, study.seed) for case, runs in found.items())
     rows: list[tuple[Cell, ...]] = []
     for case, runs in found.items():
@@ -96,11 +105,11 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(claims, (Table("wrapping", "Controllers behind the middleware", columns, tuple(rows)),))
 
 
-def _mean_error(runs: tuple[Seen, ...]) -> float:
+def _mean_error(runs: tuple[SuccessResult, ...]) -> float:
     return 100 * float(np.mean([one.error for one in runs]))
 
 
-def _claim(case: str, runs: dict[str, tuple[Seen, ...]], seed: int) -> Claim:
+def _claim(case: str, runs: dict[str, tuple[SuccessResult, ...]], seed: int) -> Claim:
     robot, name = case.split("/")
     ratios = [behind.error / without.error for behind, without in zip(runs["with"], runs["without"], strict=True)]
     ratio = bootstrap(ratios, seed)

@@ -9,7 +9,15 @@ import numpy as np
 
 from interfaces.recording.driving.pursuit import FARTHEST, matchable
 from interfaces.recording.rerun import rerun
-from interfaces.recording.track import ESTIMATED, GAP, MEASURED, REAL_POSTURE, Track, gap_lengths, not_measured
+from interfaces.recording.track import (
+    ESTIMATED,
+    GAP,
+    MEASURED,
+    REAL_POSTURE,
+    SampleTrack,
+    gap_lengths,
+    not_measured,
+)
 from interfaces.runs.drive_row import facts_of, row_of
 from interfaces.runs.drive_run import Case, DriveRun
 from interfaces.teleop.architectures import Transport
@@ -118,7 +126,7 @@ def _case(recording: Recording) -> Case:
         raise FormatError(str(recording.path), f"its beginning: {error}") from None
 
 
-def _grid(recording: Recording, track: Track) -> Array:
+def _grid(recording: Recording, track: SampleTrack) -> Array:
     """Times of the run [s], (k,): the samples' own where none is missing."""
     step, t, where = recording.session.step, track.t, str(recording.path)
     if len(t) < 2:

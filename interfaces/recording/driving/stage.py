@@ -13,7 +13,7 @@ from robots.ipr.model import Ipr
 from vrs.model import Array
 
 if TYPE_CHECKING:
-    from interfaces.recording.playback import Frame
+    from interfaces.recording.playback import PlaybackFrame
     from interfaces.recording.recording import Recording
 
 MARGIN = 3.0
@@ -43,7 +43,7 @@ class DriveStage:
         extent = self._extent(recording.session.q, MARGIN * model.body.length)
         self.scene: MobileScene = MobileScene(model, recording.session.q, room=room, grid=grid, extent=extent)
 
-    def show(self, frame: Frame, committed: Committed | None, *, now: float) -> None:
+    def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
         assert frame.q_virtual is not None
         self._grown()

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from interfaces.recording.tables import (
-    Column,
-    Table,
+    RecordingTable,
+    TableColumn,
     commands_table,
     edits_table,
     events_table,
@@ -28,7 +28,7 @@ _POSTURE = (("x_m", "m"), ("y_m", "m"), ("theta_rad", "rad"))
 _DRIVE = (("v_m_per_s", "m/s"), ("w_rad_per_s", "rad/s"))
 
 
-def mobile_tables(recording: Recording) -> tuple[Table, ...]:
+def mobile_tables(recording: Recording) -> tuple[RecordingTable, ...]:
     """All tables of a recording: `docs/recording.md` describes their columns.
 
     Raises:
@@ -49,17 +49,17 @@ def mobile_tables(recording: Recording) -> tuple[Table, ...]:
     )
 
 
-def _columns(names: tuple[tuple[str, str], ...], values: Array) -> list[Column]:
+def _columns(names: tuple[tuple[str, str], ...], values: Array) -> list[TableColumn]:
     pairs = zip(names, values.T, strict=True)
-    return [Column(name, unit, float, column.tolist()) for (name, unit), column in pairs]
+    return [TableColumn(name, unit, float, column.tolist()) for (name, unit), column in pairs]
 
 
-def _virtual(recording: Recording) -> Table:
+def _virtual(recording: Recording) -> RecordingTable:
     t = recording.track(VIRTUAL_POSTURE).t
     return table("virtual", seconds("t", t.tolist()), _columns(_POSTURE, recording.virtual(t)))
 
 
-def _real(recording: Recording) -> Table:
+def _real(recording: Recording) -> RecordingTable:
     track = recording.track(REAL_POSTURE)
     return table(
         "real",
@@ -70,27 +70,27 @@ def _real(recording: Recording) -> Table:
     )
 
 
-def _postures(recording: Recording, name: str, topic: str) -> Table:
+def _postures(recording: Recording, name: str, topic: str) -> RecordingTable:
     track = recording.track(topic)
     return table(name, seconds("t", track.t.tolist()), _columns(_POSTURE, track.q))
 
 
-def _segments(recording: Recording) -> Table:
+def _segments(recording: Recording) -> RecordingTable:
     """The newest timeline, a row an arc."""
     timeline = recording.timeline
     arcs = timeline.segments if isinstance(timeline, ArcTimeline) else ()
     return table(
         "segments",
-        Column("segment", "", int, list(range(len(arcs)))),
+        TableColumn("segment", "", int, list(range(len(arcs)))),
         seconds("start", [arc.start for arc in arcs]),
         seconds("duration", [arc.duration for arc in arcs]),
-        Column("command_id", "", int, [arc.command_id for arc in arcs]),
+        TableColumn("command_id", "", int, [arc.command_id for arc in arcs]),
         _columns(_POSTURE, np.array([arc.posture for arc in arcs]).reshape(-1, 3)),
         _columns(_DRIVE, np.array([(arc.v, arc.w) for arc in arcs]).reshape(-1, 2)),
     )
 
 
-def _environment(recording: Recording) -> Table:
+def _environment(recording: Recording) -> RecordingTable:
     """Cells of the virtual environment that came and went, a row a cell and time."""
     rows = [
         (entry.t, came, i, j)
@@ -101,7 +101,7 @@ def _environment(recording: Recording) -> Table:
     return table(
         "environment",
         seconds("t", [row[0] for row in rows]),
-        Column("came", "", bool, [row[1] for row in rows]),
-        Column("i", "", int, [row[2] for row in rows]),
-        Column("j", "", int, [row[3] for row in rows]),
+        TableColumn("came", "", bool, [row[1] for row in rows]),
+        TableColumn("i", "", int, [row[2] for row in rows]),
+        TableColumn("j", "", int, [row[3] for row in rows]),
     )

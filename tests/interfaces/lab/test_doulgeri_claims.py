@@ -43,7 +43,7 @@ def only(claims: Iterable[Claim], *said: str) -> None:
 
 
 SHARE = 1.0 - math.exp(-0.8 * 0.5)
-PREDICTED = delays.Seen((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SHARE)
+PREDICTED = delays.DelayResult((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SHARE)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,9 @@ def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
 
 
 NOWHERE = np.zeros((1, 3))
-HAND = dragging.Seen(0.005, 0.02, 0.05, 0.0, 1.0, 0, 200, 5e-4, 0.3, np.zeros(1), NOWHERE, NOWHERE, NOWHERE)
+HAND = dragging.DraggingResult(
+    0.005, 0.02, 0.05, 0.0, 1.0, 0, 200, 5e-4, 0.3, np.zeros(1), NOWHERE, NOWHERE, NOWHERE
+)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +112,7 @@ def test_encoding() -> None:
     only(said.claims, "a move every 2 s: bytes", "twist by hand, 50 inputs a second: bytes")
 
 
-RUN = jitter.Seen(0.001, 0.002, 0.004, 1.0, 2.0, 1.0, 0.0, 0, 1.0, 1.05, 0, 10, 0)
+RUN = jitter.JitterResult(0.001, 0.002, 0.004, 1.0, 2.0, 1.0, 0.0, 0, 1.0, 1.05, 0, 10, 0)
 FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
 
 
@@ -128,7 +130,7 @@ FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
     ],
 )
 def test_jitter(changes: dict[str, Any], said: list[str]) -> None:
-    def claims(*adaptive: jitter.Seen) -> Sequence[Claim]:
+    def claims(*adaptive: jitter.JitterResult) -> Sequence[Claim]:
         result: Any = jitter.Result(-2.0, adaptive, (FIXED,) * 2, ())  # type: ignore[arg-type]
         return jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims
 
@@ -157,7 +159,7 @@ def test_the_fixed_offset_hides_what_95_percent_of_the_packets_take(monkeypatch:
     assert given == [None, -quantile] * 2
 
 
-AGREED = agreement.Seen(1.0, 0.3, (0.1,), (0.5,), 0.1, 1.0, np.zeros(1), np.zeros(1))
+AGREED = agreement.AgreementResult(1.0, 0.3, (0.1,), (0.5,), 0.1, 1.0, np.zeros(1), np.zeros(1))
 QUIET = AGREED._replace(corrections=(), durations=())
 
 

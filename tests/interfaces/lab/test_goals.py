@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 from interfaces.cli.main import app
 from interfaces.lab import Study, reproduce
-from interfaces.lab.claims import Findings, Paper, Part
+from interfaces.lab.claims import Findings, Paper, PaperPart
 from interfaces.lab.goals import study as goals_study
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, SHUT, setting
 from interfaces.lab.goals.shortest import Shortest
 from interfaces.lab.goals.study import (
     EACH,
-    Found,
+    MeasuredTrip,
     conclude_asked,
     conclude_physics,
     conclude_shut,
@@ -29,7 +29,7 @@ from interfaces.lab.goals.study import (
     study_of,
     write,
 )
-from interfaces.lab.goals.trial import Setting, Trip
+from interfaces.lab.goals.trial import Trip, TripSetting
 from robots.bullet.rooms import Block, Room
 from robots.ipr.chassis import IPR
 from robots.ipr.navigation import route_map
@@ -78,7 +78,7 @@ def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
     paper = Paper(
         "goals",
         "two trips",
-        (Part("goals", measure, conclude_asked, (f"{FURNITURE}:0", f"{ROUND}:1")),),
+        (PaperPart("goals", measure, conclude_asked, (f"{FURNITURE}:0", f"{ROUND}:1")),),
     )
     written = []
     for workers in (1, 2):
@@ -99,9 +99,9 @@ TRIP = Trip(JourneyState.ARRIVED, "", 5.2, 20.0, 1, 5.2, 0.01, 0.01, 0.02, (), n
 FAILED = {"state": JourneyState.FAILED, "reason": "no way"}
 
 
-def found(group: str, *, mapped: float = 5.0, **changes: Any) -> Found:
-    where = Setting(Room("square", 6.0, 6.0), (1.0, 1.0, 0.0), Goal(5.0, 5.0, 0.0), (0, 1, 0))
-    return Found(group, where, replace(TRIP, **changes), mapped, mapped)
+def found(group: str, *, mapped: float = 5.0, **changes: Any) -> MeasuredTrip:
+    where = TripSetting(Room("square", 6.0, 6.0), (1.0, 1.0, 0.0), Goal(5.0, 5.0, 0.0), (0, 1, 0))
+    return MeasuredTrip(group, where, replace(TRIP, **changes), mapped, mapped)
 
 
 @pytest.fixture(name="without_maps")
@@ -143,7 +143,7 @@ def test_routes_that_are_mostly_too_long_or_unknown_are_said_so() -> None:
 
 @pytest.mark.usefixtures("without_maps")
 def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
-    def holds(conclude: Callable[..., Findings], *trips: Found) -> list[bool]:
+    def holds(conclude: Callable[..., Findings], *trips: MeasuredTrip) -> list[bool]:
         return [claim.holds for claim in conclude(Study(), trips).claims]
 
     shut = found(SHUT, **FAILED)

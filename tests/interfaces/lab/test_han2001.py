@@ -11,7 +11,7 @@ import pytest
 from interfaces.lab.claims import Claim, Findings, Study
 from interfaces.lab.driving.run import run
 from interfaces.lab.han2001 import PAPER, architectures, filtering, information
-from interfaces.lab.han2001.architectures import CASES, REPEATED, STREAMED, Found, Seen
+from interfaces.lab.han2001.architectures import CASES, REPEATED, STREAMED, ArchitectureResult, ArchitectureSummary
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 
@@ -56,9 +56,9 @@ def test_a_case_is_run_by_all_compositions() -> None:
     assert set(found.first) == set(found.runs)
 
 
-def made(worst: float, late: float, *, speed: float = 0.05, progress: float = 1.0) -> Seen:
+def made(worst: float, late: float, *, speed: float = 0.05, progress: float = 1.0) -> ArchitectureResult:
     path = PathComparison(worst / 3, worst / 2, worst, late, 0.1, late, late, speed, progress)
-    return Seen(path, worst, late, 0, 0)
+    return ArchitectureResult(path, worst, late, 0, 0)
 
 
 GOOD = {
@@ -70,12 +70,14 @@ GOOD = {
 SIMULATED = "II in simulation"
 
 
-def concluded(runs: dict[str, Seen], others: dict[str, Seen] | None = None) -> dict[str, Claim]:
+def concluded(
+    runs: dict[str, ArchitectureResult], others: dict[str, ArchitectureResult] | None = None
+) -> dict[str, Claim]:
     """Claims where the first seed went like this, the second like that, in every case."""
     both = runs, runs if others is None else others
     simulated = [them | {"II": them.get(SIMULATED, made(0.001, 6.0))} for them in both]
     results = tuple(
-        Found(
+        ArchitectureSummary(
             {who: tuple(them[who] for them in (simulated if case.startswith("model") else both)) for who in GOOD},
             {},
         )
@@ -107,12 +109,12 @@ def test_claims_hold_where_the_figures_say_so() -> None:
         ("II", made(0.0005, 6.0), "II's path error is large"),
     ],
 )
-def test_and_don_t_where_they_say_otherwise(who: str, instead: Seen, said: str) -> None:
+def test_and_don_t_where_they_say_otherwise(who: str, instead: ArchitectureResult, said: str) -> None:
     failed = [claim.claim for claim in concluded(GOOD | {who: instead}).values() if not claim.holds]
     assert any(said in claim for claim in failed), failed
 
 
-def failed(runs: dict[str, Seen], others: dict[str, Seen] | None = None) -> set[str]:
+def failed(runs: dict[str, ArchitectureResult], others: dict[str, ArchitectureResult] | None = None) -> set[str]:
     return {text for text, claim in concluded(runs, others).items() if not claim.holds}
 
 

@@ -15,7 +15,7 @@ from interfaces.lab import Study
 from interfaces.lab.claims import Claim, Figure
 from interfaces.lab.kim2002 import PAPER, paper
 from interfaces.lab.kim2002.paper import ORDER, conclude
-from interfaces.lab.kim2002.scenario import PLEASE, Played, Scenario, Stop, _Play, play
+from interfaces.lab.kim2002.scenario import PLEASE, Scenario, ScenarioResult, ScenarioStop, _ScenarioRun, play
 from interfaces.lab.papers import papers
 from robots.bullet.rooms import Person
 from robots.ipr.body import Cargo, MobileBody
@@ -61,14 +61,14 @@ def test_a_book_is_put_on_top_or_nowhere() -> None:
         Cargo(mass=0.0)
 
 
-GOOD = Played(
-    stage=Stage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(Stop(0.01, 0.01, 0.001),) * 2,
+GOOD = ScenarioResult(
+    stage=Stage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(ScenarioStop(0.01, 0.01, 0.001),) * 2,
     book=(0.1, 0.0, 0.8), slid=0.0, on_top=True, touched=(), passed=0.5, lost=0.01, time=60.0,
     track=np.zeros((2, 3)),
 )  # fmt: skip
 
 
-def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Played) -> dict[str, Claim]:
+def concluded(monkeypatch: pytest.MonkeyPatch, *runs: ScenarioResult) -> dict[str, Claim]:
     monkeypatch.setattr(paper, "_picture", lambda _: Figure("", "", ""))
     measured = tuple(tuple(runs[k :: paper.TOGETHER]) for k in range(paper.TOGETHER))
     return {claim.claim: claim for claim in conclude(Study(runs=len(runs)), measured).claims}
@@ -83,11 +83,17 @@ def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Played) -> dict[str, Claim
         ({"on_top": False}, ["on top at A"]),
         ({"passed": 1.6}, ["passed near"]),
         ({"touched": (Collision(50.0, "passer-by"),)}, ["touches"]),
-        ({"stops": (Stop(0.051, 0.0, 0.0), Stop(0.0, 0.0, 0.0))}, ["position error at B"]),
-        ({"stops": (Stop(0.0, 0.0, 0.0), Stop(0.051, 0.0, 0.0))}, ["position error at A", "on top at A"]),
-        ({"stops": (Stop(0.0, 0.0, 0.0), Stop(0.0, math.radians(2.1), 0.0))}, ["heading error at A"]),
-        ({"stops": (Stop(0.0, 0.0, 0.011), Stop(0.0, 0.0, 0.0))}, ["localization at B"]),
-        ({"stops": (Stop(0.0, 0.0, 0.0),)}, ["error at A", "localization at A", "on top at A"]),
+        ({"stops": (ScenarioStop(0.051, 0.0, 0.0), ScenarioStop(0.0, 0.0, 0.0))}, ["position error at B"]),
+        (
+            {"stops": (ScenarioStop(0.0, 0.0, 0.0), ScenarioStop(0.051, 0.0, 0.0))},
+            ["position error at A", "on top at A"],
+        ),
+        (
+            {"stops": (ScenarioStop(0.0, 0.0, 0.0), ScenarioStop(0.0, math.radians(2.1), 0.0))},
+            ["heading error at A"],
+        ),
+        ({"stops": (ScenarioStop(0.0, 0.0, 0.011), ScenarioStop(0.0, 0.0, 0.0))}, ["localization at B"]),
+        ({"stops": (ScenarioStop(0.0, 0.0, 0.0),)}, ["error at A", "localization at A", "on top at A"]),
     ],
 )
 def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
@@ -102,9 +108,9 @@ def test_a_gap_is_from_outline_to_outline() -> None:
     walker = Person("passer-by", 0.22, 1.7, (0.0, 1.0), ((2.0, 0.1), (2.0, 0.1)))
     body = SimpleNamespace(truth=(0.0, 0.0, 0.0), time=0.0)
     run: Any = SimpleNamespace(_body=body, _room=SimpleNamespace(people=(None, walker)))
-    assert _Play._gap(run) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)
+    assert _ScenarioRun._gap(run) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)
     body.truth = (2.0, -0.9, math.pi)
-    assert _Play._gap(run) == pytest.approx(1.0 - IPR.width / 2 - 0.22)
+    assert _ScenarioRun._gap(run) == pytest.approx(1.0 - IPR.width / 2 - 0.22)
 
 
 def test_the_paper_is_known_by_its_name() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from interfaces.lab.claims import Study
 from interfaces.lab.kim2006 import PAPER, links, narrow, packets
-from interfaces.lab.kim2006.following import Followed, Following, PathLeader, course, run
-from interfaces.lab.kim2006.links import Found, Pair, pair
+from interfaces.lab.kim2006.following import Followed, FollowingCase, PathLeader, course, run
+from interfaces.lab.kim2006.links import LinkResult, Pair, pair
 from interfaces.rsp.schemes import SCHEMES
 from interfaces.rsp.schemes.ends import Seen
 from vrs.errors import InvalidValueError
@@ -37,7 +37,7 @@ def test_the_saving_is_the_formulas_for_every_duty(duty: float) -> None:
 
 
 def test_a_run_repeats_to_the_last_bit_and_its_body_may_be_pybullets() -> None:
-    case = Following("rsp", "mon", 0.05, 3, 3.0)
+    case = FollowingCase("rsp", "mon", 0.05, 3, 3.0)
     one, other = run(case), run(case)
     assert one[:8] == other[:8]
     assert np.array_equal(one.way, other.way)
@@ -46,7 +46,7 @@ def test_a_run_repeats_to_the_last_bit_and_its_body_may_be_pybullets() -> None:
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_every_scheme_follows_on_a_good_link(name: str) -> None:
-    found = run(Following(name, "constant:0.02", 0.0, 1, 6.0, "bare"))
+    found = run(FollowingCase(name, "constant:0.02", 0.0, 1, 6.0, "bare"))
     assert found.path_error < 0.006
     assert found.progress == pytest.approx(1.0, abs=0.01)
     assert found.age == pytest.approx(0.06, abs=0.025)
@@ -55,13 +55,13 @@ def test_every_scheme_follows_on_a_good_link(name: str) -> None:
 
 
 def test_rsp_is_smaller_than_packets_of_one_size_and_repeated_inputs() -> None:
-    down = {name: run(Following(name, "none", 0.0, 1, 4.0, "bare")).down for name in SCHEMES}
+    down = {name: run(FollowingCase(name, "none", 0.0, 1, 4.0, "bare")).down for name in SCHEMES}
     assert down["rsp"] < down["repeated"] < down["fixed"] == down["tcp"]
     assert down["fixed"] == pytest.approx(50 * 1992, rel=1e-3)
 
 
 def test_a_lost_packet_holds_up_tcp_and_loses_commands_without_acknowledgement() -> None:
-    found = {name: run(Following(name, "none", 0.1, 2, 8.0, "bare")) for name in SCHEMES}
+    found = {name: run(FollowingCase(name, "none", 0.1, 2, 8.0, "bare")) for name in SCHEMES}
     assert found["tcp"].age > 2 * found["rsp"].age
     assert found["fixed"].commands_missing > 0
     assert found["rsp"].commands_missing == 0
@@ -93,7 +93,7 @@ def test_paths_are_smooth_and_differ_by_seed() -> None:
 @pytest.mark.parametrize("bad", [{"scheme": "pigeon"}, {"body": "jelly"}, {"loss": 1.0}, {"length": 1.0}])
 def test_cases_are_checked(bad: dict) -> None:
     with pytest.raises(InvalidValueError):
-        Following(**bad)
+        FollowingCase(**bad)
 
 
 def test_a_network_is_measured_and_concluded(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,9 +128,11 @@ def test_the_verdict_is_the_paired_intervals() -> None:
 
 
 def test_a_claim_fails_where_tcp_is_nearer() -> None:
-    worse = Found("mon", 0.1, dict.fromkeys(SCHEMES, (0.01,) * 8), {"tcp": Pair((0.02, 0.021), (0.01, 0.011))})
+    worse = LinkResult("mon", 0.1, dict.fromkeys(SCHEMES, (0.01,) * 8), {"tcp": Pair((0.02, 0.021), (0.01, 0.011))})
     assert not links._claim(worse).holds
-    rows = links._wins([Found(*worse[:3], dict.fromkeys(("tcp", "fixed", "repeated"), worse.pairs["tcp"]))]).rows
+    rows = links._wins(
+        [LinkResult(*worse[:3], dict.fromkeys(("tcp", "fixed", "repeated"), worse.pairs["tcp"]))]
+    ).rows
     assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1]
 
 
@@ -138,9 +140,9 @@ def test_narrow_links_are_concluded_by_the_ages() -> None:
     def made(age: float) -> list[tuple[float, ...]]:
         return [(0.01, 0.02, 1.0, age + 0.001 * k, 0.1, 0.0, 1.0, 1.0) for k in range(3)]
 
-    good = tuple(narrow.Found(made(0.1), made(4.0 if case == "16" else 0.1)) for case in narrow.CASES)
+    good = tuple(narrow.BandwidthResult(made(0.1), made(4.0 if case == "16" else 0.1)) for case in narrow.CASES)
     assert all(claim.holds for claim in narrow.conclude(SMALL, good).claims)
-    bad = tuple(narrow.Found(made(0.5), made(0.1)) for _ in narrow.CASES)
+    bad = tuple(narrow.BandwidthResult(made(0.5), made(0.1)) for _ in narrow.CASES)
     assert not any(claim.holds for claim in narrow.conclude(SMALL, bad).claims)
 
 

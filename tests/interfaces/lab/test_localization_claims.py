@@ -29,7 +29,7 @@ from interfaces.lab.localization.searching import (
     conclude_starts,
     conclude_symmetric,
 )
-from interfaces.lab.localization.trial import Track
+from interfaces.lab.localization.trial import PostureErrors
 from interfaces.lab.localization.unobservable import Axis, conclude_axes
 from robots.onboard.localizer import Status
 
@@ -37,19 +37,19 @@ SPREAD = np.array([0.002, 0.002, 0.001])
 """Deviations of x, y [m] and heading [rad] of somebody who keeps all bars."""
 
 
-def track(*, place: float = 1.0, turn: float = 1.0, doubt: float = 1.0, outlier: float = 0.0) -> Track:
+def track(*, place: float = 1.0, turn: float = 1.0, doubt: float = 1.0, outlier: float = 0.0) -> PostureErrors:
     """Errors so many times as large as they may be, honest but for what `doubt` is larger than they are."""
     rng = np.random.default_rng(0)
     spread = SPREAD * (place, place, turn)
     errors = rng.normal(size=(4000, 3)) * spread
     errors[-1, 0] += outlier
-    return Track(errors, np.tile(np.diag((doubt * spread) ** 2), (4000, 1, 1)))
+    return PostureErrors(errors, np.tile(np.diag((doubt * spread) ** 2), (4000, 1, 1)))
 
 
 GOOD = track()
 
 
-def room(name: str = "", bad: Track = GOOD) -> RoomFound:
+def room(name: str = "", bad: PostureErrors = GOOD) -> RoomFound:
     """A room in which everybody keeps the bars, but for one."""
     tracks = dict.fromkeys(METHODS, GOOD) | ({name: bad} if name else {})
     return RoomFound(1, "room", 0, 0.01, 10.0, 0, (4, 4), tracks, None)

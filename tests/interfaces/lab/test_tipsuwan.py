@@ -15,9 +15,9 @@ from interfaces.lab.tipsuwan.run import (
     ARRIVAL,
     LIFTED,
     MEDIANS,
-    Control,
-    Setting,
-    Track,
+    DriveTrace,
+    NetworkControl,
+    NetworkRunSetting,
     agent,
     leg,
     network_of,
@@ -25,13 +25,13 @@ from interfaces.lab.tipsuwan.run import (
     run,
 )
 from interfaces.lab.tipsuwan.s_paths import MOST_CURVATURE, SHORTER, T_PRED, predicted_time, s_path
-from interfaces.lab.tipsuwan.success import CASES, PATHS, Found, Seen, succeeds
+from interfaces.lab.tipsuwan.success import CASES, PATHS, PathSuccess, SuccessResult, succeeds
 from interfaces.middleware import MiddlewareConfig
 from robots.onboard.curve import Curve
 from vrs.errors import InvalidValueError
 
 SMALL = Study(seed=0, runs=2, length=15.0)
-SETTING = Setting()
+SETTING = NetworkRunSetting()
 CURVE = s_path(2)
 
 
@@ -41,9 +41,9 @@ def driven(control, delay, *, robot="kinematic", setting=SETTING, seed=1, curve=
 
 @pytest.mark.parametrize("robot", ["kinematic", "ipr"])
 def test_the_papers_three_cases(robot):
-    ideal = driven(Control.DIRECT, no_delay(), robot=robot)
-    without = driven(Control.DIRECT, network_of(1), robot=robot)
-    behind = driven(Control.NETWORK, network_of(1), robot=robot)
+    ideal = driven(NetworkControl.DIRECT, no_delay(), robot=robot)
+    without = driven(NetworkControl.DIRECT, network_of(1), robot=robot)
+    behind = driven(NetworkControl.NETWORK, network_of(1), robot=robot)
     assert succeeds(*map(success.seen, (ideal, without, behind)))
     assert ideal.t[-1] < behind.t[-1] < without.t[-1] == pytest.approx(15.0)
     assert measured(without).reason is Reason.LIMIT_CYCLE
@@ -53,26 +53,28 @@ def test_the_papers_three_cases(robot):
 
 
 def test_a_run_repeats_to_the_last_bit_and_the_seed_matters():
-    first, again, other = (driven(Control.NETWORK, network_of(1), seed=seed) for seed in (1, 1, 2))
+    first, again, other = (driven(NetworkControl.NETWORK, network_of(1), seed=seed) for seed in (1, 1, 2))
     assert np.array_equal(first.postures, again.postures)
     assert len(first.t) != len(other.t) or not np.array_equal(first.postures, other.postures)
 
 
 def test_the_exact_gain_and_the_networks_drive_alike():
-    exact, network = (driven(control, network_of(3)) for control in (Control.EXACT, Control.NETWORK))
+    exact, network = (driven(control, network_of(3)) for control in (NetworkControl.EXACT, NetworkControl.NETWORK))
     k = min(len(exact.t), len(network.t)) - 1
     assert math.dist(exact.postures[k, :2], network.postures[k, :2]) < 0.05
 
 
 def test_the_predictive_controller_arrives_sooner():
-    predictive, behind = (driven(control, network_of(1)) for control in (Control.PREDICTIVE, Control.EXACT))
+    predictive, behind = (
+        driven(control, network_of(1)) for control in (NetworkControl.PREDICTIVE, NetworkControl.EXACT)
+    )
     assert predictive.arrived
     assert predictive.t[-1] < 0.8 * behind.t[-1]
     assert measured(predictive).error < 0.03
 
 
 def test_no_drive_breaks_the_tolerance():
-    track = driven(Control.NETWORK, leg(0.3))
+    track = driven(NetworkControl.NETWORK, leg(0.3))
     v, w = track.drives.T
     # The mean of ten round trips isn't below the shortest: that's 2 (0.15 − 0.01) s.
     shortest = 2 * 0.14
@@ -82,10 +84,10 @@ def test_no_drive_breaks_the_tolerance():
 
 
 def test_half_a_middleware_is_worse_than_a_whole_one():
-    whole = driven(Control.EXACT, network_of(1))
+    whole = driven(NetworkControl.EXACT, network_of(1))
     for predicts in (True, False):
         config = MiddlewareConfig(predicts=predicts, schedules=not predicts)
-        half = driven(Control.EXACT, network_of(1), setting=Setting(middleware=config))
+        half = driven(NetworkControl.EXACT, network_of(1), setting=NetworkRunSetting(middleware=config))
         assert measured(half).error > 1.3 * measured(whole).error or not half.arrived
 
 
@@ -132,7 +134,7 @@ def track(x, y, theta=0.0, v=0.0, *, curve=None, arrived=False):
     t = 0.01 * np.arange(1501)
     columns = [np.broadcast_to(np.asarray(values, dtype=float), t.shape) for values in (x, y, theta, v)]
     drives = np.stack([columns[3], np.zeros_like(t)], -1)
-    return Track(curve or Curve([(0, 0), (10, 0)]), t, np.stack(columns[:3], -1), drives, arrived)
+    return DriveTrace(curve or Curve([(0, 0), (10, 0)]), t, np.stack(columns[:3], -1), drives, arrived)
 
 
 def test_reasons_are_told_apart():
@@ -158,9 +160,9 @@ def test_errors_and_progress_are_measured():
 
 
 GOOD = {
-    "ideal": Seen(True, 5.0, 0.01, 1.0, Reason.ARRIVED),
-    "without": Seen(False, 15.0, 0.1, 0.8, Reason.LIMIT_CYCLE),
-    "behind": Seen(True, 11.0, 0.02, 1.0, Reason.ARRIVED),
+    "ideal": SuccessResult(True, 5.0, 0.01, 1.0, Reason.ARRIVED),
+    "without": SuccessResult(False, 15.0, 0.1, 0.8, Reason.LIMIT_CYCLE),
+    "behind": SuccessResult(True, 11.0, 0.02, 1.0, Reason.ARRIVED),
 }
 
 
@@ -180,8 +182,8 @@ def concluded(bad):
         behind = tuple(GOOD["behind"] if n >= bad and k % PATHS < 10 else GOOD["without"] for n in range(10))
         if bad == 0:
             behind = (GOOD["behind"],) * 10
-        runs = dict.fromkeys(Control, behind) | {Control.DIRECT: (GOOD["without"],) * 10}
-        found.append(Found(8.5, GOOD["ideal"], runs, {}))
+        runs = dict.fromkeys(NetworkControl, behind) | {NetworkControl.DIRECT: (GOOD["without"],) * 10}
+        found.append(PathSuccess(8.5, GOOD["ideal"], runs, {}))
     return success.conclude(SMALL, tuple(found))
 
 
@@ -197,17 +199,17 @@ def test_claims_hold_as_the_figures_say():
 
 def test_shorter_paths_are_claimed_as_they_are():
     assert 6.0 <= predicted_time(s_path(4, within=SHORTER), 0.23, 0.25) <= 9.0
-    runs = {Control.DIRECT: (GOOD["without"],) * 10, Control.NETWORK: (GOOD["behind"],) * 10}
-    paths = [Found(7.0, GOOD["ideal"], runs, {})] * PATHS
-    arriving = [Found(6.1, GOOD["ideal"], runs | {Control.DIRECT: (GOOD["behind"],) * 10}, {})] * 2
+    runs = {NetworkControl.DIRECT: (GOOD["without"],) * 10, NetworkControl.NETWORK: (GOOD["behind"],) * 10}
+    paths = [PathSuccess(7.0, GOOD["ideal"], runs, {})] * PATHS
+    arriving = [PathSuccess(6.1, GOOD["ideal"], runs | {NetworkControl.DIRECT: (GOOD["behind"],) * 10}, {})] * 2
     assert shorter.conclude(SMALL, tuple(paths)).claims[0].holds
     findings = shorter.conclude(SMALL, tuple(paths[2:] + arriving))
     assert findings.claims[0].measured == pytest.approx(0.9)
     assert not findings.claims[0].holds
     assert findings.claims[0].interval == pytest.approx((0.9, 0.9))
     # A network of ten that fails on all paths: what is uncertain is how many such networks are drawn.
-    quick = runs | {Control.DIRECT: (GOOD["behind"], *(GOOD["without"],) * 9)}
-    claim = shorter.conclude(SMALL, (Found(7.0, GOOD["ideal"], quick, {}),) * PATHS).claims[0]
+    quick = runs | {NetworkControl.DIRECT: (GOOD["behind"], *(GOOD["without"],) * 9)}
+    claim = shorter.conclude(SMALL, (PathSuccess(7.0, GOOD["ideal"], quick, {}),) * PATHS).claims[0]
     assert claim.measured == pytest.approx(0.9)
     assert claim.interval == pytest.approx((0.7, 1.0), abs=0.101)
     assert [row[0] for row in findings.tables[0].rows][1:] == ["without middleware", "middleware, network"]
@@ -215,7 +217,7 @@ def test_shorter_paths_are_claimed_as_they_are():
 
 def test_a_case_is_run_by_all_controls():
     found = success.work(Study(seed=0, runs=2, length=2.0), "kinematic 0")
-    assert {control: len(runs) for control, runs in found.runs.items()} == dict.fromkeys(Control, 2)
+    assert {control: len(runs) for control, runs in found.runs.items()} == dict.fromkeys(NetworkControl, 2)
     assert set(found.tracks) == {success.IDEAL, *success.LABELS.values()}
     figure = success._figure("kinematic", found.tracks)
     assert figure.svg.startswith("<?xml")
@@ -303,21 +305,21 @@ def test_a_letter_says_what_became_of_a_path(arrivals, error, letter, monkeypatc
 
     def seen(told):
         control, delay = told
-        arrived = ideal if delay == "none" else behind if control is Control.EXACT else without
-        return Seen(arrived, 1.0, 0.1 if control is Control.DIRECT else error, 1.0, Reason.SLOW)
+        arrived = ideal if delay == "none" else behind if control is NetworkControl.EXACT else without
+        return SuccessResult(arrived, 1.0, 0.1 if control is NetworkControl.DIRECT else error, 1.0, Reason.SLOW)
 
     monkeypatch.setattr(extent, "seen", seen)
     assert extent._outcome(0, 0.2, extent.varied("alpha", 2.0, 15.0)) == letter
 
 
 def test_enough_runs_succeed_by_their_share_not_by_its_interval():
-    runs = {Control.DIRECT: (GOOD["without"],) * 10, Control.NETWORK: (GOOD["behind"],) * 10}
-    some = runs | {Control.NETWORK: (GOOD["behind"],) * 9 + (GOOD["without"],)}
+    runs = {NetworkControl.DIRECT: (GOOD["without"],) * 10, NetworkControl.NETWORK: (GOOD["behind"],) * 10}
+    some = runs | {NetworkControl.NETWORK: (GOOD["behind"],) * 9 + (GOOD["without"],)}
     for many, holds in ((10, True), (11, False)):
-        paths = [Found(8.5, GOOD["ideal"], some, {})] * many + [Found(8.5, GOOD["ideal"], runs, {})] * (
+        paths = [PathSuccess(8.5, GOOD["ideal"], some, {})] * many + [PathSuccess(8.5, GOOD["ideal"], runs, {})] * (
             PATHS - many
         )
-        assert success.claim("ipr", Control.NETWORK, paths, T_PRED, 0).holds is holds
+        assert success.claim("ipr", NetworkControl.NETWORK, paths, T_PRED, 0).holds is holds
 
 
 def test_the_paper_is_in_the_list():
@@ -330,13 +332,13 @@ def test_the_paper_is_in_the_list():
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: Setting(length=0.0), "length must be"),
+    (lambda: NetworkRunSetting(length=0.0), "length must be"),
     (lambda: leg(0.01), "median must be"),
     (lambda: leg(0.2, -1.0), "correlation time must be"),
     (lambda: PredictiveConfig(period=0.2), "period must be"),
     (lambda: PredictiveConfig(horizon=0), "horizon must be"),
     (lambda: PredictiveConfig(effort=(0.0, 0.1)), "effort must be"),
-    (lambda: driven(Control.DIRECT, no_delay(), robot="r2d2"), "one of kinematic, ipr"),
+    (lambda: driven(NetworkControl.DIRECT, no_delay(), robot="r2d2"), "one of kinematic, ipr"),
 ])  # fmt: skip
 def test_impossible_settings_are_refused(make, said):
     with pytest.raises(InvalidValueError, match=said):

@@ -21,7 +21,7 @@ from interfaces.media import Aloud, Presenter, SpeechConfig, SpeechError
 from interfaces.media.coding import SOUND_PERIOD, encode_sound
 from interfaces.media.presenter import MOST_WAITING
 from interfaces.media.speech import LONGEST, cleaned, reading_time, samples_of, shortened, spoken
-from interfaces.media.voice import LEAD, SILENCE, Playout
+from interfaces.media.voice import LEAD, SILENCE, VoicePlayout
 from vrs.clock import ManualClock, WallClock
 from vrs.errors import FormatError, InvalidValueError
 
@@ -127,7 +127,7 @@ def test_a_program_that_fails_or_hangs_says_so(tmp_path: Path, monkeypatch: pyte
 
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.integers(1, 80)), min_size=1, max_size=6))
 def test_what_is_said_is_heard_whole_once_and_in_order(said: list[tuple[float, int]]) -> None:
-    playout, now, number = Playout(), 100.0, itertools.count()
+    playout, now, number = VoicePlayout(), 100.0, itertools.count()
     expected, heard = [], []
     tick = 100.0
 
@@ -155,7 +155,7 @@ def test_what_is_said_is_heard_whole_once_and_in_order(said: list[tuple[float, i
 
 
 def test_hush_ends_what_is_said() -> None:
-    playout = Playout()
+    playout = VoicePlayout()
     begin, _ = playout.say([b"a"] * 100, now=1.0)
     assert playout.at(begin) == b"a"
     playout.hush()
@@ -164,7 +164,7 @@ def test_hush_ends_what_is_said() -> None:
 
 @needs_program
 def test_speak_lasts_as_long_as_its_words_and_one_waits_for_the_other() -> None:
-    clock, playout, told = WallClock(), Playout(), []
+    clock, playout, told = WallClock(), VoicePlayout(), []
 
     async def talk() -> list[float]:
         presenter = Presenter(clock, playout)
@@ -191,7 +191,7 @@ def test_without_sound_words_stand_as_long_as_reading_takes_and_who_is_cancelled
     monkeypatch.setattr("interfaces.media.presenter.reading_time", lambda text: reading_time(text) / 100)
 
     async def talk() -> None:
-        presenter = Presenter(WallClock(), Playout(), audible=False)
+        presenter = Presenter(WallClock(), VoicePlayout(), audible=False)
         assert "[media]" in presenter.problem
         await presenter.speak("Hello!")
         assert presenter.saying == ""
@@ -218,7 +218,7 @@ def test_what_a_robot_says_and_shows_elsewhere_is_said_and_shown_here(monkeypatc
 
     async def follow() -> None:
         shown: list[str] = []
-        presenter = Presenter(WallClock(), Playout(), screen=shown.append, audible=False)
+        presenter = Presenter(WallClock(), VoicePlayout(), screen=shown.append, audible=False)
 
         async def until(words: str) -> None:
             async with asyncio.timeout(10):
@@ -273,7 +273,7 @@ def test_a_loudspeaker_on_board_is_done_when_its_words_are(monkeypatch: pytest.M
 def test_a_message_stands_until_it_is_cleared() -> None:
     async def show() -> None:
         shown: list[str] = []
-        presenter = Presenter(ManualClock(), Playout(), screen=shown.append, audible=False)
+        presenter = Presenter(ManualClock(), VoicePlayout(), screen=shown.append, audible=False)
         presenter.show("Please  put the book\non my top side!")
         assert presenter.message == "Please put the book on my top side!"
         with pytest.raises(InvalidValueError):

@@ -11,7 +11,7 @@ import numpy as np
 from mcap.reader import make_reader
 
 from interfaces.recording.recording import Recording
-from interfaces.recording.track import REAL, VIRTUAL, Track
+from interfaces.recording.track import REAL, VIRTUAL, SampleTrack
 from vrs.model import Array
 
 TOPICS = {"/virtual/pose": "virtual", "/real/pose": "real"}
@@ -70,7 +70,7 @@ def check(path: Path, recording: Recording, least: int) -> None:
     assert not found
 
 
-def _beside(samples: Track, shown: list[tuple[float, Array]], least: int) -> tuple[Array, Array]:
+def _beside(samples: SampleTrack, shown: list[tuple[float, Array]], least: int) -> tuple[Array, Array]:
     """Joints of the samples of the same times, which are whole nanoseconds here, and what was shown then."""
     assert len(shown) >= least
     t = np.array([at for at, _ in shown])

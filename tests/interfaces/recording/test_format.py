@@ -18,7 +18,7 @@ from mcap.stream_reader import StreamReader
 
 from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording import messages as m
-from interfaces.recording.channels import CHANNELS, Channel
+from interfaces.recording.channels import CHANNELS, RecordingChannel
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.poses import quaternions
 from tests.interfaces.recording import recorded, shown
@@ -128,7 +128,7 @@ class _Share(msgspec.Struct):
 
 def test_bounds_of_numbers_are_written_in_one_way() -> None:
     """Of two that are equal, typing knows the first that was written: a file would hang on the order of imports."""
-    channel = Channel("/share", "vrs.Share", (_Share,), ())
+    channel = RecordingChannel("/share", "vrs.Share", (_Share,), ())
     assert b'"minimum":0.0,"maximum":1.0' in channel.json_schema((_Share,))
 
 

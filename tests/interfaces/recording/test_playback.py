@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from interfaces.playhead import Mode
-from interfaces.recording.headless import Frames
+from interfaces.recording.headless import PlaybackFrames
 from interfaces.recording.playback import LAG, Align, Playback
 from interfaces.recording.recording import Recording, open_recording
 from tests.interfaces.recording.made import BEHIND, MODEL, Site, make
@@ -27,7 +27,7 @@ def playback(made):
 
 def run(playback, seconds, *, hz=50.0, begun=0.0):
     """Frames of so many seconds of the user's time, with the marks."""
-    frames = Frames(playback, rate=hz, begun=begun)
+    frames = PlaybackFrames(playback, rate=hz, begun=begun)
     found = []
     while frames.due <= begun + seconds + 1e-9:
         one = frames.next(now=frames.due)
@@ -95,7 +95,7 @@ class TestFrames:
 
     def test_one_who_is_late_gets_the_newest_and_the_rate_stays(self, playback):
         playback.play(now=0.0, rate=2.0)
-        frames = Frames(playback, rate=50.0, begun=0.0)
+        frames = PlaybackFrames(playback, rate=50.0, begun=0.0)
         frames.next(now=0.0)
         at, moment, _ = frames.next(now=1.007)
         assert (at, moment.t) == (pytest.approx(1.0), pytest.approx(2.0))
@@ -257,7 +257,7 @@ class TestGrowing:
         site, recording, playback = self.watched(tmp_path)
         with recording:
             playback.play(now=0.0, rate=8.0)
-            frames, seen = Frames(playback, rate=50.0, begun=0.0), []
+            frames, seen = PlaybackFrames(playback, rate=50.0, begun=0.0), []
             for k in range(1000):
                 now = k / 50
                 if now < 5.0:

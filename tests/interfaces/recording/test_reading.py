@@ -10,7 +10,7 @@ import pytest
 
 from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording import messages as m
-from interfaces.recording.source import Source
+from interfaces.recording.source import FileSource
 from tests.interfaces.recording import recorded
 from vrs.errors import FormatError, InvalidValueError, NonFiniteTimeError, VrsError
 
@@ -82,13 +82,13 @@ def test_a_seek_reads_a_few_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     samples = [(k * recorded.STEP, recorded.sample(k)) for k in range(60 * 60)]
     path = recorded.write(tmp_path / "run.mcap", samples, end=60.0)
     with open_recording(path) as recording:
-        read, lengths = Source.read, []
+        read, lengths = FileSource.read, []
 
-        def counted(self: Source, offset: int, length: int) -> bytes:
+        def counted(self: FileSource, offset: int, length: int) -> bytes:
             lengths.append(length)
             return read(self, offset, length)
 
-        monkeypatch.setattr(Source, "read", counted)
+        monkeypatch.setattr(FileSource, "read", counted)
         for t in (30.1, 30.2, 30.15, 31.0):
             assert np.isfinite(recording.real(t)).all()
         assert len(lengths) <= 16

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from interfaces.station.bounds import SOCKET, Bounds, BoundsConfig
+from interfaces.station.bounds import SOCKET, BoundsConfig, RequestBounds
 from vrs.errors import InvalidValueError
 
 PAGE = b'<script>one</script><scripted><script src="/x"></script>'
@@ -38,7 +38,7 @@ class Inner:
         self.seen.append(message["code"])
 
 
-def ask(bounds: Bounds, path: str, method: str = "GET") -> tuple[int, dict[str, str], bytes]:
+def ask(bounds: RequestBounds, path: str, method: str = "GET") -> tuple[int, dict[str, str], bytes]:
     sent: list[Any] = []
 
     async def run() -> None:
@@ -58,7 +58,7 @@ def ask(bounds: Bounds, path: str, method: str = "GET") -> tuple[int, dict[str, 
 
 def test_only_the_page_and_its_parts_are_there() -> None:
     inner = Inner()
-    bounds = Bounds(inner, "/", lambda most: True)
+    bounds = RequestBounds(inner, "/", lambda most: True)
     for path, method in (("/elsewhere", "GET"), ("/", "POST"), (SOCKET + "socket.io/", "GET"), ("//", "GET")):
         assert ask(bounds, path, method)[0] == 404
     assert inner.seen == []
@@ -72,7 +72,7 @@ def test_there_are_only_so_many_visitors() -> None:
         asked.append(most)
         return len(asked) > 1
 
-    bounds = Bounds(inner, "/", make_room, BoundsConfig(visitors=3))
+    bounds = RequestBounds(inner, "/", make_room, BoundsConfig(visitors=3))
     assert ask(bounds, "/")[0] == 503
     assert ask(bounds, "/_nicegui/3/static/x.js")[0] == 200
     assert ask(bounds, "/")[0] == 200
@@ -80,7 +80,7 @@ def test_there_are_only_so_many_visitors() -> None:
 
 
 def test_of_many_pages_that_are_asked_for_at_once_the_newest_is_made_first() -> None:
-    bounds = Bounds(Inner(), "/", lambda most: True, BoundsConfig(pages=100, pages_burst=2, pages_waiting=4))
+    bounds = RequestBounds(Inner(), "/", lambda most: True, BoundsConfig(pages=100, pages_burst=2, pages_waiting=4))
     ended: list[tuple[int, int]] = []
 
     async def one(number: int) -> None:
@@ -100,7 +100,7 @@ def test_of_many_pages_that_are_asked_for_at_once_the_newest_is_made_first() -> 
 
 
 def test_every_script_of_the_page_is_signed_anew_each_time() -> None:
-    bounds = Bounds(Inner(), "/", lambda most: True)
+    bounds = RequestBounds(Inner(), "/", lambda most: True)
     words = set()
     for _ in range(3):
         status, headers, body = ask(bounds, "/")
@@ -147,7 +147,7 @@ class Wire:
 
 def test_one_who_says_too_much_is_closed() -> None:
     inner, wire = Inner(), Wire(["x"] * 10)
-    bounds = Bounds(inner, "/", lambda most: True, BoundsConfig(rate=1, burst=5))
+    bounds = RequestBounds(inner, "/", lambda most: True, BoundsConfig(rate=1, burst=5))
     asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
     assert inner.seen == [SOCKET + "socket.io/", None, "x", "x", "x", "x", "x", 1008]
     assert [message.get("code") for message in wire.sent] == [None, 1008]
@@ -156,7 +156,7 @@ def test_one_who_says_too_much_is_closed() -> None:
 def test_one_who_does_not_read_is_cut_off() -> None:
     inner, wire = Inner(), Wire(["x"], stuck=True)
     inner.forever = True
-    bounds = Bounds(inner, "/", lambda most: True, BoundsConfig(blocked=0.1))
+    bounds = RequestBounds(inner, "/", lambda most: True, BoundsConfig(blocked=0.1))
     with pytest.raises(ConnectionResetError):
         asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
     assert wire.aborted
@@ -165,14 +165,14 @@ def test_one_who_does_not_read_is_cut_off() -> None:
 @pytest.mark.parametrize("path", ["/ws2", "/_nicegui/3/static/x.js", "/"])
 def test_sockets_are_taken_at_one_place_only(path: str) -> None:
     inner, wire = Inner(), Wire([])
-    asyncio.run(Bounds(inner, "/", lambda most: True)(wire.scope(path), wire.receive, wire.send))
+    asyncio.run(RequestBounds(inner, "/", lambda most: True)(wire.scope(path), wire.receive, wire.send))
     assert inner.seen == []
     assert [message["type"] for message in wire.sent] == ["websocket.close"]
 
 
 def test_a_socket_that_ended_makes_room() -> None:
     inner = Inner()
-    bounds = Bounds(inner, "/", lambda most: True, BoundsConfig(visitors=1))
+    bounds = RequestBounds(inner, "/", lambda most: True, BoundsConfig(visitors=1))
     for _ in range(3):
         wire = Wire([])
         asyncio.run(bounds(wire.scope(), wire.receive, wire.send))
@@ -187,7 +187,7 @@ def test_of_too_many_sockets_the_oldest_gives_way() -> None:
             await send({"type": "websocket.accept"})
             await held.wait()
 
-        bounds = Bounds(keep, "/", lambda most: True, BoundsConfig(visitors=2))
+        bounds = RequestBounds(keep, "/", lambda most: True, BoundsConfig(visitors=2))
         wires = [Wire([]) for _ in range(3)]
         tasks = []
         for wire in wires:
