@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.results import Bar, Cost, Part, Result
 from interfaces.val2.check import check_text
 from interfaces.val2.controller import Controller
-from interfaces.val2.events import Ended, Failed
+from interfaces.val2.events import ProgramEnded, ProgramFailed
 from interfaces.val2.motion import arm_for
 from interfaces.val2.rehearsal import rehearse
 from interfaces.val2.source import parse_file
@@ -78,9 +78,9 @@ def _carried_out(programs: tuple[Program, ...]) -> float:
     now, begun = 0.0, time.thread_time()
     while True:
         for event in controller.advance(now=now):
-            if isinstance(event, Failed):
+            if isinstance(event, ProgramFailed):
                 raise event.error
-            if isinstance(event, Ended):
+            if isinstance(event, ProgramEnded):
                 return time.thread_time() - begun
         now = max(now, controller.next_deadline())
         assert now < math.inf

@@ -13,7 +13,7 @@ from interfaces.cli.run import text_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from interfaces.val2.check import Finding
+    from interfaces.val2.check import CheckFinding
     from interfaces.val2.source import SourceFile
 
 SUFFERED = 2
@@ -46,27 +46,27 @@ def check(
     return SUFFERED if wrong else 0
 
 
-def _rehearsed(source: SourceFile) -> list[Finding]:
+def _rehearsed(source: SourceFile) -> list[CheckFinding]:
     """What only planning shows: the first program on a virtual arm alone."""
-    from interfaces.val2.check import Finding
+    from interfaces.val2.check import CheckFinding
     from interfaces.val2.rehearsal import rehearse
     from robots import puma560
 
     return [
-        Finding("error" if one.grave else "warning", one.error.at(place=one.place), one.place)
+        CheckFinding("error" if one.grave else "warning", one.error.at(place=one.place), one.place)
         for one in rehearse(source, puma560.model()).findings
     ]
 
 
-def _once(found: list[Finding]) -> list[Finding]:
+def _once(found: list[CheckFinding]) -> list[CheckFinding]:
     """Without what was found at the same place before: a loop comes by many times."""
-    first: dict[tuple[object, ...], Finding] = {}
+    first: dict[tuple[object, ...], CheckFinding] = {}
     for finding in found:
         first.setdefault((finding.severity, finding.place, finding.error.what, finding.error.program), finding)
     return list(first.values())
 
 
-def _row(finding: Finding) -> dict[str, object]:
+def _row(finding: CheckFinding) -> dict[str, object]:
     error, place = finding.error, finding.place
     return {
         "severity": finding.severity,
@@ -79,7 +79,7 @@ def _row(finding: Finding) -> dict[str, object]:
     }
 
 
-def _show(path: Path, found: Sequence[Finding]) -> None:
+def _show(path: Path, found: Sequence[CheckFinding]) -> None:
     for finding in found:
         error, place = finding.error, finding.place
         where = str(path) if place is None else f"{path}:{place.line}:{place.column}"

@@ -13,7 +13,7 @@ from interfaces.software import software
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from interfaces.val2.monitor.monitor import Monitor
+    from interfaces.val2.monitor.monitor import TerminalMonitor
     from interfaces.val2.monitor.switchboard import Control
     from interfaces.val2.motion import Arm
     from vrs.clock import Clock
@@ -97,24 +97,24 @@ def _converse(arm: Arm, control: Control, clock: Clock, files: Path, what: str) 
 
     from interfaces.val2.controller import Controller
     from interfaces.val2.monitor.files import Files
-    from interfaces.val2.monitor.monitor import Monitor
+    from interfaces.val2.monitor.monitor import TerminalMonitor
     from interfaces.val2.monitor.switchboard import Switchboard
 
     controller = Controller(arm, parameters=arm.parameters, now=clock.now())
     typed = sys.stdin.isatty() and sys.stdout.isatty()
     board = Switchboard(controller, control)
-    monitor = Monitor(board, Files(files, anywhere=True), what, patient=not typed)
+    monitor = TerminalMonitor(board, Files(files, anywhere=True), what, patient=not typed)
     asyncio.run(_typed(monitor, clock) if typed else _piped(monitor, clock))
 
 
-async def _typed(monitor: Monitor, clock: Clock) -> None:
+async def _typed(monitor: TerminalMonitor, clock: Clock) -> None:
     from interfaces.val2.monitor.terminal import Terminal
 
     state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
     await Terminal(monitor, clock, history=state / "vrs-teleop" / "console").run()
 
 
-async def _piped(monitor: Monitor, clock: Clock) -> None:
+async def _piped(monitor: TerminalMonitor, clock: Clock) -> None:
     import asyncio
     import contextlib
     import signal

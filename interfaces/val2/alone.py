@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.memory import where
 from interfaces.val2.syntax import (
     AnyValue,
@@ -13,7 +13,7 @@ from interfaces.val2.syntax import (
     Decompose,
     Do,
     Else,
-    End,
+    EndBlock,
     Exit,
     For,
     Goto,
@@ -37,13 +37,13 @@ _MEANWHILE: Final = {
 """What DO may do while a program runs, beside assignments and TYPE."""
 
 
-def stray(step: Step, at: Place) -> ValError | None:
+def stray(step: Step, at: TextPosition) -> ValError | None:
     """Why a step can't stand alone, as DO wants it; None if it can."""
     match step.statement:
         case (
             If()
             | Else()
-            | End()
+            | EndBlock()
             | While()
             | Do()
             | Until()

@@ -12,7 +12,7 @@ from interfaces.val2 import forms, kinds, walk
 from interfaces.val2.alone import stray
 from interfaces.val2.compiler import compiled, refusal
 from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
@@ -51,25 +51,25 @@ _WORD: Final = re.compile(r'"[^"]*"|[#$]?[A-Za-z][A-Za-z0-9_.]*')
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class CheckFinding:
     """Something that a check found."""
 
     severity: Literal["error", "warning"]
     error: ValError
     """What is wrong, and in which program and step."""
-    place: Place | None
+    place: TextPosition | None
     """Where in the file."""
 
 
-def _error(error: ValError) -> Finding:
-    return Finding("error", error, error.place)
+def _error(error: ValError) -> CheckFinding:
+    return CheckFinding("error", error, error.place)
 
 
-def _warning(error: ValError) -> Finding:
-    return Finding("warning", error, error.place)
+def _warning(error: ValError) -> CheckFinding:
+    return CheckFinding("warning", error, error.place)
 
 
-def check_text(text: str, name: str) -> tuple[SourceFile | None, list[Finding]]:
+def check_text(text: str, name: str) -> tuple[SourceFile | None, list[CheckFinding]]:
     """Read a file and check it.
 
     Args:
@@ -82,18 +82,18 @@ def check_text(text: str, name: str) -> tuple[SourceFile | None, list[Finding]]:
     source, unreadable = read_all(text, name)
     found = [_error(error) for error in unreadable.values()]
     if not source.programs and not unreadable:
-        found.append(_error(ValError("Undefined program", "the file holds none", place=Place(1, 1))))
+        found.append(_error(ValError("Undefined program", "the file holds none", place=TextPosition(1, 1))))
     found += check(source, unreadable.keys(), words_of(text, unreadable))
     found += _alike_names(text)
     return None if unreadable else source, sorted(found, key=_order)
 
 
-def _order(finding: Finding) -> tuple[int, int]:
+def _order(finding: CheckFinding) -> tuple[int, int]:
     place = finding.place
     return (0, 0) if place is None else (place.line, place.column)
 
 
-def check(source: SourceFile, unreadable: Collection[int] = (), words: Collection[str] = ()) -> list[Finding]:
+def check(source: SourceFile, unreadable: Collection[int] = (), words: Collection[str] = ()) -> list[CheckFinding]:
     """What is wrong with the programs of a file, one after the other.
 
     Args:
@@ -145,7 +145,7 @@ class _Checker:
                     names |= {variable.name for variable in variables}
         return frozenset(names)
 
-    def program(self, program: Program) -> Iterator[Finding]:
+    def program(self, program: Program) -> Iterator[CheckFinding]:
         """What is wrong with a program."""
         structure, errors = survey(program)
         yield from (_error(e) for e in errors if e.place is None or e.place.line not in self._unreadable)
@@ -168,9 +168,11 @@ class _Checker:
                 yield _error(error.at(program=program.name, step=number, place=step.at))
             for finding in self._step(step, known, usable, reported):
                 error = finding.error.at(program=program.name, step=number, place=step.at)
-                yield Finding(finding.severity, error, error.place)
+                yield CheckFinding(finding.severity, error, error.place)
 
-    def _step(self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]) -> Iterator[Finding]:
+    def _step(
+        self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
+    ) -> Iterator[CheckFinding]:
         statement = step.statement
         if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
@@ -191,7 +193,7 @@ class _Checker:
 
     def _unset(
         self, expression: Expression, wanted: Kind, usable: set[str], reported: set[str]
-    ) -> Iterator[Finding]:
+    ) -> Iterator[CheckFinding]:
         """Names that nothing in the file sets, each once in a program; functions that do nothing."""
         match expression:
             case Variable(name, _, at) if name not in usable and name not in reported:
@@ -227,7 +229,7 @@ class _Checker:
             case React(program=name, at=at) if name and name not in self._programs:
                 yield self._undefined(name, at)
 
-    def _undefined(self, name: str, at: Place) -> ValError:
+    def _undefined(self, name: str, at: TextPosition) -> ValError:
         close = nearest(name.upper(), [known.upper() for known in self._programs])
         return ValError("Undefined program", f"{name}{close.lower()}", place=at)
 
@@ -351,7 +353,7 @@ def _capped(statement: Statement) -> Iterator[ValError]:
             yield ValError("Value out of range", detail, place=operand.at)
 
 
-def _alike_names(text: str) -> Iterator[Finding]:
+def _alike_names(text: str) -> Iterator[CheckFinding]:
     """Names that differ only where names don't count any more."""
     first: dict[str, str] = {}
     try:
@@ -372,4 +374,4 @@ def _alike_names(text: str) -> Iterator[Finding]:
             if other != name:
                 detail = f"{name} is the same as {other}: {SIGNIFICANT} characters count"
                 first[counted] = name
-                yield _warning(ValError("Long names", detail, place=Place(number, found.start() + 1)))
+                yield _warning(ValError("Long names", detail, place=TextPosition(number, found.start() + 1)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.memory import Slot
+from interfaces.val2.memory import VariableSlot
 from interfaces.val2.operations import Slots
 from interfaces.val2.syntax import Program
 
@@ -27,7 +27,7 @@ class Code:
     kept: int
     """How many FOR and CASE there are."""
 
-    def slots(self, arguments: list[Slot]) -> list[Any]:
+    def slots(self, arguments: list[VariableSlot]) -> list[Any]:
         """What a call has of its own.
 
         Raises:
@@ -35,4 +35,4 @@ class Code:
         """
         if len(arguments) > len(self.program.parameters):
             raise ValError("Too many arguments", f"{self.program.name} takes {len(self.program.parameters)}")
-        return [*arguments, *[Slot() for _ in range(self.names - len(arguments))], *[None] * self.kept]
+        return [*arguments, *[VariableSlot() for _ in range(self.names - len(arguments))], *[None] * self.kept]

@@ -20,10 +20,10 @@ from interfaces.val2.forms import UNAVAILABLE
 from interfaces.val2.functions import expressions
 from interfaces.val2.geometry import to_oat
 from interfaces.val2.instructions import instruction
-from interfaces.val2.memory import MOST_DIMENSIONS, Slot, index, mismatch, undefined, where
+from interfaces.val2.memory import MOST_DIMENSIONS, VariableSlot, index, mismatch, undefined, where
 from interfaces.val2.operations import Slots
 from interfaces.val2.reactions import reaction_to
-from interfaces.val2.structure import Block, structure
+from interfaces.val2.structure import StructureBlock, structure
 from interfaces.val2.syntax import (
     AnyValue,
     Assign,
@@ -33,7 +33,7 @@ from interfaces.val2.syntax import (
     Decompose,
     Do,
     Else,
-    End,
+    EndBlock,
     Exit,
     Expression,
     For,
@@ -85,7 +85,7 @@ class _Compiler:
     def __init__(self, program: Program, context: Context) -> None:
         self.program, self.context = program, context
         self.structure = structure(program)
-        scope: dict[str, int | Slot] = {p.name: i for i, p in enumerate(program.parameters)}
+        scope: dict[str, int | VariableSlot] = {p.name: i for i, p in enumerate(program.parameters)}
         names = len(program.parameters)
         for step in program.steps:
             if not isinstance(step.statement, Local) or step.statement.keyword == "GLOBAL":
@@ -131,7 +131,7 @@ class _Compiler:
             case Value() | Else():
                 target = self._past(i)
                 return lambda _: target
-            case End():
+            case EndBlock():
                 return self._end(i)
             case Assign(name, value):
                 return self._assign(name, value, following)
@@ -189,7 +189,7 @@ class _Compiler:
 
     # Structures.
 
-    def _block(self, i: int) -> Block:
+    def _block(self, i: int) -> StructureBlock:
         """The innermost block that a step belongs to as its head, its end, or an arm."""
         return self.structure.blocks[i]
 
@@ -285,7 +285,7 @@ class _Compiler:
         read: Callable[[Slots], float | str] = x.string(e) if name.prefix else x.real(e)
         type_ = None if name.prefix else float
         place = None if name.indices else x.slot(name.name)
-        if isinstance(place, Slot):
+        if isinstance(place, VariableSlot):
 
             def assign(s: Slots) -> int:
                 value = read(s)
@@ -348,14 +348,14 @@ class _Compiler:
 
         return invoke
 
-    def _argument(self, e: Expression | None) -> Callable[[Slots], Slot]:
+    def _argument(self, e: Expression | None) -> Callable[[Slots], VariableSlot]:
         """By reference where it's a name, by value where it's anything else."""
         if e is None:
-            return lambda _: Slot()
+            return lambda _: VariableSlot()
         if isinstance(e, Variable):
             return self.x.reference(e)
         value = self.x.value(e)
-        return lambda s: Slot(value(s))
+        return lambda s: VariableSlot(value(s))
 
     def _react(self, react: React, following: int) -> StepFunction:
         context, signal, at = self.context, self.x.real(react.signal), react.at

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2.code import Code
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.events import Event, SignalChanged, Warned
 from interfaces.val2.forms import PARAMETERS, SWITCHES
 from interfaces.val2.memory import Memory, where
@@ -116,7 +116,7 @@ class Context:
     """Programs that were compiled, by name."""
     warned: set[Warned] = field(default_factory=set)
 
-    def code(self, name: str, at: Place = NOWHERE) -> Code:
+    def code(self, name: str, at: TextPosition = NOWHERE) -> Code:
         """A program, compiled anew where it was changed.
 
         Raises:

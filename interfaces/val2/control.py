@@ -12,7 +12,7 @@ from robots.onboard.lease import LeaseState
 
 if TYPE_CHECKING:
     from interfaces.stream.connect import Connection
-    from interfaces.val2.monitor.switchboard import Person
+    from interfaces.val2.monitor.switchboard import SharedOperator
 
 PATIENCE: Final = 3.0
 """How long the lease is waited for [s]; the robot comes to rest between two."""
@@ -47,7 +47,7 @@ class LeaseControl:
         self._lapses = connection.lapses
         self._resumed = self._resume_until = -math.inf
 
-    def wanted(self, person: Person | None = None, *, now: float) -> str | None:
+    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         """Ask for the lease: empty if it's there, why not, or None while nothing is known yet.
 
         Args:
@@ -78,7 +78,7 @@ class LeaseControl:
     def _acquire(self) -> None:
         self._connection.acquire(wait=0.0)
 
-    def _theirs(self, person: Person, lease: Lease | None, now: float) -> str | None:
+    def _theirs(self, person: SharedOperator, lease: Lease | None, now: float) -> str | None:
         """A share of the lease of a person's session, which is to take one if it has none."""
         mine = lease is not None and lease.shared and lease.commands and not self._ends
         if mine and self._share[0] == person.session:

@@ -16,10 +16,10 @@ from interfaces.val2.alone import meanwhile, stray
 from interfaces.val2.compiler import compiled
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Event, Failed
+from interfaces.val2.events import Event, ProgramFailed
 from interfaces.val2.functions import expressions
-from interfaces.val2.interpreter import State, Task
-from interfaces.val2.memory import LONGEST_STRING, Memory, Slot
+from interfaces.val2.interpreter import ProgramState, Task
+from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.ports import ArmPort
 from interfaces.val2.signals import Rule, Signals
 from interfaces.val2.source import SignalRule
@@ -40,10 +40,10 @@ MOST_AT_ONCE: Final = 2_500
 
 
 @dataclass(frozen=True, slots=True)
-class Status:
+class ControllerStatus:
     """What STATUS shows."""
 
-    state: State
+    state: ProgramState
     program: str = ""
     """Where it runs or stands: the innermost call."""
     step: int = 0
@@ -120,7 +120,7 @@ class Controller:
     @property
     def running(self) -> bool:
         """Whether a program runs."""
-        return self._program is not None and self._program.state is State.RUNNING
+        return self._program is not None and self._program.state is ProgramState.RUNNING
 
     @property
     def doing(self) -> bool:
@@ -132,13 +132,13 @@ class Controller:
         """Whether a PROMPT waits for a line."""
         return self.context.asking
 
-    def status(self) -> Status:
+    def status(self) -> ControllerStatus:
         """What the program does."""
         task = self._program
         if task is None:
-            return Status(State.IDLE)
+            return ControllerStatus(ProgramState.IDLE)
         stack = tuple((f.name, f.step) for f in task.frames)
-        return Status(task.state, *stack[-1], task.cycles, stack, task.word)
+        return ControllerStatus(task.state, *stack[-1], task.cycles, stack, task.word)
 
     # Commands.
 
@@ -167,7 +167,7 @@ class Controller:
         context.now = max(now, context.now)
         code = context.code(name)
         x = expressions(context)
-        slots = [x.reference(a)([]) if isinstance(a, Variable) else Slot(x.value(a)([])) for a in arguments]
+        slots = [x.reference(a)([]) if isinstance(a, Variable) else VariableSlot(x.value(a)([])) for a in arguments]
         task = Task(context, code, slots, cycles=cycles, step=step, single=single)
         rules = [self._rule(r) for r in self.cell]
         self.arm.begin_program()
@@ -207,7 +207,7 @@ class Controller:
         try:
             code.steps[0](code.slots([]))
         except ValError as error:
-            self.context.events.append(Failed(error))
+            self.context.events.append(ProgramFailed(error))
         self._due = True
 
     def let_go(self, *, now: float) -> None:
@@ -220,7 +220,7 @@ class Controller:
             scheduled = self.arm.answered(now=context.now) and not self.arm.ready(now=context.now)
             word = "DO"
         except ValError as error:
-            context.events.append(Failed(error))
+            context.events.append(ProgramFailed(error))
             scheduled, word = True, "ERROR"
         if scheduled:
             self._do.end(word)
@@ -332,7 +332,7 @@ class Controller:
 
     def _paused(self, now: float) -> Task:
         self._free()
-        if self._program is None or self._program.state is not State.PAUSED:
+        if self._program is None or self._program.state is not ProgramState.PAUSED:
             raise ValError("No program to proceed")
         self.context.now = max(now, self.context.now)
         self._due = True
@@ -366,7 +366,7 @@ class Controller:
             self._busy = start + done * STATEMENT
             context.signals.advance(now=now)
             self._due |= context.notice()
-            if task is self._do and task.state is not State.RUNNING:
+            if task is self._do and task.state is not ProgramState.RUNNING:
                 self._do = None
         events = tuple(context.events)
         context.events.clear()

@@ -9,7 +9,7 @@ from interfaces.val2.code import StepFunction
 from interfaces.val2.context import SPECIAL, Waiting
 from interfaces.val2.events import Asked, Typed
 from interfaces.val2.expressions import Expressions
-from interfaces.val2.memory import Slot, mismatch
+from interfaces.val2.memory import VariableSlot, mismatch
 from interfaces.val2.operations import Slots
 from interfaces.val2.syntax import Expression, Format, Prompt, Variable
 
@@ -35,7 +35,7 @@ def prompt_step(x: Expressions, prompt: Prompt, following: int) -> StepFunction:
     if any(v.prefix == "#" for v in names):
         raise mismatch(next(v for v in names if v.prefix == "#"))
 
-    def asking(question: str, targets: list[Slot]) -> Generator[float, None, int]:
+    def asking(question: str, targets: list[VariableSlot]) -> Generator[float, None, int]:
         context.answers.clear()
         context.asking = True
         try:

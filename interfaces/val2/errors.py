@@ -12,7 +12,7 @@ TAKEN: Final = "whoever has control has given another command"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class TextPosition:
     """Where something stands in a text."""
 
     line: int
@@ -31,7 +31,7 @@ class ValError(VrsError):
         *,
         program: str = "",
         step: int | None = None,
-        place: Place | None = None,
+        place: TextPosition | None = None,
     ) -> None:
         """Say what is wrong.
 
@@ -58,7 +58,7 @@ class ValError(VrsError):
         head = f"*{self.what}*" + (f" {self.detail}" if self.detail else "")
         return ", ".join([head, *where])
 
-    def at(self, *, program: str = "", step: int | None = None, place: Place | None = None) -> ValError:
+    def at(self, *, program: str = "", step: int | None = None, place: TextPosition | None = None) -> ValError:
         """The same error at a place, where it doesn't know its own."""
         return ValError(
             self.what,

@@ -25,7 +25,7 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
-class Paused:
+class ProgramPaused:
     """A program stands before a step, and can go on."""
 
     program: str
@@ -36,7 +36,7 @@ class Paused:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class ProgramEnded:
     """A program, or a `DO`, is done."""
 
     program: str
@@ -46,7 +46,7 @@ class Ended:
 
 
 @dataclass(frozen=True, slots=True)
-class Failed:
+class ProgramFailed:
     """A program, or a `DO`, was stopped by an error."""
 
     error: ValError
@@ -67,4 +67,4 @@ class SignalChanged:
     on: bool
 
 
-Event: TypeAlias = Typed | Asked | Paused | Ended | Failed | Warned | SignalChanged
+Event: TypeAlias = Typed | Asked | ProgramPaused | ProgramEnded | ProgramFailed | Warned | SignalChanged

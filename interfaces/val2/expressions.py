@@ -15,7 +15,7 @@ import numpy as np
 from interfaces.val2 import arithmetic
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
-from interfaces.val2.memory import MOST_DIMENSIONS, Key, Slot, index, mismatch, undefined, where
+from interfaces.val2.memory import MOST_DIMENSIONS, Key, VariableSlot, index, mismatch, undefined, where
 from interfaces.val2.operations import Real, Slots, joined, placed
 from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Number, Text, Unary, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
@@ -58,7 +58,9 @@ class Functions(NamedTuple):
 class Expressions:
     """Makes closures of the expressions of one program."""
 
-    def __init__(self, context: Context, functions: Functions, scope: dict[str, int | Slot] | None = None) -> None:
+    def __init__(
+        self, context: Context, functions: Functions, scope: dict[str, int | VariableSlot] | None = None
+    ) -> None:
         """Bind to a context.
 
         Args:
@@ -89,7 +91,7 @@ class Expressions:
 
     # Names.
 
-    def slot(self, name: str) -> int | Slot:
+    def slot(self, name: str) -> int | VariableSlot:
         """Where a name is: a number in the call's slots, or a slot that lasts."""
         found = self._scope.get(name)
         return self.context.memory.slot(name) if found is None else found
@@ -108,20 +110,20 @@ class Expressions:
             return lambda s: index(part(s), at)
         return lambda s: tuple(index(p(s), at) for p in parts)
 
-    def found(self, variable: Variable) -> Callable[[Slots], Slot | None]:
+    def found(self, variable: Variable) -> Callable[[Slots], VariableSlot | None]:
         """The slot of a variable; None for an element that doesn't exist."""
         place = self.slot(variable.name)
         if not variable.indices:
             return (lambda s: s[place]) if isinstance(place, int) else (lambda _: place)
         key = self.key(variable)
 
-        def element(s: Slots) -> Slot | None:
-            array: Slot = s[place] if isinstance(place, int) else place
+        def element(s: Slots) -> VariableSlot | None:
+            array: VariableSlot = s[place] if isinstance(place, int) else place
             return array.elements.get(key(s)) if array.elements else None
 
         return element
 
-    def reference(self, variable: Variable) -> Callable[[Slots], Slot]:
+    def reference(self, variable: Variable) -> Callable[[Slots], VariableSlot]:
         """The slot of a variable, made if need be: to be set, or an argument."""
         place = self.slot(variable.name)
         if not variable.indices:
@@ -137,7 +139,7 @@ class Expressions:
         key = self.key(variable) if variable.indices else None
 
         def value(s: Slots) -> Value:
-            slot: Slot | None = s[place] if isinstance(place, int) else place
+            slot: VariableSlot | None = s[place] if isinstance(place, int) else place
             k = None
             if key is not None:
                 assert slot is not None

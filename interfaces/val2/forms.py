@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from interfaces.val2.slots import Form, Function, Parameter, Switch, form, function
+from interfaces.val2.slots import Function, InstructionForm, Parameter, Switch, form, function
 
 _MOTION: Final = (
     form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", "motion"),
@@ -143,7 +143,7 @@ _DIALOGUE: Final = (
          usage="GLOBAL [REAL|LOC] name, .."),
 )  # fmt: skip
 
-INSTRUCTIONS: Final[dict[str, Form]] = {
+INSTRUCTIONS: Final[dict[str, InstructionForm]] = {
     row.keyword: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
 }
 """Keywords of a program's lines."""

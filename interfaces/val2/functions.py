@@ -16,7 +16,7 @@ from interfaces.val2.events import Warned
 from interfaces.val2.expressions import Expressions, Functions, ResultKind, String
 from interfaces.val2.forms import FUNCTIONS
 from interfaces.val2.locations import FRAMES, frame_function, point_function
-from interfaces.val2.memory import Slot, where
+from interfaces.val2.memory import VariableSlot, where
 from interfaces.val2.operations import Real, Slots, placed
 from interfaces.val2.syntax import Apply, Format, Variable
 from interfaces.val2.values import Value
@@ -343,6 +343,6 @@ ALL: Final = Functions(RESULTS, real_function, string_function, frame_function, 
 """The functions of VAL-II."""
 
 
-def expressions(context: Context, scope: dict[str, int | Slot] | None = None) -> Expressions:
+def expressions(context: Context, scope: dict[str, int | VariableSlot] | None = None) -> Expressions:
     """What makes closures of VAL-II's expressions; see `Expressions`."""
     return Expressions(context, ALL, scope)

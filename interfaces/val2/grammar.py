@@ -9,7 +9,7 @@ from importlib import resources
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2 import forms
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.slots import Function, nearest
 from interfaces.val2.syntax import (
     Apply,
@@ -47,7 +47,7 @@ _SHOWN: Final = {
 
 Node: TypeAlias = Any
 """A tree or a token of Lark's, whose own types say nothing of what they hold."""
-Worded: TypeAlias = tuple[Expression | None, tuple[tuple[str, Place], ...]]
+Worded: TypeAlias = tuple[Expression | None, tuple[tuple[str, TextPosition], ...]]
 """An operand, and the words behind it."""
 
 
@@ -74,18 +74,20 @@ def read(text: str, start: str, line: int) -> Node:
         return _lark().parse(text, start=start)
     except UnexpectedToken as error:
         if error.token.type == "$END":
-            raise _unexpected("the end of the line", error.accepts, Place(line, len(text.rstrip()) + 1)) from None
+            raise _unexpected(
+                "the end of the line", error.accepts, TextPosition(line, len(text.rstrip()) + 1)
+            ) from None
         shown = f"'{error.token}'"
         allowed = error.accepts or _accepted_behind(text[: error.column - 1], start)
-        raise _unexpected(shown, allowed, Place(line, error.column)) from None
+        raise _unexpected(shown, allowed, TextPosition(line, error.column)) from None
     except UnexpectedCharacters as error:
-        place = Place(line, error.column)
+        place = TextPosition(line, error.column)
         if text[error.column - 1] == '"':
             raise ValError("Syntax error", "the string has no closing quote", place=place) from None
         shown = repr(text[error.column - 1])
         raise _unexpected(shown, error.allowed or frozenset(), place) from None
     except UnexpectedInput:
-        raise ValError("Syntax error", place=Place(line, 1)) from None
+        raise ValError("Syntax error", place=TextPosition(line, 1)) from None
 
 
 def _accepted_behind(text: str, start: str) -> set[str]:
@@ -96,7 +98,7 @@ def _accepted_behind(text: str, start: str) -> set[str]:
     return accepted
 
 
-def _unexpected(what: str, allowed: Sequence[str] | frozenset[str] | set[str], place: Place) -> ValError:
+def _unexpected(what: str, allowed: Sequence[str] | frozenset[str] | set[str], place: TextPosition) -> ValError:
     left = set(allowed) - {"IGNORE"}
     shown = []
     if left.issuperset(_VALUE):
@@ -137,7 +139,7 @@ def expression(node: Node, line: int, depth: int = 0) -> Expression:
 
 
 def _token(token: Node, line: int) -> Expression:
-    at = Place(line, token.column)
+    at = TextPosition(line, token.column)
     if token.type == "NUMBER":
         return Number(number(token, line), at)
     return Text(str(token[1:-1]), at)
@@ -151,21 +153,21 @@ def number(token: Node, line: int) -> float:
     """
     value = float(int(token[2:], _BASES[token[1].upper()])) if token[0] == "^" else float(token)
     if not math.isfinite(value):
-        raise ValError("Number too large", str(token), place=Place(line, token.column))
+        raise ValError("Number too large", str(token), place=TextPosition(line, token.column))
     return value
 
 
-def _first(node: Node, line: int) -> Place:
+def _first(node: Node, line: int) -> TextPosition:
     """Where a tree begins."""
     token = next(node.scan_values(lambda _: True), None)
-    return Place(line, 1 if token is None else token.column)
+    return TextPosition(line, 1 if token is None else token.column)
 
 
 def _operation(children: list[Node], line: int, depth: int) -> Expression:
-    return _Row(children, line, depth).expression(0)
+    return _OperatorRow(children, line, depth).expression(0)
 
 
-class _Row:
+class _OperatorRow:
     """Operators and operands in a row."""
 
     def __init__(self, children: list[Node], line: int, depth: int) -> None:
@@ -183,7 +185,7 @@ class _Row:
             if own < level:
                 break
             self._next += 1
-            left = Binary(operator, left, self.expression(own + 1), Place(self._line, token.column))
+            left = Binary(operator, left, self.expression(own + 1), TextPosition(self._line, token.column))
         return left
 
     def _operand(self, level: int) -> Expression:
@@ -194,7 +196,7 @@ class _Row:
         operand = self.expression(max(level, forms.LEVEL_OF_NOT if node.type == "NOT" else forms.LEVEL_OF_SIGN))
         if node.type == "PLUS":
             return operand
-        return Unary(node.upper(), operand, Place(self._line, node.column))
+        return Unary(node.upper(), operand, TextPosition(self._line, node.column))
 
 
 def _compound(children: list[Node], line: int, depth: int) -> Expression:
@@ -207,7 +209,7 @@ def _compound(children: list[Node], line: int, depth: int) -> Expression:
 
 def _variable(children: list[Node], line: int, depth: int) -> Expression:
     token, indices = children
-    at = Place(line, token.column)
+    at = TextPosition(line, token.column)
     upper = token.upper()
     if indices is None:
         if upper in forms.CONSTANTS:
@@ -235,7 +237,7 @@ def variable(node: Node, line: int) -> Variable:
 
 def _apply(children: list[Node], line: int, depth: int) -> Expression:
     token, rest = children
-    at = Place(line, token.column)
+    at = TextPosition(line, token.column)
     name = forms.ALIASES.get(token.upper(), token.upper())
     function = forms.FUNCTIONS.get(name)
     if function is None:
@@ -246,11 +248,13 @@ def _apply(children: list[Node], line: int, depth: int) -> Expression:
     return Apply(name, _arguments(rest, function, at, depth), at)
 
 
-def _misplaced(operator: str, at: Place) -> ValError:
+def _misplaced(operator: str, at: TextPosition) -> ValError:
     return ValError("Syntax error", f"{operator} can't stand here; parentheses may be missing", place=at)
 
 
-def _arguments(node: Node, function: Function, at: Place, depth: int) -> tuple[Expression | Format | None, ...]:
+def _arguments(
+    node: Node, function: Function, at: TextPosition, depth: int
+) -> tuple[Expression | Format | None, ...]:
     line = at.line
     arguments: list[Expression | Format | None] = []
     for child in node.children:
@@ -258,11 +262,11 @@ def _arguments(node: Node, function: Function, at: Place, depth: int) -> tuple[E
         if kind == "BY":
             if function.name != "SHIFT":
                 detail = "BY belongs in SHIFT"
-                raise ValError("Syntax error", detail, place=Place(line, child.column))
+                raise ValError("Syntax error", detail, place=TextPosition(line, child.column))
         elif kind == "FORMAT":
             if function.name != "$ENCODE":
                 detail = f"a format such as {child} belongs in TYPE and $ENCODE"
-                raise ValError("Syntax error", detail, place=Place(line, child.column))
+                raise ValError("Syntax error", detail, place=TextPosition(line, child.column))
             arguments.append(form_of(child, line))
         else:
             arguments.append(None if child is None else expression(child, line, depth))
@@ -281,10 +285,10 @@ def form_of(token: Node, line: int) -> Format:
     code = token[1].upper()
     if code not in forms.FORMATS:
         allowed = ", ".join(f"/{c}" for c in forms.FORMATS)
-        raise ValError("Invalid format", f"{token}; allowed: {allowed}", place=Place(line, token.column))
+        raise ValError("Invalid format", f"{token}; allowed: {allowed}", place=TextPosition(line, token.column))
     width, _, decimals = token[2:].partition(".")
     if len(width) > 3 or len(decimals) > 2:
-        raise ValError("Invalid format", f"{token} is too wide", place=Place(line, token.column))
+        raise ValError("Invalid format", f"{token} is too wide", place=TextPosition(line, token.column))
     return Format(code, int(width) if width else None, int(decimals) if decimals else None)
 
 
@@ -295,7 +299,7 @@ def operand(node: Node, line: int) -> Worded:
     if getattr(node, "data", "") != "worded":
         return expression(node, line), ()
     first, *words = node.children
-    return expression(first, line), tuple((w.upper(), Place(line, w.column)) for w in words)
+    return expression(first, line), tuple((w.upper(), TextPosition(line, w.column)) for w in words)
 
 
 _BUILDERS: Final[dict[str, Callable[[list[Node], int, int], Expression]]] = {

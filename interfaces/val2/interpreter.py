@@ -21,9 +21,9 @@ from interfaces.val2.context import (
     Waiting,
 )  # fmt: skip
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Ended, Failed, Paused
+from interfaces.val2.events import ProgramEnded, ProgramFailed, ProgramPaused
 from interfaces.val2.instructions import until
-from interfaces.val2.memory import Slot, where
+from interfaces.val2.memory import VariableSlot, where
 from interfaces.val2.reactions import Reaction
 from vrs.errors import VrsError
 
@@ -31,7 +31,7 @@ MOST_CALLS: Final = 1_000
 """How deep programs may call each other."""
 
 
-class State(Enum):
+class ProgramState(Enum):
     """What a program does."""
 
     IDLE = "idle"
@@ -42,7 +42,7 @@ class State(Enum):
 
 
 @dataclass(slots=True)
-class Frame:
+class CallFrame:
     """A call."""
 
     code: Code
@@ -77,7 +77,7 @@ class Task:
         self,
         context: Context,
         code: Code,
-        arguments: list[Slot],
+        arguments: list[VariableSlot],
         *,
         cycles: int,
         step: int = 1,
@@ -100,13 +100,13 @@ class Task:
             raise ValError("Invalid step", f"{step}: 1 to {len(code.program.steps)}", program=code.program.name)
         self.context, self.code, self.arguments = context, code, arguments
         self.cycles, self.single = cycles, single
-        self.state = State.RUNNING
+        self.state = ProgramState.RUNNING
         self.word = ""
         """Why it paused or ended."""
         self.deadline = math.inf
         """When a wait wants to be looked at again."""
         self._interrupted = False
-        self.frames = [Frame(code, code.slots(arguments), pc=step - 1)]
+        self.frames = [CallFrame(code, code.slots(arguments), pc=step - 1)]
 
     @property
     def waiting(self) -> bool:
@@ -128,7 +128,7 @@ class Task:
         """
         done = 0
         try:
-            while done < most and self.state is State.RUNNING:
+            while done < most and self.state is ProgramState.RUNNING:
                 self._react()
                 frame = self.frames[-1]
                 if frame.waiting is None:
@@ -136,7 +136,7 @@ class Task:
                     self.context.charged = 0
                 elif not self._wait(frame):
                     break
-                if self.single and self.state is State.RUNNING and not self.waiting:
+                if self.single and self.state is ProgramState.RUNNING and not self.waiting:
                     self.pause("XSTEP")
         except ValError as error:
             self.fail(error)
@@ -145,7 +145,7 @@ class Task:
         self.context.notice()
         return done
 
-    def _compute(self, frame: Frame, most: int) -> int:
+    def _compute(self, frame: CallFrame, most: int) -> int:
         steps, slots, pc = frame.code.steps, frame.slots, frame.pc
         following, left = pc, most
         try:
@@ -161,7 +161,7 @@ class Task:
             self._act(self.context.pending, frame)
         return most - left
 
-    def _wait(self, frame: Frame) -> bool:
+    def _wait(self, frame: CallFrame) -> bool:
         """Whether a wait is over."""
         assert frame.waiting is not None
         try:
@@ -172,14 +172,14 @@ class Task:
             return True
         return False
 
-    def _act(self, action: Action, frame: Frame) -> None:
+    def _act(self, action: Action, frame: CallFrame) -> None:
         match action:
             case int():
                 frame.pc = action
             case Waiting():
                 frame.waiting = action
             case Invoke(code, slots, following):
-                self._push(Frame(code, slots, frame.level))
+                self._push(CallFrame(code, slots, frame.level))
                 frame.pc = following
             case Leave():
                 self._leave(frame)
@@ -191,31 +191,33 @@ class Task:
                 frame.pc = step
                 self.pause("PAUSE")
 
-    def _push(self, frame: Frame) -> None:
+    def _push(self, frame: CallFrame) -> None:
         if len(self.frames) >= MOST_CALLS:
             raise ValError("Too many calls", f"{MOST_CALLS} at most")
         self.frames.append(frame)
 
-    def _leave(self, frame: Frame) -> None:
+    def _leave(self, frame: CallFrame) -> None:
         frame.drop()
         if len(self.frames) == 1:
             frame.waiting = Waiting(_resting(self.context, "END"))
             return
         self._release(self.frames.pop())
 
-    def _release(self, frame: Frame) -> None:
+    def _release(self, frame: CallFrame) -> None:
         for slot in frame.slots[len(frame.code.program.parameters) : frame.code.names]:
             self.context.memory.release(slot)
 
     def _finish(self, word: str) -> None:
         self._unwind()
         if word == "HALT" or self.cycles in (0, 1):
-            self.state, self.word, self.cycles = State.IDLE, word, 0
+            self.state, self.word, self.cycles = ProgramState.IDLE, word, 0
             self._forget()
-            self.context.events.append(Ended(self.code.program.name, word if self.code.program.name else "DO"))
+            self.context.events.append(
+                ProgramEnded(self.code.program.name, word if self.code.program.name else "DO")
+            )
             return
         self.cycles = max(self.cycles - 1, -1)
-        self.frames = [Frame(self.code, self.code.slots(self.arguments))]
+        self.frames = [CallFrame(self.code, self.code.slots(self.arguments))]
         self.context.arm.begin_program()
 
     def _unwind(self) -> None:
@@ -234,7 +236,7 @@ class Task:
         if reaction is not None:
             self._call(reaction, frame)
 
-    def _call(self, reaction: Reaction, frame: Frame) -> None:
+    def _call(self, reaction: Reaction, frame: CallFrame) -> None:
         context = self.context
         if reaction.immediate:
             context.dropped += not context.arm.ready(now=context.now)
@@ -243,7 +245,7 @@ class Task:
             self._leave(frame)
             return
         code = context.code(reaction.program)
-        self._push(Frame(code, code.slots([]), reaction.level))
+        self._push(CallFrame(code, code.slots([]), reaction.level))
 
     # Interruptions.
 
@@ -252,15 +254,15 @@ class Task:
         frame = self.frames[-1]
         self._interrupted = frame.waiting is not None
         frame.drop()
-        self.state, self.word = State.PAUSED, word
-        self.context.events.append(Paused(frame.name, frame.step, word))
+        self.state, self.word = ProgramState.PAUSED, word
+        self.context.events.append(ProgramPaused(frame.name, frame.step, word))
 
     def end(self, word: str) -> None:
         """End now."""
         self._unwind()
-        self.state, self.word = State.IDLE, word
+        self.state, self.word = ProgramState.IDLE, word
         self._forget()
-        self.context.events.append(Ended(self.code.program.name, word))
+        self.context.events.append(ProgramEnded(self.code.program.name, word))
 
     def _forget(self) -> None:
         """Watch no signals any more; a DO leaves the paused program's alone."""
@@ -275,8 +277,8 @@ class Task:
             steps = frame.code.program.steps
             place = where(steps[frame.pc].at) if frame.pc < len(steps) else None
             error = error.at(program=frame.name, step=frame.step, place=place)
-        self.state, self.word, self._interrupted = State.PAUSED, "ERROR", True
-        self.context.events.append(Failed(error))
+        self.state, self.word, self._interrupted = ProgramState.PAUSED, "ERROR", True
+        self.context.events.append(ProgramFailed(error))
 
     def go_on(self, *, again: bool, single: bool = False) -> None:
         """PROCEED, RETRY, XSTEP: run, from the next step or from the one that was given up."""
@@ -284,7 +286,7 @@ class Task:
         if self._interrupted and not again:
             frame.pc = min(frame.pc + 1, len(frame.code.program.steps))
         self._interrupted = False
-        self.state, self.word, self.single = State.RUNNING, "", single
+        self.state, self.word, self.single = ProgramState.RUNNING, "", single
 
 
 def _resting(context: Context, word: str) -> Generator[float, None, Finished]:

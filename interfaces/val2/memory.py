@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, TypeAlias
 
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.syntax import NOWHERE, Number, Program, Unary, Variable
 from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
@@ -25,15 +25,15 @@ KINDS: Final = {"real": float, "string": str, "location": Transformation, "point
 """Types of values by the words of `Memory.listing`."""
 
 
-class Slot:
+class VariableSlot:
     """What stands behind a name, or behind an element of an array; arguments by reference are shared slots."""
 
     __slots__ = ("elements", "parent", "value")
 
-    def __init__(self, value: Value | None = None, parent: Slot | None = None) -> None:
+    def __init__(self, value: Value | None = None, parent: VariableSlot | None = None) -> None:
         self.value = value
         """None if it's unset."""
-        self.elements: dict[Key, Slot] | None = None
+        self.elements: dict[Key, VariableSlot] | None = None
         """Of an array."""
         self.parent = parent
         """The array whose element it is."""
@@ -50,7 +50,7 @@ def shown(name: str, key: Key | None = None) -> str:
     return f"{name}[{','.join(map(str, key if isinstance(key, tuple) else (key,)))}]"
 
 
-def where(at: Place) -> Place | None:
+def where(at: TextPosition) -> TextPosition | None:
     """A place, unless it's nowhere."""
     return at if at.line else None
 
@@ -66,7 +66,7 @@ def mismatch(variable: Variable) -> ValError:
     return ValError("Variable type mismatch", variable.name, place=where(variable.at))
 
 
-def index(value: float, at: Place = NOWHERE) -> int:
+def index(value: float, at: TextPosition = NOWHERE) -> int:
     """An index: the integer part of a real.
 
     Raises:
@@ -83,11 +83,11 @@ class Memory:
     def __init__(self) -> None:
         self.programs: dict[str, Program] = {}
         """By name; who changes it replaces whole programs."""
-        self._slots: dict[str, Slot] = {}
-        self._own: dict[tuple[str, str], Slot] = {}
+        self._slots: dict[str, VariableSlot] = {}
+        self._own: dict[tuple[str, str], VariableSlot] = {}
         self._elements = 0
 
-    def slot(self, name: str) -> Slot:
+    def slot(self, name: str) -> VariableSlot:
         """The slot of a global name, made if need be; it stays the same one for ever.
 
         Raises:
@@ -97,16 +97,16 @@ class Memory:
         if slot is None:
             if len(self._slots) >= MOST_VALUES:
                 raise ValError("Not enough storage area", f"{MOST_VALUES} names")
-            slot = self._slots[name] = Slot()
+            slot = self._slots[name] = VariableSlot()
         return slot
 
-    def own(self, program: str, name: str) -> Slot:
+    def own(self, program: str, name: str) -> VariableSlot:
         """The slot of a program's LOCAL name."""
         if len(self._own) >= MOST_VALUES:
             raise ValError("Not enough storage area", f"{MOST_VALUES} names")
-        return self._own.setdefault((program, name), Slot())
+        return self._own.setdefault((program, name), VariableSlot())
 
-    def element(self, slot: Slot, key: Key) -> Slot:
+    def element(self, slot: VariableSlot, key: Key) -> VariableSlot:
         """An element of an array, made if need be.
 
         Raises:
@@ -119,10 +119,10 @@ class Memory:
             if self._elements >= MOST_VALUES:
                 raise ValError("Not enough storage area", f"{MOST_VALUES} elements of arrays")
             self._elements += 1
-            element = slot.elements[key] = Slot(None, slot)
+            element = slot.elements[key] = VariableSlot(None, slot)
         return element
 
-    def store(self, slot: Slot, value: Value, variable: Variable) -> None:
+    def store(self, slot: VariableSlot, value: Value, variable: Variable) -> None:
         """Give a slot a value.
 
         Raises:
@@ -143,7 +143,7 @@ class Memory:
             raise ValError("String too long", f"{LONGEST_STRING} characters at most", place=where(variable.at))
         slot.value = value
 
-    def release(self, slot: Slot) -> None:
+    def release(self, slot: VariableSlot) -> None:
         """Forget a name of a call that is over."""
         if slot.elements:
             self._elements -= len(slot.elements)

@@ -6,22 +6,22 @@ from collections.abc import Callable
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2 import arithmetic
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.memory import where
 
 Slots: TypeAlias = list[Any]
-"""Of a call: a `Slot` for each name, then what FOR keeps."""
+"""Of a call: a `VariableSlot` for each name, then what FOR keeps."""
 Real: TypeAlias = Callable[[Slots], float]
 
 _QUICK: Final = frozenset("+-*")
 
 
-def placed(error: ValError, at: Place) -> ValError:
+def placed(error: ValError, at: TextPosition) -> ValError:
     """An error at a place, unless it has one."""
     return error.at(place=where(at))
 
 
-def joined(symbol: str, a: Real, b: Real, at: Place) -> Real:
+def joined(symbol: str, a: Real, b: Real, at: TextPosition) -> Real:
     """A closure of two reals with an operator between them."""
     if symbol in _QUICK:
         return _quick(symbol, a, b, at)
@@ -37,7 +37,7 @@ def joined(symbol: str, a: Real, b: Real, at: Place) -> Real:
     return binary
 
 
-def _quick(symbol: str, a: Real, b: Real, at: Place) -> Real:
+def _quick(symbol: str, a: Real, b: Real, at: TextPosition) -> Real:
     """The frequent operators, without a call in between."""
 
     def overflow() -> ValError:

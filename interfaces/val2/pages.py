@@ -22,8 +22,8 @@ from interfaces.stream.sockets import let_stay
 from interfaces.timer import Turning
 from interfaces.val2.monitor.completion import suggestions
 from interfaces.val2.monitor.desk import Said, Style
-from interfaces.val2.monitor.monitor import LONGEST, Monitor
-from interfaces.val2.monitor.switchboard import Person, Switchboard
+from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
+from interfaces.val2.monitor.switchboard import SharedOperator, Switchboard
 from vrs.clock import Clock
 from vrs.errors import VrsError
 
@@ -54,7 +54,7 @@ _Text = Annotated[str, Meta(max_length=4 * LONGEST)]
 _Key = Annotated[str, Meta(max_length=256)]
 
 
-class Hello(msgspec.Struct, frozen=True, tag="hello"):
+class PageHello(msgspec.Struct, frozen=True, tag="hello"):
     """The page's first message: its token, and the session by which it commands."""
 
     token: _Key | None = None
@@ -69,7 +69,7 @@ class Who(msgspec.Struct, frozen=True, tag="who"):
     holds: bool
 
 
-class Lines(msgspec.Struct, frozen=True, tag="lines"):
+class TypedLines(msgspec.Struct, frozen=True, tag="lines"):
     """What was typed."""
 
     lines: Annotated[list[_Text], Meta(max_length=256)]
@@ -85,13 +85,13 @@ class Complete(msgspec.Struct, frozen=True, tag="complete"):
     text: _Text
 
 
-class Shown(msgspec.Struct, frozen=True, tag="shown"):
+class ShownCharacters(msgspec.Struct, frozen=True, tag="shown"):
     """So many characters have been shown in all."""
 
     size: Annotated[int, Meta(ge=0, le=2**53)]
 
 
-_read: Final = msgspec.json.Decoder(Hello | Who | Lines | Interrupt | Complete | Shown).decode
+_read: Final = msgspec.json.Decoder(PageHello | Who | TypedLines | Interrupt | Complete | ShownCharacters).decode
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class TerminalRoom:
     board: Switchboard
     clock: Clock
     """Session time."""
-    terminal: Callable[[str | None, Person | None], Monitor | None]
+    terminal: Callable[[str | None, SharedOperator | None], TerminalMonitor | None]
     """Makes a monitor for a token, and a person who commands elsewhere, too; None where the token opens nothing."""
 
 
@@ -116,7 +116,7 @@ class PageTerminal:
     """Whether the page says that it has the lease."""
     closing: tuple[int, str] | None = None
     """Code and reason with which the connection is to be closed."""
-    monitor: Monitor | None = None
+    monitor: TerminalMonitor | None = None
     greeted: bool = False
     _said: deque[Said] = field(default_factory=deque)
     _waiting: int = 0
@@ -132,7 +132,7 @@ class PageTerminal:
         """Let the page ask for the lease."""
         self._answers.append({"type": "take"})
 
-    def begin(self, monitor: Monitor, *, now: float) -> None:
+    def begin(self, monitor: TerminalMonitor, *, now: float) -> None:
         """Let a monitor speak and listen."""
         self.monitor = monitor
         files = monitor.desk.files.offered()
@@ -154,18 +154,18 @@ class PageTerminal:
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             self.close(_POLICY, f"not a message of a terminal: {error}")
             return
-        if isinstance(message, Hello) == self.greeted:
+        if isinstance(message, PageHello) == self.greeted:
             self.close(_POLICY, "hello comes first, and once")
-        elif isinstance(message, Hello | Who):
+        elif isinstance(message, PageHello | Who):
             self.session, self.holds = message.session, message.holds
-            if isinstance(message, Hello):
+            if isinstance(message, PageHello):
                 self.token, self.greeted = message.token, True
-        elif isinstance(message, Shown):
+        elif isinstance(message, ShownCharacters):
             self._shown = max(self._shown, min(message.size, self._sent))
         elif self.monitor is not None:
             self._act(self.monitor, message, now)
 
-    def _act(self, monitor: Monitor, message: Lines | Interrupt | Complete, now: float) -> None:
+    def _act(self, monitor: TerminalMonitor, message: TypedLines | Interrupt | Complete, now: float) -> None:
         if isinstance(message, Complete):
             fragment, words = suggestions(message.text[:LONGEST], monitor.desk, program=monitor.edits)
             takes = monitor.takes_commands or monitor.edits
@@ -190,7 +190,7 @@ class PageTerminal:
         if self.monitor.done and not self._said:
             self.close(1000, "the monitor was left")
 
-    def _listen(self, monitor: Monitor) -> None:
+    def _listen(self, monitor: TerminalMonitor) -> None:
         """Take what was said, as far as there's room."""
         for piece in monitor.output():
             if self._waiting + len(piece.text) > UNREAD:
@@ -252,7 +252,7 @@ class PageTerminal:
             self.monitor.leave(now=now)
 
 
-class _Client:
+class _TerminalClient:
     """A terminal and its socket."""
 
     def __init__(self, terminal: PageTerminal) -> None:
@@ -270,7 +270,7 @@ class PageDoor:
             enter: Gives what terminals are at, which may take a while.
         """
         self._enter = enter
-        self._clients: set[_Client] = set()
+        self._clients: set[_TerminalClient] = set()
         self._room: TerminalRoom | None = None
         self._turning: Turning | None = None
 
@@ -286,7 +286,7 @@ class PageDoor:
         """Serve one page, until it goes."""
         await receive()
         await send({"type": "websocket.accept"})
-        client = _Client(PageTerminal())
+        client = _TerminalClient(PageTerminal())
         terminal = client.terminal
         self._clients.add(client)
         writing = asyncio.create_task(self._write(client, scope["state"]["socket"], send))
@@ -313,7 +313,7 @@ class PageDoor:
             writing.cancel()
             await asyncio.wait([writing, greeting])
 
-    async def _greet(self, client: _Client, scope: Scope) -> None:
+    async def _greet(self, client: _TerminalClient, scope: Scope) -> None:
         """Give a page its monitor, once it has said who it is."""
         terminal = client.terminal
         with contextlib.suppress(TimeoutError):
@@ -357,7 +357,7 @@ class PageDoor:
         deadlines = [client.terminal.next_deadline() for client in self._clients]
         return min([self._room.board.next_deadline(), *deadlines])
 
-    async def _write(self, client: _Client, socket: Any, send: Send) -> None:
+    async def _write(self, client: _TerminalClient, socket: Any, send: Send) -> None:
         """Send what there is; a page that takes nothing is cut off."""
         terminal = client.terminal
         try:

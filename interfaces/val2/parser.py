@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import Final, TypeAlias, TypeVar
 
 from interfaces.val2 import forms, grammar, statements
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.printer import print_step
-from interfaces.val2.rest import HIGHEST_LABEL, Rest
+from interfaces.val2.rest import HIGHEST_LABEL, OperandText
 from interfaces.val2.slots import nearest
 from interfaces.val2.syntax import Blank, Expression, Program, Step, Variable
 
@@ -77,18 +77,18 @@ def read_line(text: str, line: int) -> Step:
 def _see_one_line(text: str, line: int) -> None:
     if len(text) > LONGEST_LINE:
         detail = f"{LONGEST_LINE} characters at most"
-        raise ValError("Line too long", detail, place=Place(line, LONGEST_LINE + 1))
+        raise ValError("Line too long", detail, place=TextPosition(line, LONGEST_LINE + 1))
     if "\n" in text or "\r" in text:
         found = _BREAK.search(text)
         column = found.start() + 1 if found else 1
-        raise ValError("Syntax error", "one line is allowed", place=Place(line, column))
+        raise ValError("Syntax error", "one line is allowed", place=TextPosition(line, column))
 
 
 @lru_cache(maxsize=8192)
 def _step(text: str, line: int) -> Step:
     if remark := _REMARK.match(text):
         label, _ = _label(text, line)
-        return Step(Blank(), label, text[remark.end() :].rstrip(), Place(line, remark.start(1) + 1))
+        return Step(Blank(), label, text[remark.end() :].rstrip(), TextPosition(line, remark.start(1) + 1))
     code, comment = split_comment(text, line)
     label, begin = _label(code, line)
     found = _HEAD.match(code, begin)
@@ -96,15 +96,15 @@ def _step(text: str, line: int) -> Step:
         begin += len(code[begin:]) - len(code[begin:].lstrip())
         if begin < len(code):
             detail = f"unexpected {code[begin]!r}; allowed: an instruction, or a variable and '='"
-            raise ValError("Syntax error", detail, place=Place(line, begin + 1))
-        return Step(Blank(), label, comment, Place(line, 1))
-    at = Place(line, found.start(1) + 1)
+            raise ValError("Syntax error", detail, place=TextPosition(line, begin + 1))
+        return Step(Blank(), label, comment, TextPosition(line, 1))
+    at = TextPosition(line, found.start(1) + 1)
     keyword = found[1].upper()
     if found[2]:
-        return Step(statements.assignment(Rest(code, found.start(1), at)), label, comment, at)
-    rest = Rest(code, found.end(1), at)
+        return Step(statements.assignment(OperandText(code, found.start(1), at)), label, comment, at)
+    rest = OperandText(code, found.end(1), at)
     if keyword == "END" and not rest.empty:
-        rest, comment = Rest("", found.end(1), at), text[found.end(1) :].strip()
+        rest, comment = OperandText("", found.end(1), at), text[found.end(1) :].strip()
     return Step(statements.statement(keyword, rest), label, comment, at)
 
 
@@ -119,7 +119,7 @@ def split_comment(text: str, line: int) -> tuple[str, str | None]:
         found = _CODE.match(text)
         end = found.end() if found else 0
         if text[end : end + 1] == '"':
-            raise ValError("Syntax error", "the string has no closing quote", place=Place(line, end + 1))
+            raise ValError("Syntax error", "the string has no closing quote", place=TextPosition(line, end + 1))
         code, semicolon, comment = text[:end], text[end : end + 1], text[end + 1 :]
     return code, comment.rstrip() if semicolon else None
 
@@ -130,7 +130,9 @@ def _label(code: str, line: int) -> tuple[int | None, int]:
     if found is None:
         return None, 0
     if len(found[1].lstrip("0")) > len(str(HIGHEST_LABEL)) or int(found[1]) > HIGHEST_LABEL:
-        raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=Place(line, found.start(1) + 1))
+        raise ValError(
+            "Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=TextPosition(line, found.start(1) + 1)
+        )
     return int(found[1]), found.end()
 
 
@@ -155,7 +157,7 @@ def parse_program(text: str) -> Program:
     program, end = whole(read_program(lines, begin))
     for i in range(end, len(lines)):
         if lines[i].strip() and not lines[i].lstrip().startswith(";"):
-            raise ValError("Syntax error", "one program is allowed", place=Place(i + 1, 1))
+            raise ValError("Syntax error", "one program is allowed", place=TextPosition(i + 1, 1))
     return program
 
 
@@ -185,7 +187,7 @@ def read_program(lines: Sequence[str], begin: int) -> Reading[tuple[Program, int
     """
     name, parameters, comment = _header(lines[begin], begin + 1)
     steps, end = yield from read_steps(lines, begin + 1, name)
-    return Program(name, parameters, steps, comment, Place(begin + 1, 1)), end
+    return Program(name, parameters, steps, comment, TextPosition(begin + 1, 1)), end
 
 
 def read_steps(lines: Sequence[str], begin: int, name: str) -> Reading[tuple[tuple[Step, ...], int]]:
@@ -216,7 +218,7 @@ def unknown_directive(line: str, number: int) -> ValError:
     """The error of a line that begins with what is no directive."""
     word = line.split(maxsplit=1)[0]
     detail = f"{word}{nearest(word, DIRECTIVES)}; allowed: {', '.join(DIRECTIVES)}"
-    return ValError("Undefined directive", detail, place=Place(number, len(line) - len(line.lstrip()) + 1))
+    return ValError("Undefined directive", detail, place=TextPosition(number, len(line) - len(line.lstrip()) + 1))
 
 
 def _trimmed(steps: list[Step]) -> tuple[Step, ...]:
@@ -231,15 +233,17 @@ def _header(line: str, number: int) -> tuple[str, tuple[Variable, ...], str | No
     code, comment = split_comment(line, number)
     found = _HEADER.match(code)
     if found is None:
-        at = Place(number, len(line) - len(line.lstrip()) + 1)
+        at = TextPosition(number, len(line) - len(line.lstrip()) + 1)
         raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=at)
     name = _PROGRAM_NAME.match(code, found.end())
     if name is None:
-        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(number, found.end() + 1))
+        raise ValError(
+            "Syntax error", "allowed: .PROGRAM name(arguments)", place=TextPosition(number, found.end() + 1)
+        )
     parameters, end = _parameters(code, name.end(), number)
     if code[end:].strip():
         column = end + len(code[end:]) - len(code[end:].lstrip()) + 1
-        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(number, column))
+        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=TextPosition(number, column))
     return grammar.name_of(name[0]), parameters, comment
 
 
@@ -249,15 +253,17 @@ def _parameters(code: str, begin: int, line: int) -> tuple[tuple[Variable, ...],
         return (), begin
     closing = code.find(")", opening)
     if closing < 0:
-        raise ValError("Syntax error", "')' is missing", place=Place(line, len(code.rstrip()) + 1))
+        raise ValError("Syntax error", "')' is missing", place=TextPosition(line, len(code.rstrip()) + 1))
     parameters: list[Variable] = []
     position = opening + 1
     while code[position:closing].strip():
         found = _PARAMETER.match(code, position, closing)
         if found is None or (found.end() < closing and code[found.end()] != ","):
             column = (found.end() if found else position) + 1
-            raise ValError("Syntax error", "allowed: names with commas between them", place=Place(line, column))
-        at = Place(line, found.start(1) + 1)
+            raise ValError(
+                "Syntax error", "allowed: names with commas between them", place=TextPosition(line, column)
+            )
+        at = TextPosition(line, found.start(1) + 1)
         variable = Variable(grammar.name_of(found[1]), (), at, array=bool(found[2]))
         if found[1].upper() in forms.CONSTANTS:
             raise ValError("Reserved name", f"{found[1].upper()} is a function", place=at)

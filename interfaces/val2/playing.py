@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from interfaces.val2.controller import Controller
-from interfaces.val2.errors import Place, ValError
-from interfaces.val2.events import Asked, Ended, Event, Failed, Paused, Typed, Warned
+from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.events import Asked, Event, ProgramEnded, ProgramFailed, ProgramPaused, Typed, Warned
 from interfaces.val2.motion import Arm
 from interfaces.val2.source import SourceFile
 
@@ -99,13 +99,13 @@ class Player:
                     self.give_up(ValError("No answer", f"nobody answers {question!r}"), now)
                 else:
                     self._controller.answer(line, now=now)
-            case Failed(error):
+            case ProgramFailed(error):
                 self.errors.append(error)
                 self._go_on(now, unreached(error))
-            case Paused(program, step, word):
+            case ProgramPaused(program, step, word):
                 if not self.done and not self._go_on(now, True):
                     self.listeners.told(f"{word} in program {program} before step {step}: nobody proceeds")
-            case Ended():
+            case ProgramEnded():
                 self.done = True
             case _:
                 pass
@@ -117,12 +117,12 @@ class Player:
         self.done = True
         return False
 
-    def place(self, error: ValError) -> Place | None:
+    def place(self, error: ValError) -> TextPosition | None:
         """Where in the file an error happened; None where that's unknown."""
         for program in self.source.programs:
             if program.name == error.program and error.step is not None and error.step <= len(program.steps):
                 at = program.steps[error.step - 1].at
-                return Place(at.line, at.column if error.place is None else error.place.column)
+                return TextPosition(at.line, at.column if error.place is None else error.place.column)
         return error.place if error.step is None else None
 
 

@@ -18,7 +18,7 @@ from interfaces.val2.syntax import (
     Decompose,
     Do,
     Else,
-    End,
+    EndBlock,
     Exit,
     Expression,
     For,
@@ -185,7 +185,7 @@ def print_statement(statement: Statement) -> str:
             return f"VALUE {_listed(values)}:"
         case Else():
             return "ELSE"
-        case End():
+        case EndBlock():
             return "END"
         case Do():
             return "DO"
@@ -266,7 +266,7 @@ def _shape(statement: Statement) -> tuple[int, int]:
             return 0, 1
         case Else() | Value() | AnyValue():
             return 1, 1
-        case End() | Until():
+        case EndBlock() | Until():
             return 1, 0
     return 0, 0
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from interfaces.val2 import forms, grammar
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.parser import directive, lines_of
 from interfaces.val2.slots import nearest_word
 from interfaces.val2.source import SourceFile, parse_file
@@ -41,7 +41,7 @@ def read_all(text: str, name: str) -> tuple[SourceFile, dict[int, ValError]]:
     try:
         lines = lines_of(text)
     except ValError as error:
-        return SourceFile(name), {1: error.at(place=Place(1, 1))}
+        return SourceFile(name), {1: error.at(place=TextPosition(1, 1))}
     while len(errors) < MOST_ERRORS:
         try:
             return parse_file("\n".join(lines), name), errors

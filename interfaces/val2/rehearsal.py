@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from interfaces.val2.controller import STATEMENT, TURN
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.playing import Listeners, Player, endless, stuck
 from interfaces.val2.source import SourceFile
@@ -26,11 +26,11 @@ MOST: Final = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class RehearsalFinding:
     """Something that a rehearsal came upon."""
 
     error: ValError
-    place: Place | None
+    place: TextPosition | None
     """Where in the file."""
     grave: bool
     """Whether the program is wrong; else the rehearsal could see no farther."""
@@ -40,7 +40,7 @@ class Finding:
 class Rehearsal:
     """What a rehearsal came to."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[RehearsalFinding, ...]
     timeline: Timeline
     """What the arm did."""
     end: float
@@ -87,7 +87,9 @@ def rehearse(
         computed += deadline - now if deadline - now <= 4 * TURN * STATEMENT else 0.0
         now = max(now, deadline)
         clock.set(now)
-    findings = tuple(Finding(error, player.place(error), _grave(error, given_up)) for error in player.errors)
+    findings = tuple(
+        RehearsalFinding(error, player.place(error), _grave(error, given_up)) for error in player.errors
+    )
     return Rehearsal(findings, engine.timeline, now)
 
 

@@ -7,9 +7,9 @@ from collections.abc import Collection
 from typing import Final
 
 from interfaces.val2 import forms, grammar
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.grammar import Node, Worded
-from interfaces.val2.slots import MISSING, TOO_MANY, Form, nearest
+from interfaces.val2.slots import MISSING, TOO_MANY, InstructionForm, nearest
 from interfaces.val2.syntax import Apply, Expression, Number, Text, Unary, Variable
 
 HIGHEST_LABEL: Final = 65535
@@ -21,10 +21,10 @@ _PLAIN: Final = re.compile(
 _NUMBER: Final = re.compile(r"(-?)([0-9]+(?:\.[0-9]*)?)")
 
 
-class Rest:
+class OperandText:
     """What stands behind a keyword: the line with blanks in place of all before it."""
 
-    def __init__(self, code: str, behind: int, at: Place) -> None:
+    def __init__(self, code: str, behind: int, at: TextPosition) -> None:
         """Keep the rest of a line.
 
         Args:
@@ -41,14 +41,14 @@ class Rest:
         return not self.text.strip()
 
     @property
-    def end(self) -> Place:
+    def end(self) -> TextPosition:
         """Behind the last character of the line."""
-        return Place(self.line, max(len(self.text.rstrip()), self.behind) + 1)
+        return TextPosition(self.line, max(len(self.text.rstrip()), self.behind) + 1)
 
     @property
-    def start(self) -> Place:
+    def start(self) -> TextPosition:
         """At the first character behind the keyword."""
-        return Place(self.line, len(self.text) - len(self.text.lstrip()) + 1)
+        return TextPosition(self.line, len(self.text) - len(self.text.lstrip()) + 1)
 
     def tree(self, start: str) -> list[Node]:
         """The children of Lark's tree."""
@@ -63,7 +63,7 @@ class Rest:
         if self.empty:
             return []
         if (simple := _SIMPLE.match(self.text)) and simple[1].upper() not in forms.CONSTANTS:
-            return [(Variable(grammar.name_of(simple[1]), (), Place(self.line, simple.start(1) + 1)), ())]
+            return [(Variable(grammar.name_of(simple[1]), (), TextPosition(self.line, simple.start(1) + 1)), ())]
         if (plain := _PLAIN.match(self.text)) and (built := self._call_of_numbers(plain)) is not None:
             return [(built, ())]
         return [grammar.operand(node, self.line) for node in self.tree("operands")]
@@ -74,17 +74,17 @@ class Rest:
         row = forms.FUNCTIONS.get(name)
         arguments: list[Expression] = []
         for found in _NUMBER.finditer(plain[2]):
-            at = Place(self.line, plain.start(2) + found.start() + 1)
+            at = TextPosition(self.line, plain.start(2) + found.start() + 1)
             if found[1]:
-                magnitude = Number(float(found[2]), Place(self.line, at.column + 1))
+                magnitude = Number(float(found[2]), TextPosition(self.line, at.column + 1))
                 arguments.append(Unary("-", magnitude, at))
             else:
                 arguments.append(Number(float(found[2]), at))
         if row is None or len(arguments) != len(row.slots):
             return None
-        return Apply(name, tuple(arguments), Place(self.line, plain.start(1) + 1))
+        return Apply(name, tuple(arguments), TextPosition(self.line, plain.start(1) + 1))
 
-    def require(self, form: Form) -> None:
+    def require(self, form: InstructionForm) -> None:
         """See that there's something.
 
         Raises:
@@ -94,14 +94,16 @@ class Rest:
             raise ValError(MISSING, form.usage, place=self.end)
 
 
-def operands_and_words(row: Form, given: list[Worded]) -> tuple[list[Expression | None], tuple[str, ...]]:
+def operands_and_words(
+    row: InstructionForm, given: list[Worded]
+) -> tuple[list[Expression | None], tuple[str, ...]]:
     """Tell operands from words, which look like variables where no operand stands before them.
 
     Raises:
         ValError: If a word isn't allowed.
     """
     operands: list[Expression | None] = []
-    found: list[tuple[str, Place]] = []
+    found: list[tuple[str, TextPosition]] = []
     allowed = row.allowed_words
     for operand, words in given:
         word = as_word(operand)
@@ -115,7 +117,7 @@ def operands_and_words(row: Form, given: list[Worded]) -> tuple[list[Expression 
     return operands, _ordered(row, found)
 
 
-def _ordered(row: Form, found: list[tuple[str, Place]]) -> tuple[str, ...]:
+def _ordered(row: InstructionForm, found: list[tuple[str, TextPosition]]) -> tuple[str, ...]:
     words = []
     for group in row.words:
         here = [(word, at) for word, at in found if word in group]
@@ -136,7 +138,7 @@ def as_word(operand: Expression | None) -> str:
     return operand.value.upper() if isinstance(operand, Text) else ""
 
 
-def count(row: Form, operands: list[Expression | None], rest: Rest) -> None:
+def count(row: InstructionForm, operands: list[Expression | None], rest: OperandText) -> None:
     """Count the operands.
 
     Raises:
@@ -150,16 +152,16 @@ def count(row: Form, operands: list[Expression | None], rest: Rest) -> None:
             raise ValError(MISSING, f"{slot.name}; allowed: {row.usage}", place=rest.end)
 
 
-def label(token: Node, rest: Rest) -> int:
+def label(token: Node, rest: OperandText) -> int:
     """The label of a token.
 
     Raises:
         ValError: If there can't be such a label.
     """
-    return checked_label(grammar.number(token, rest.line), Place(rest.line, token.column))
+    return checked_label(grammar.number(token, rest.line), TextPosition(rest.line, token.column))
 
 
-def checked_label(value: float, at: Place) -> int:
+def checked_label(value: float, at: TextPosition) -> int:
     """The label of a number.
 
     Raises:
@@ -170,7 +172,7 @@ def checked_label(value: float, at: Place) -> int:
     return int(value)
 
 
-def label_of(operand: Expression | None, rest: Rest) -> int:
+def label_of(operand: Expression | None, rest: OperandText) -> int:
     """The label that an operand names.
 
     Raises:
@@ -181,7 +183,7 @@ def label_of(operand: Expression | None, rest: Rest) -> int:
     raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=operand.at if operand else rest.start)
 
 
-def see_no_slip(kind: str, names: list[str], known: Collection[str], at: Place) -> None:
+def see_no_slip(kind: str, names: list[str], known: Collection[str], at: TextPosition) -> None:
     """See that names which aren't known don't look like those that are, and don't stand beside them.
 
     Raises:

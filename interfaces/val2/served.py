@@ -14,8 +14,8 @@ from interfaces.stream.control import Role
 from interfaces.val2.control import LeaseControl
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import Monitor
-from interfaces.val2.monitor.switchboard import Person, Switchboard
+from interfaces.val2.monitor.monitor import TerminalMonitor
+from interfaces.val2.monitor.switchboard import SharedOperator, Switchboard
 from interfaces.val2.pages import TerminalRoom
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.tcp import ValDoor
@@ -106,20 +106,20 @@ class ServedVal:
         """
         room = await self.enter()
 
-        def terminal(shown: str) -> Monitor | None:
+        def terminal(shown: str) -> TerminalMonitor | None:
             return self._terminal(room.board, access, shown, None)
 
         async with ValDoor(room.board, room.clock, terminal).listening(listening):
             yield self
 
     def _terminal(
-        self, board: Switchboard, access: Access, token: str | None, person: Person | None
-    ) -> Monitor | None:
+        self, board: Switchboard, access: Access, token: str | None, person: SharedOperator | None
+    ) -> TerminalMonitor | None:
         """The monitor for whoever shows a token; None for a wrong one."""
         barred = "this token only looks" if access.refusal(Role.OPERATOR, token) else ""
         if barred and access.refusal(Role.VIEWER, token):
             return None
-        return Monitor(board, self._files, f"{self._version}, VAL-II", barred=barred, person=person)
+        return TerminalMonitor(board, self._files, f"{self._version}, VAL-II", barred=barred, person=person)
 
 
 def examples() -> Path | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
     "real", "string", "location", "any", "label", "program", "variable", "frame", "point", "array", "text"
@@ -21,7 +21,7 @@ TOO_MANY: Final = "Too many arguments"
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class OperandSlot:
     """A place for an operand."""
 
     name: str
@@ -30,11 +30,11 @@ class Slot:
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class InstructionForm:
     """How an instruction is written."""
 
     keyword: str
-    slots: tuple[Slot, ...]
+    slots: tuple[OperandSlot, ...]
     words: tuple[tuple[str, ...], ...]
     """Words behind the operands, in their order, one of each group at most."""
     help: str
@@ -58,7 +58,7 @@ class Function:
     """How a function is written."""
 
     name: str
-    slots: tuple[Slot, ...]
+    slots: tuple[OperandSlot, ...]
     gives: Kind
     help: str
     origin: Origin
@@ -69,7 +69,7 @@ class Function:
     idle: bool = False
     """It's recognised, but has no meaning here: 0, or an empty string."""
 
-    def expect(self, arguments: Sequence[object | None], at: Place) -> None:
+    def expect(self, arguments: Sequence[object | None], at: TextPosition) -> None:
         """Count the arguments.
 
         Raises:
@@ -105,12 +105,12 @@ class Parameter:
     origin: Origin
 
 
-def slots_of(spelled: str) -> tuple[tuple[Slot, ...], bool]:
+def slots_of(spelled: str) -> tuple[tuple[OperandSlot, ...], bool]:
     """Slots such as `target:location, hand:real?`, and whether the last (`*`) repeats."""
     slots = []
     for part in filter(None, (p.strip() for p in spelled.split(","))):
         name, _, kind = part.rstrip("?*").partition(":")
-        slots.append(Slot(name, kind or "real", required="?" not in part))  # type: ignore[arg-type]
+        slots.append(OperandSlot(name, kind or "real", required="?" not in part))  # type: ignore[arg-type]
     return tuple(slots), "*" in spelled
 
 
@@ -124,11 +124,11 @@ def form(
     words: str = "",
     usage: str = "",
     own: bool = False,
-) -> Form:
+) -> InstructionForm:
     """A row of the table: slots as `slots_of` reads them, words as `MMPS|IPS ALWAYS`."""
     slots, repeats = slots_of(spelled)
     groups = tuple(tuple(group.split("|")) for group in words.split())
-    return Form(
+    return InstructionForm(
         keyword,
         slots,
         groups,
@@ -158,12 +158,12 @@ def function(
     return Function(name, slots, gives, explanation, origin, repeats, constant, shown, idle)
 
 
-def _usage(keyword: str, slots: tuple[Slot, ...], groups: tuple[tuple[str, ...], ...], repeats: bool) -> str:
+def _usage(keyword: str, slots: tuple[OperandSlot, ...], groups: tuple[tuple[str, ...], ...], repeats: bool) -> str:
     words = "".join(f" [{'|'.join(group)}]" for group in groups)
     return f"{keyword} {_listed(slots, repeats)}".rstrip() + words
 
 
-def _listed(slots: tuple[Slot, ...], repeats: bool) -> str:
+def _listed(slots: tuple[OperandSlot, ...], repeats: bool) -> str:
     shown = ""
     for i, slot in enumerate(slots):
         piece = f"{', ' if i else ''}{slot.name}"

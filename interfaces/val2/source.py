@@ -10,7 +10,7 @@ from pathlib import PurePath
 from typing import Final
 
 from interfaces.val2 import forms, geometry, grammar
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import (
     Reading,
@@ -35,7 +35,7 @@ _ELEMENT: Final = re.compile(r"[0-9]{1,6}")
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class NamedValue:
     """A variable, or an element of an array with numbers as indices, and its value."""
 
     variable: Variable
@@ -55,7 +55,7 @@ class SignalRule:
     """Each turning-on is a pulse of so long [s]; None: it follows off, too."""
     at_time: float | None = None
     """Once, so long after EXECUTE [s]; None: all the time."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +64,10 @@ class SourceFile:
 
     name: str
     programs: tuple[Program, ...] = ()
-    locations: tuple[Entry, ...] = ()
+    locations: tuple[NamedValue, ...] = ()
     """Transformations and precision points."""
-    reals: tuple[Entry, ...] = ()
-    strings: tuple[Entry, ...] = ()
+    reals: tuple[NamedValue, ...] = ()
+    strings: tuple[NamedValue, ...] = ()
     signals: tuple[SignalRule, ...] = ()
 
 
@@ -86,10 +86,10 @@ def parse_file(text: str, name: str) -> SourceFile:
 
 def read_file(text: str, name: str) -> Reading[SourceFile]:
     """Read a file in steps, as `parse_file` does at once."""
-    return (yield from _Reader(lines_of(text), name).run())
+    return (yield from _SourceReader(lines_of(text), name).run())
 
 
-class _Reader:
+class _SourceReader:
     def __init__(self, lines: Sequence[str], name: str) -> None:
         self._lines, self._name = lines, name
         self._programs: list[Program] = []
@@ -115,7 +115,7 @@ class _Reader:
                 case _:
                     raise unknown_directive(line, i + 1)
         locations, reals, strings = (
-            tuple(Entry(variable, value) for variable, value in entries.items())
+            tuple(NamedValue(variable, value) for variable, value in entries.items())
             for entries in self._entries.values()
         )
         return SourceFile(self._name, tuple(self._programs), locations, reals, strings, tuple(self._rules))
@@ -131,11 +131,11 @@ class _Reader:
             return i + 1
         if self._programs:
             column = len(self._lines[i]) - len(self._lines[i].lstrip()) + 1
-            raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=Place(i + 1, column))
+            raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=TextPosition(i + 1, column))
         stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(self._name).stem)
         name = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
         steps, end = yield from read_steps(self._lines, i, name)
-        self._add(Program(name, (), steps, None, Place(i + 1, 1)))
+        self._add(Program(name, (), steps, None, TextPosition(i + 1, 1)))
         return end
 
     def _section(self, section: str, begin: int) -> Reading[int]:
@@ -159,13 +159,13 @@ def _see_alone(line: str, section: str, number: int) -> None:
     behind = code.lstrip()[len(section) :]
     if behind.strip():
         column = len(code) - len(behind.lstrip()) + 1
-        raise ValError("Syntax error", f"allowed: {section} alone on its line", place=Place(number, column))
+        raise ValError("Syntax error", f"allowed: {section} alone on its line", place=TextPosition(number, column))
 
 
 def _variable(code: str, line: int, prefixes: str) -> tuple[Variable, int]:
     """The variable that a line begins with, and where what stands behind it begins."""
     found = _NAME.match(code)
-    at = Place(line, len(code) - len(code.lstrip()) + 1)
+    at = TextPosition(line, len(code) - len(code.lstrip()) + 1)
     if found is None:
         raise ValError("Syntax error", "allowed: a name, and its value", place=at)
     prefix = found[1][0] if found[1][0] in "#$" else ""
@@ -187,16 +187,16 @@ def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
         found = _NUMBER.match(code, position)
         if found is None or len(values) == count:
             what = "a number" if len(values) < count else "the end of the line"
-            raise ValError("Syntax error", f"allowed: {what}", place=Place(line, position + 1))
+            raise ValError("Syntax error", f"allowed: {what}", place=TextPosition(line, position + 1))
         value = float(found[0])
         if not math.isfinite(value):
-            raise ValError("Number too large", found[0], place=Place(line, position + 1))
+            raise ValError("Number too large", found[0], place=TextPosition(line, position + 1))
         values.append(value)
         gap = _GAP.match(code, found.end())
         position = gap.end() if gap else found.end()
     if len(values) < count:
         detail = f"{len(values)} of {count} numbers"
-        raise ValError("Missing argument", detail, place=Place(line, len(code.rstrip()) + 1))
+        raise ValError("Missing argument", detail, place=TextPosition(line, len(code.rstrip()) + 1))
     return tuple(values)
 
 
@@ -257,13 +257,13 @@ def parse_rule(text: str, line: int = 1) -> SignalRule:
     """
     signal, _, value, *rest = grammar.read(text, "rule", line).children
     number_of = grammar.number(signal, line)
-    place = Place(line, signal.column)
+    place = TextPosition(line, signal.column)
     if not number_of.is_integer():
         raise ValError("Illegal digital signal", str(signal), place=place)
     times: dict[str, float] = {}
     for word, seconds in zip(rest[::2], rest[1::2], strict=True):
         if word.type in times:
-            raise ValError("Syntax error", f"a second {word}", place=Place(line, word.column))
+            raise ValError("Syntax error", f"a second {word}", place=TextPosition(line, word.column))
         times[word.type] = grammar.number(seconds, line)
     return SignalRule(
         int(number_of),
@@ -293,13 +293,13 @@ def print_file(source: SourceFile) -> str:
     return "".join(parts)
 
 
-def _numbers_of(entry: Entry) -> tuple[float, ...]:
+def _numbers_of(entry: NamedValue) -> tuple[float, ...]:
     if not isinstance(entry.value, Transformation | PrecisionPoint):
         raise ValError("Mixed types", f"{print_expression(entry.variable)} isn't a location")
     return numbers_of(entry.value)
 
 
-def _row(entry: Entry, value: str) -> str:
+def _row(entry: NamedValue, value: str) -> str:
     return f"{print_expression(entry.variable)} {value}"
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Final
 
 from interfaces.val2 import forms, grammar
-from interfaces.val2.errors import Place, ValError
-from interfaces.val2.rest import Rest, as_word, count, label, label_of, operands_and_words, see_no_slip
-from interfaces.val2.slots import MISSING, TOO_MANY, Form, nearest
+from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.rest import OperandText, as_word, count, label, label_of, operands_and_words, see_no_slip
+from interfaces.val2.slots import MISSING, TOO_MANY, InstructionForm, nearest
 from interfaces.val2.syntax import (
     AnyValue,
     Apply,
@@ -21,7 +21,7 @@ from interfaces.val2.syntax import (
     Decompose,
     Do,
     Else,
-    End,
+    EndBlock,
     Exit,
     Expression,
     For,
@@ -63,7 +63,7 @@ _TIMED: Final = re.compile(
 )
 
 
-def statement(keyword: str, rest: Rest) -> Statement:
+def statement(keyword: str, rest: OperandText) -> Statement:
     """The statement of a keyword, upper case, and what stands behind it.
 
     Raises:
@@ -84,14 +84,14 @@ def statement(keyword: str, rest: Rest) -> Statement:
     raise ValError("Undefined instruction", detail, place=rest.at)
 
 
-def assignment(rest: Rest) -> Statement:
+def assignment(rest: OperandText) -> Statement:
     """`x = 3`, or a location without SET before it."""
     target, value = _assigned(rest)
     located = target.prefix == "#" or _is_location(value)
     return Set(target, value) if located else Assign(target, value)
 
 
-def _assigned(rest: Rest) -> tuple[Variable, Expression]:
+def _assigned(rest: OperandText) -> tuple[Variable, Expression]:
     left, _, right = rest.tree("assignment")
     return grammar.variable(left, rest.line), rest.expression(right)
 
@@ -102,7 +102,7 @@ def _is_location(value: Expression) -> bool:
     return isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
 
 
-def _instruction(row: Form, rest: Rest) -> Statement:
+def _instruction(row: InstructionForm, rest: OperandText) -> Statement:
     if row.keyword in ("ACCEL", "ALTER", "ALTON"):
         _open_channel(row, rest)
     operands, words = operands_and_words(row, rest.operands())
@@ -116,7 +116,7 @@ def _instruction(row: Form, rest: Rest) -> Statement:
     return Instruction(row.keyword, tuple(operands), words, rest.at)
 
 
-def _open_channel(row: Form, rest: Rest) -> None:
+def _open_channel(row: InstructionForm, rest: OperandText) -> None:
     """`ALTER (1) 3` reads like `ALTER 1, 3`."""
     if found := _CHANNEL.match(rest.text):
         inner = found[2] if found[2].strip() or row.keyword != "ACCEL" else "1"
@@ -139,7 +139,7 @@ def timed(text: str) -> tuple[int, int, int] | None:
     return None if found is None else (found.end(1), found.start(2), found.end(2))
 
 
-def _at(keyword: str, rest: Rest) -> Statement:
+def _at(keyword: str, rest: OperandText) -> Statement:
     """`AT time`, or with a motion behind it."""
     row, places = forms.INSTRUCTIONS[keyword], timed(rest.text)
     if places is None:
@@ -147,13 +147,13 @@ def _at(keyword: str, rest: Rest) -> Statement:
     end, begin, behind = places
     time = grammar.read(rest.text[:end], "expression", rest.line)
     motion = forms.INSTRUCTIONS[rest.text[begin:behind].upper()]
-    made = _instruction(motion, Rest(rest.text, behind, Place(rest.line, begin + 1)))
+    made = _instruction(motion, OperandText(rest.text, behind, TextPosition(rest.line, begin + 1)))
     assert isinstance(made, Instruction)
     return replace(made, begins=rest.expression(time))
 
 
-def _nothing(make: Callable[[], Statement]) -> Callable[[str, Rest], Statement]:
-    def read(keyword: str, rest: Rest) -> Statement:
+def _nothing(make: Callable[[], Statement]) -> Callable[[str, OperandText], Statement]:
+    def read(keyword: str, rest: OperandText) -> Statement:
         if not rest.empty:
             detail = f"unexpected '{rest.text.strip()}' behind {keyword}; allowed: the end of the line"
             raise ValError("Syntax error", detail, place=rest.start)
@@ -162,17 +162,17 @@ def _nothing(make: Callable[[], Statement]) -> Callable[[str, Rest], Statement]:
     return read
 
 
-def _set(keyword: str, rest: Rest) -> Statement:
+def _set(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     return Set(*_assigned(rest))
 
 
-def _decompose(keyword: str, rest: Rest) -> Statement:
+def _decompose(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     return Decompose(*_assigned(rest))
 
 
-def _shift(keyword: str, rest: Rest) -> Statement:
+def _shift(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     first, *others = rest.tree("shift")
     values = [None if n is None else rest.expression(n) for n in others if getattr(n, "type", "") != "BY"]
@@ -182,13 +182,13 @@ def _shift(keyword: str, rest: Rest) -> Statement:
     return Set(target, Apply("SHIFT", (target, *values), rest.at))
 
 
-def _timer(keyword: str, rest: Rest) -> Statement:
+def _timer(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     index, _, value = rest.tree("timing")
     return Instruction(keyword, (rest.expression(index), rest.expression(value)), (), rest.at)
 
 
-def _parameter(keyword: str, rest: Rest) -> Statement:
+def _parameter(keyword: str, rest: OperandText) -> Statement:
     row = forms.INSTRUCTIONS[keyword]
     rest.require(row)
     found = _SETTING.match(rest.text)
@@ -196,15 +196,15 @@ def _parameter(keyword: str, rest: Rest) -> Statement:
         raise ValError("Syntax error", f"allowed: {row.usage}", place=rest.start)
     name = found[1].upper()
     if name not in forms.PARAMETERS:
-        see_no_slip("parameter", [name], forms.PARAMETERS, Place(rest.line, found.start(1) + 1))
+        see_no_slip("parameter", [name], forms.PARAMETERS, TextPosition(rest.line, found.start(1) + 1))
         return Ignored(keyword, rest.text.strip(), rest.at)
     if found[2] is None:
-        raise ValError(MISSING, f"allowed: {row.usage}", place=Place(rest.line, found.end() + 1))
+        raise ValError(MISSING, f"allowed: {row.usage}", place=TextPosition(rest.line, found.end() + 1))
     value = grammar.read(" " * found.end() + rest.text[found.end() :], "expression", rest.line)
     return Instruction(keyword, (rest.expression(value),), (name,), rest.at)
 
 
-def _switches(keyword: str, rest: Rest) -> Statement:
+def _switches(keyword: str, rest: OperandText) -> Statement:
     row = forms.INSTRUCTIONS[keyword]
     rest.require(row)
     names = []
@@ -220,7 +220,7 @@ def _switches(keyword: str, rest: Rest) -> Statement:
     return Instruction(keyword, (), tuple(names), rest.at)
 
 
-def _react(keyword: str, rest: Rest) -> Statement:
+def _react(keyword: str, rest: OperandText) -> Statement:
     row = forms.INSTRUCTIONS[keyword]
     operands, words = operands_and_words(row, rest.operands())
     count(row, operands[:2], rest)
@@ -240,7 +240,7 @@ def _program_of(operand: Expression) -> str:
     raise ValError("Syntax error", "allowed: the name of a program", place=operand.at)
 
 
-def _if(keyword: str, rest: Rest) -> Statement:
+def _if(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     condition, *others = rest.tree("branch")
     built = rest.expression(condition)
@@ -249,7 +249,7 @@ def _if(keyword: str, rest: Rest) -> Statement:
     return If(built)
 
 
-def _goto(keyword: str, rest: Rest) -> Statement:
+def _goto(keyword: str, rest: OperandText) -> Statement:
     operands = rest.operands()
     if len(operands) != 1 or operands[0][1]:
         detail = f"allowed: {forms.INSTRUCTIONS[keyword].usage}"
@@ -257,22 +257,22 @@ def _goto(keyword: str, rest: Rest) -> Statement:
     return Goto(label_of(operands[0][0], rest), rest.at)
 
 
-def _while(keyword: str, rest: Rest) -> Statement:
+def _while(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     return While(rest.expression(rest.tree("while")[0]))
 
 
-def _until(keyword: str, rest: Rest) -> Statement:
+def _until(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     return Until(rest.expression(rest.tree("until")[0]))
 
 
-def _case(keyword: str, rest: Rest) -> Statement:
+def _case(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     return Case(rest.expression(rest.tree("case")[0]))
 
 
-def _value(keyword: str, rest: Rest) -> Statement:
+def _value(keyword: str, rest: OperandText) -> Statement:
     trimmed = rest.text.rstrip()
     rest.text = trimmed.removesuffix(":")
     row = forms.INSTRUCTIONS[keyword]
@@ -285,12 +285,12 @@ def _value(keyword: str, rest: Rest) -> Statement:
     return Value(tuple(values))
 
 
-def _any(keyword: str, rest: Rest) -> Statement:
+def _any(keyword: str, rest: OperandText) -> Statement:
     rest.text = rest.text.rstrip().removesuffix(":")
     return _nothing(AnyValue)(keyword, rest)
 
 
-def _for(keyword: str, rest: Rest) -> Statement:
+def _for(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     children = [n for n in rest.tree("loop") if getattr(n, "type", "") not in ("TO", "STEP", "EQUALS")]
     step = rest.expression(children[3]) if len(children) > 3 and children[3] is not None else None
@@ -299,7 +299,7 @@ def _for(keyword: str, rest: Rest) -> Statement:
     )
 
 
-def _loops(keyword: str, rest: Rest) -> Statement:
+def _loops(keyword: str, rest: OperandText) -> Statement:
     text, count = rest.text.strip(), 1
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
     if text and not (plain and 1 <= (count := int(text)) <= MOST_LOOPS):
@@ -307,22 +307,22 @@ def _loops(keyword: str, rest: Rest) -> Statement:
     return Exit(count, rest.at) if keyword == "EXIT" else Next(count, rest.at)
 
 
-def _call(keyword: str, rest: Rest) -> Statement:
+def _call(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
     name, arguments = rest.tree("call")
     if not _NAME.fullmatch(name):
-        raise ValError("Syntax error", "allowed: the name of a program", place=Place(rest.line, name.column))
+        raise ValError("Syntax error", "allowed: the name of a program", place=TextPosition(rest.line, name.column))
     given: list[Expression | None] = []
     for node in arguments.children if arguments is not None else ():
         if getattr(node, "type", "") in ("FORMAT", "BY"):
-            raise ValError("Syntax error", f"unexpected {node}", place=Place(rest.line, node.column))
+            raise ValError("Syntax error", f"unexpected {node}", place=TextPosition(rest.line, node.column))
         given.append(None if node is None else rest.expression(node))
     if given == [None]:
         given = []
     return Call(grammar.name_of(name), tuple(given), keyword, rest.at)
 
 
-def items(rest: Rest) -> tuple[Expression | Format, ...]:
+def items(rest: OperandText) -> tuple[Expression | Format, ...]:
     """What TYPE prints."""
     if rest.empty:
         return ()
@@ -333,7 +333,7 @@ def items(rest: Rest) -> tuple[Expression | Format, ...]:
     return tuple(listed)
 
 
-def _prompt(keyword: str, rest: Rest) -> Statement:
+def _prompt(keyword: str, rest: OperandText) -> Statement:
     operands = rest.operands()
     row = forms.INSTRUCTIONS[keyword]
     targets = []
@@ -349,7 +349,7 @@ def _prompt(keyword: str, rest: Rest) -> Statement:
     return Prompt(Text("", rest.at) if text is None else text, tuple(targets))
 
 
-def _local(keyword: str, rest: Rest) -> Statement:
+def _local(keyword: str, rest: OperandText) -> Statement:
     kind = ""
     if found := _KIND.match(rest.text):
         kind = "LOC" if found[1].upper() == "LOC" else "REAL"
@@ -359,7 +359,7 @@ def _local(keyword: str, rest: Rest) -> Statement:
     return Local(keyword, names, kind)
 
 
-_OWN: Final[dict[str, Callable[[str, Rest], Statement]]] = {
+_OWN: Final[dict[str, Callable[[str, OperandText], Statement]]] = {
     "AT": _at,
     "SET": _set,
     "DECOMPOSE": _decompose,
@@ -372,7 +372,7 @@ _OWN: Final[dict[str, Callable[[str, Rest], Statement]]] = {
     "REACTI": _react,
     "IF": _if,
     "ELSE": _nothing(Else),
-    "END": _nothing(End),
+    "END": _nothing(EndBlock),
     "WHILE": _while,
     "DO": _nothing(Do),
     "UNTIL": _until,

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.syntax import (
     AnyValue,
     Blank,
     Case,
     Do,
     Else,
-    End,
+    EndBlock,
     Exit,
     For,
     Goto,
@@ -37,7 +37,7 @@ DEEPEST: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class StructureBlock:
     """A structure from its first step to its last; steps are counted from 0."""
 
     kind: BlockKind
@@ -61,7 +61,7 @@ class Structure:
     `END` of a loop to the loop's first step; `ELSE` behind its `END`, as only the steps before it come to it;
     `GOTO`, `IF .. GOTO` and `GRASP` to a label; `EXIT` behind its loop, `NEXT` to the `END` or `UNTIL` of its loop.
     """
-    blocks: Mapping[int, Block]
+    blocks: Mapping[int, StructureBlock]
     """The structure of each step that begins, divides or ends one.
 
     What comes to a `VALUE` or an `ANY` from the step before it goes on behind the block's end.
@@ -112,7 +112,7 @@ class _Surveyor:
         self._open: list[_Open] = []
         self.labels: dict[int, int] = {}
         self.jumps: dict[int, int] = {}
-        self.blocks: dict[int, Block] = {}
+        self.blocks: dict[int, StructureBlock] = {}
         self.errors: list[tuple[int, ValError]] = []
 
     def run(self) -> None:
@@ -126,7 +126,9 @@ class _Surveyor:
             closer = "UNTIL" if left.kind == "DO" else "END"
             self._fail(left.start, f"{left.kind} without {closer}")
 
-    def _fail(self, i: int, detail: str, what: str = "Control structure error", at: Place | None = None) -> None:
+    def _fail(
+        self, i: int, detail: str, what: str = "Control structure error", at: TextPosition | None = None
+    ) -> None:
         place = at or self._program.steps[i].at
         self.errors.append((i, ValError(what, detail, program=self._program.name, step=i + 1, place=place)))
 
@@ -148,7 +150,7 @@ class _Surveyor:
                 self._value(i, last=False)
             case AnyValue():
                 self._value(i, last=True)
-            case End():
+            case EndBlock():
                 self._end(i)
             case Until():
                 self._until(i)
@@ -209,7 +211,7 @@ class _Surveyor:
 
     def _close(self, i: int) -> None:
         inner = self._open.pop()
-        block = Block(inner.kind, inner.start, i, tuple(inner.arms))
+        block = StructureBlock(inner.kind, inner.start, i, tuple(inner.arms))
         for part in (block.start, *block.arms, i):
             self.blocks[part] = block
         match block.kind:
@@ -228,7 +230,7 @@ class _Surveyor:
         self.jumps.update(dict.fromkeys(inner.exits, i + 1))
         self.jumps.update(dict.fromkeys(inner.nexts, i))
 
-    def _loop(self, i: int, count: int, at: Place, *, leaves: bool) -> None:
+    def _loop(self, i: int, count: int, at: TextPosition, *, leaves: bool) -> None:
         loops = [block for block in self._open if block.kind in _LOOPS]
         if count > len(loops):
             word = "EXIT" if leaves else "NEXT"
@@ -240,7 +242,7 @@ class _Surveyor:
         else:
             (loops[-count].exits if leaves else loops[-count].nexts).append(i)
 
-    def _goto(self, i: int, label: int, at: Place) -> None:
+    def _goto(self, i: int, label: int, at: TextPosition) -> None:
         if label in self.labels:
             self.jumps[i] = self.labels[label]
         else:

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from interfaces.val2.errors import Place
+from interfaces.val2.errors import TextPosition
 
-NOWHERE = Place(0, 0)
+NOWHERE = TextPosition(0, 0)
 """Of what was made, not read."""
 
 
@@ -21,7 +21,7 @@ class Number:
     """A number."""
 
     value: float
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Text:
     """A string between quotes."""
 
     value: str
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Variable:
     name: str
     """Lower case, at most 15 characters beside the prefix, which is part of it."""
     indices: tuple[Expression, ...] = ()
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
     array: bool = False
     """A whole array: `a[]`."""
 
@@ -57,7 +57,7 @@ class Apply:
     """Upper case; with its prefix, as `$ENCODE`, `#PPOINT`."""
     arguments: tuple[Expression | Format | None, ...] = ()
     """None for one that was left out; formats in `$ENCODE` alone."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Unary:
 
     operator: str
     operand: Expression
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Binary:
     operator: str
     left: Expression
     right: Expression
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class Compound:
     """A compound transformation `a:b:c`, two parts or more."""
 
     parts: tuple[Expression, ...]
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 Expression: TypeAlias = Number | Text | Variable | Apply | Unary | Binary | Compound
@@ -121,7 +121,7 @@ class Instruction:
     """None for one that was left out."""
     words: tuple[str, ...] = ()
     """Words after them, upper case, in the order of `forms.py`: `MMPS`, `ALWAYS`; a switch's name for `ENABLE`."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
     begins: Expression | None = None
     """Time of `AT time` before a motion, on the same line."""
 
@@ -139,7 +139,7 @@ class IfGoto:
 
     condition: Expression
     label: int
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ class Else:
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class EndBlock:
     """`END` of an `IF`, `WHILE`, `FOR` or `CASE`."""
 
 
@@ -205,7 +205,7 @@ class Exit:
     """`EXIT n`: leave the n innermost loops."""
 
     count: int = 1
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +213,7 @@ class Next:
     """`NEXT n`: go to the next turn of the n-th innermost loop."""
 
     count: int = 1
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +221,7 @@ class Goto:
     """`GOTO label`."""
 
     label: int
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +232,7 @@ class Call:
     arguments: tuple[Expression | None, ...] = ()
     keyword: str = "CALL"
     """`CALL` or `GOSUB`."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +250,7 @@ class React:
     immediate: bool = False
     """`REACTI`: the present motion is stopped at once."""
     always: bool = False
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,11 +304,11 @@ class Ignored:
     keyword: str
     rest: str
     """The rest of the line as it was written."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 Statement: TypeAlias = (
-    Blank | Assign | Set | Instruction | If | IfGoto | Else | End | While | Do | Until | For | Case | Value
+    Blank | Assign | Set | Instruction | If | IfGoto | Else | EndBlock | While | Do | Until | For | Case | Value
     | AnyValue | Exit | Next | Goto | Call | Return | React | Type | Prompt | Decompose | Local | Ignored
 )  # fmt: skip
 
@@ -322,7 +322,7 @@ class Step:
     """0 to 65535."""
     comment: str | None = None
     """What follows `;`, without it; None for no comment."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,4 +336,4 @@ class Program:
     """Step n is `steps[n - 1]`."""
     comment: str | None = None
     """Of the `.PROGRAM` line."""
-    at: Place = field(default=NOWHERE, compare=False)
+    at: TextPosition = field(default=NOWHERE, compare=False)

@@ -17,7 +17,7 @@ from typing import Final
 
 from interfaces.stream.strangers import Strangers
 from interfaces.timer import Turning
-from interfaces.val2.monitor.monitor import OVERLONG, Monitor
+from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.switchboard import Switchboard
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from vrs.clock import Clock
@@ -58,7 +58,10 @@ class TcpTerminal:
     """The terminal of a connection: bytes to lines, what is said to bytes."""
 
     def __init__(
-        self, writer: asyncio.StreamWriter, terminal: Callable[[str], Monitor | None], full: Callable[[], bool]
+        self,
+        writer: asyncio.StreamWriter,
+        terminal: Callable[[str], TerminalMonitor | None],
+        full: Callable[[], bool],
     ) -> None:
         """Ask for a token.
 
@@ -70,7 +73,7 @@ class TcpTerminal:
         self._writer, self._terminal, self._full = writer, terminal, full
         self._input, self._output = Input(), Output(_NEWLINE)
         self._lines: deque[str] = deque()
-        self.monitor: Monitor | None = None
+        self.monitor: TerminalMonitor | None = None
         """None before a token was accepted: nothing is carried out."""
         self._tries, self._before = TRIES, 0
         self._ended = self._told = self._lost = False
@@ -143,7 +146,7 @@ class TcpTerminal:
             self.over.set()
         return False
 
-    def _type(self, monitor: Monitor, text: str, now: float) -> None:
+    def _type(self, monitor: TerminalMonitor, text: str, now: float) -> None:
         self._output.took()
         if text == INTERRUPT:
             self._send(_NEWLINE)
@@ -193,7 +196,7 @@ class TcpTerminal:
 class ValDoor:
     """Terminals at one controller, over TCP."""
 
-    def __init__(self, board: Switchboard, clock: Clock, terminal: Callable[[str], Monitor | None]) -> None:
+    def __init__(self, board: Switchboard, clock: Clock, terminal: Callable[[str], TerminalMonitor | None]) -> None:
         """Begin with `listening`.
 
         Args:

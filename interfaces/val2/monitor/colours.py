@@ -14,7 +14,7 @@ from pygments.token import Token, _TokenType
 from interfaces.val2.errors import ValError
 from interfaces.val2.lexer import Val2Lexer
 from interfaces.val2.monitor import commands
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 
 _CLASSES: Final = (
     (Token.Comment, "class:comment"),
@@ -51,7 +51,7 @@ def style() -> Style:
 class LineLexer(Lexer):
     """Colours the line that is being typed: a command, or an instruction where one is wanted."""
 
-    def __init__(self, monitor: Monitor) -> None:
+    def __init__(self, monitor: TerminalMonitor) -> None:
         self._monitor = monitor
         self._lexer = Val2Lexer(stripnl=False, ensurenl=False)
 

@@ -10,7 +10,7 @@ from typing import Final
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, words
-from interfaces.val2.monitor.desk import Desk
+from interfaces.val2.monitor.desk import TerminalState
 from interfaces.val2.monitor.text import split_word
 
 MOST: Final = 200
@@ -34,7 +34,7 @@ class Suggestion:
     """One line; empty for none."""
 
 
-def suggestions(text: str, desk: Desk, *, program: bool = False) -> tuple[str, list[Suggestion]]:
+def suggestions(text: str, desk: TerminalState, *, program: bool = False) -> tuple[str, list[Suggestion]]:
     """What may complete a line.
 
     Args:
@@ -58,7 +58,7 @@ def suggestions(text: str, desk: Desk, *, program: bool = False) -> tuple[str, l
     return fragment, [Suggestion(one.word.lower() if lower else one.word, one.help) for one in some]
 
 
-def _command(before: str, desk: Desk) -> Iterable[Suggestion]:
+def _command(before: str, desk: TerminalState) -> Iterable[Suggestion]:
     word, rest = split_word(before)
     if not word:
         return [Suggestion(one.name, one.help) for one in commands.COMMANDS.values()]
@@ -91,7 +91,7 @@ def _command(before: str, desk: Desk) -> Iterable[Suggestion]:
     return _operands(desk) if name in {"TOOL", "BASE", "POINT", "HERE", "REWIND", "SPEED", "SIGNAL"} else []
 
 
-def _instruction(before: str, desk: Desk) -> Iterator[Suggestion]:
+def _instruction(before: str, desk: TerminalState) -> Iterator[Suggestion]:
     word, _ = split_word(_LABEL.sub("", before))
     if not word:
         yield from (Suggestion(one.keyword, one.help) for one in forms.INSTRUCTIONS.values())
@@ -109,13 +109,13 @@ def _instruction(before: str, desk: Desk) -> Iterator[Suggestion]:
     yield from _operands(desk)
 
 
-def _operands(desk: Desk) -> Iterator[Suggestion]:
+def _operands(desk: TerminalState) -> Iterator[Suggestion]:
     yield from (Suggestion(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
     yield from (Suggestion(name, said) for name, said in forms.OPERATORS.items())
     yield from _names(desk, "location", "point", "real", "string")
 
 
-def _names(desk: Desk, *kinds: str) -> list[Suggestion]:
+def _names(desk: TerminalState, *kinds: str) -> list[Suggestion]:
     """Names in memory, an array's once."""
     listing = desk.controller.memory.listing
     return [

@@ -60,7 +60,7 @@ class Dialogue(Protocol):
 
 
 @dataclass(slots=True)
-class Desk:
+class TerminalState:
     """The place of one terminal."""
 
     controller: Controller

@@ -8,7 +8,7 @@ from typing import Final
 from interfaces.val2.errors import ValError
 from interfaces.val2.geometry import from_oat
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.desk import Desk, Dialogue
+from interfaces.val2.monitor.desk import Dialogue, TerminalState
 from interfaces.val2.monitor.text import pieces
 from interfaces.val2.values import Location, PrecisionPoint
 
@@ -39,12 +39,12 @@ class Confirm:
         """Nothing has happened."""
 
 
-class Change:
+class ChangeDialogue:
     """Shows a location's six numbers and asks for changes to them, until there are none."""
 
     prompt = "Change? "
 
-    def __init__(self, desk: Desk, value: Location, keep: Callable[[Location], None]) -> None:
+    def __init__(self, desk: TerminalState, value: Location, keep: Callable[[Location], None]) -> None:
         """Show the value.
 
         Args:
@@ -107,12 +107,12 @@ def _number(text: str) -> float:
     return value
 
 
-class Watch:
+class WatchDialogue:
     """WHERE 1: shows where the arm is, again and again, until a line comes."""
 
     prompt = ""
 
-    def __init__(self, desk: Desk, *, now: float) -> None:
+    def __init__(self, desk: TerminalState, *, now: float) -> None:
         """Show it for the first time."""
         self._desk = desk
         desk.say(layout.where(desk.controller.arm.here(now=now))[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor.desk import Desk, Dialogue, Style
+from interfaces.val2.monitor.desk import Dialogue, Style, TerminalState
 from interfaces.val2.monitor.editor import Editor
 from interfaces.val2.monitor.locations import following
 from interfaces.val2.monitor.text import integer, named, pieces
@@ -16,7 +16,7 @@ from interfaces.val2.syntax import Program, Variable
 class Editing:
     """Takes lines for the editor."""
 
-    def __init__(self, desk: Desk, program: Program, step: int, *, now: float) -> None:
+    def __init__(self, desk: TerminalState, program: Program, step: int, *, now: float) -> None:
         """Show the program's head and the step."""
         self._desk, self._now = desk, now
         self._taught: Variable | None = None
@@ -67,7 +67,7 @@ class Editing:
         return variable
 
 
-def edit(desk: Desk, rest: str, *, now: float) -> Dialogue:
+def edit(desk: TerminalState, rest: str, *, now: float) -> Dialogue:
     """EDIT program, step; EDIT program(arguments) for a new one; EDIT alone goes on with the last."""
     given, *step = pieces(rest or desk.last_edit) or [""]
     if len(step) > 1:

@@ -10,11 +10,11 @@ from typing import Final
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import Memory
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.desk import Desk, Dialogue, Style
+from interfaces.val2.monitor.desk import Dialogue, Style, TerminalState
 from interfaces.val2.monitor.dialogues import Confirm
 from interfaces.val2.monitor.listing import chosen
 from interfaces.val2.monitor.text import halves, named, nothing
-from interfaces.val2.source import Entry, SourceFile, print_file, read_file
+from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file
 from interfaces.val2.syntax import Call, Program, React, Variable
 from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
@@ -25,19 +25,19 @@ _VALUE_WORK: Final = 4
 _PARTS = {"P": "programs", "L": "locations", "R": "reals", "S": "strings"}
 
 
-def flist(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def flist(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """FLIST, LISTF: the files."""
     nothing(rest, "FLIST")
     desk.say_all(layout.in_columns(desk.files.listed()), "No files")
 
 
-def load(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def load(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """LOAD file: programs and values; all of it or nothing."""
     path = desk.files.found(rest)
     desk.work = _loading(desk, path.name, desk.files.read(path))
 
 
-def _loading(desk: Desk, name: str, text: str) -> Generator[int, None, None]:
+def _loading(desk: TerminalState, name: str, text: str) -> Generator[int, None, None]:
     """Read a file and take what it holds, in slices."""
     source = yield from read_file(text, name)
     entries = [*source.locations, *source.reals, *source.strings]
@@ -57,7 +57,7 @@ def _loading(desk: Desk, name: str, text: str) -> Generator[int, None, None]:
     desk.say(f"{name}: {', '.join(said) or 'nothing'}")
 
 
-def _set_all(memory: Memory, entries: Sequence[Entry]) -> Generator[int, None, None]:
+def _set_all(memory: Memory, entries: Sequence[NamedValue]) -> Generator[int, None, None]:
     """Set variables; where one can't be, none is. Few are set at once, and no program runs while many are."""
     done: list[tuple[Variable, Value | None]] = []
     try:
@@ -82,7 +82,7 @@ def store(parts: str) -> Callable[..., Dialogue | None]:
         parts: Letters of what is written: programs, locations, reals, strings; empty for all, with what is used.
     """
 
-    def act(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+    def act(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
         name, names = halves(rest)
         path = desk.files.path(name)
         source = _source(desk, path.name, parts, names or "")
@@ -101,9 +101,9 @@ def store(parts: str) -> Callable[..., Dialogue | None]:
     return act
 
 
-def _source(desk: Desk, name: str, parts: str, names: str) -> SourceFile:
+def _source(desk: TerminalState, name: str, parts: str, names: str) -> SourceFile:
     memory = desk.controller.memory
-    entries = [Entry(variable, value) for variable, value in memory.variables()]
+    entries = [NamedValue(variable, value) for variable, value in memory.variables()]
     kinds = {
         "locations": [entry for entry in entries if isinstance(entry.value, Transformation | PrecisionPoint)],
         "reals": [entry for entry in entries if isinstance(entry.value, float)],
@@ -129,7 +129,7 @@ def _source(desk: Desk, name: str, parts: str, names: str) -> SourceFile:
     )
 
 
-def _named(entries: Iterable[Entry], names: str, kind: str) -> list[Entry]:
+def _named(entries: Iterable[NamedValue], names: str, kind: str) -> list[NamedValue]:
     return list(
         chosen(
             {layout.variable(entry.variable): entry for entry in entries}, names, kind.removesuffix("s")
@@ -164,7 +164,7 @@ def _walk(node: object) -> Iterator[object]:
             yield from _walk(getattr(node, field.name))
 
 
-def delete_programs(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+def delete_programs(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
     """DELETE, DELETEP."""
     if not rest:
         raise ValError("Missing argument", "which programs?")
@@ -188,7 +188,7 @@ def delete_values(kind: str) -> Callable[..., Dialogue]:
         kind: `location`, `real` or `string`.
     """
 
-    def command(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+    def command(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
         if not rest:
             raise ValError("Missing argument", f"which {kind}s?")
         memory = desk.controller.memory
@@ -214,17 +214,17 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(listed) if len(listed) <= 4 else f"{listed[0]} .. {listed[-1]}, {len(listed)} in all"
 
 
-def copy(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+def copy(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
     """COPY new=old."""
     return _put(desk, rest, "COPY", keep=True, now=now)
 
 
-def rename(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+def rename(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
     """RENAME new=old."""
     return _put(desk, rest, "RENAME", keep=False, now=now)
 
 
-def _put(desk: Desk, rest: str, name: str, *, keep: bool, now: float) -> Dialogue | None:
+def _put(desk: TerminalState, rest: str, name: str, *, keep: bool, now: float) -> Dialogue | None:
     given, old = halves(rest)
     if old is None:
         raise ValError("Missing argument", f"{name} new=old")
@@ -246,7 +246,7 @@ def _put(desk: Desk, rest: str, name: str, *, keep: bool, now: float) -> Dialogu
     return None
 
 
-def zero(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+def zero(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
     """ZERO: forget everything."""
     nothing(rest, "ZERO")
 

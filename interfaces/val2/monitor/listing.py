@@ -9,7 +9,7 @@ from typing import TypeVar
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import MOST_VALUES
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.desk import Desk, as_location
+from interfaces.val2.monitor.desk import TerminalState, as_location
 from interfaces.val2.monitor.text import is_pattern, nothing, pieces
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
@@ -19,7 +19,7 @@ from interfaces.val2.values import Location, Value
 T = TypeVar("T")
 
 
-def listp(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def listp(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """LISTP: programs with their steps."""
     programs = desk.controller.memory.programs
     for name in chosen(dict(sorted(programs.items())), rest, "program"):
@@ -29,12 +29,12 @@ def listp(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - comma
         desk.say("No programs")
 
 
-def listl(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def listl(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """LISTL: locations."""
     desk.say_all(layout.locations(chosen(locations(desk), rest, "location")), "No locations")
 
 
-def listr(desk: Desk, rest: str, *, now: float) -> None:
+def listr(desk: TerminalState, rest: str, *, now: float) -> None:
     """LISTR: reals, or an expression."""
     known = {name: value for name, value in desk.controller.memory.listing("real") if isinstance(value, float)}
     if _computed(rest) or _product(rest, known):
@@ -43,7 +43,7 @@ def listr(desk: Desk, rest: str, *, now: float) -> None:
     desk.say_all(layout.reals(chosen(known, rest, "value")), "No reals")
 
 
-def lists(desk: Desk, rest: str, *, now: float) -> None:
+def lists(desk: TerminalState, rest: str, *, now: float) -> None:
     """LISTS: strings, or an expression."""
     if _computed(rest):
         value = desk.value(rest, now=now)
@@ -71,7 +71,7 @@ def _product(rest: str, known: Mapping[str, float]) -> bool:
     return True
 
 
-def locations(desk: Desk) -> dict[str, Location]:
+def locations(desk: TerminalState) -> dict[str, Location]:
     """All locations by name."""
     listing = desk.controller.memory.listing
     return {name: as_location(value, name) for name, value in [*listing("location"), *listing("point")]}
@@ -107,7 +107,7 @@ def matcher(pattern: str) -> re.Pattern[str]:
     return re.compile(spelled if plain.endswith("]") and not plain.endswith("[]") else spelled + r"(\[.*\])?")
 
 
-def directory(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def directory(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """DIRECTORY: programs in memory."""
     programs = chosen(dict(sorted(desk.controller.memory.programs.items())), rest, "program")
     desk.say_all(_directory(programs), "No programs")
@@ -123,7 +123,7 @@ def _directory(programs: Mapping[str, Program]) -> list[str]:
     return layout.table(rows) if rows else []
 
 
-def free(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def free(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """FREE: what is in memory."""
     nothing(rest, "FREE")
     memory = desk.controller.memory
@@ -143,7 +143,7 @@ def free(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - comman
     )  # fmt: skip
 
 
-def identity(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def identity(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """ID: what this is."""
     nothing(rest, "ID")
     desk.say(desk.version)

@@ -8,18 +8,18 @@ from dataclasses import replace
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.desk import Desk, Dialogue, as_location
-from interfaces.val2.monitor.dialogues import Change, Watch
+from interfaces.val2.monitor.desk import Dialogue, TerminalState, as_location
+from interfaces.val2.monitor.dialogues import ChangeDialogue, WatchDialogue
 from interfaces.val2.monitor.text import halves, nothing
 from interfaces.val2.ports import Where
 from interfaces.val2.syntax import Compound, Number, Variable
 from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation
 
 
-def where(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
+def where(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
     """WHERE, WHERE 1, WHERE REAL."""
     if rest == "1":
-        return Watch(desk, now=now)
+        return WatchDialogue(desk, now=now)
     if rest and "REAL".startswith(rest.upper()):
         real = desk.controller.arm.real(now=now)
         if real is None:
@@ -31,7 +31,7 @@ def where(desk: Desk, rest: str, *, now: float) -> Dialogue | None:
     return None
 
 
-def rewind(desk: Desk, rest: str, *, now: float) -> None:
+def rewind(desk: TerminalState, rest: str, *, now: float) -> None:
     """REWIND t, REWIND -t: where the arm was."""
     t = desk.number(rest, now=now)
     t = now + t if rest.startswith("-") else t
@@ -42,13 +42,13 @@ def rewind(desk: Desk, rest: str, *, now: float) -> None:
     desk.say(f"At {layout.fixed(t, 3)} s, {apart}", *layout.where(past))
 
 
-def here(desk: Desk, rest: str, *, now: float) -> Dialogue:
+def here(desk: TerminalState, rest: str, *, now: float) -> Dialogue:
     """HERE location, HERE #location, HERE a:b."""
     variable, value = _recorded(desk, rest, now=now)
-    return Change(desk, value, _keeper(desk, variable))
+    return ChangeDialogue(desk, value, _keeper(desk, variable))
 
 
-def _recorded(desk: Desk, text: str, *, now: float) -> tuple[Variable, Location]:
+def _recorded(desk: TerminalState, text: str, *, now: float) -> tuple[Variable, Location]:
     """The variable that a HERE is about, and the arm's location as it takes it."""
     target = desk.expression(text, "a location's name")
     frame = NULL
@@ -79,14 +79,14 @@ def _refuse_string(variable: Variable) -> None:
         raise ValError("Invalid argument", f"{variable.name}: a location's name is wanted")
 
 
-def _keeper(desk: Desk, variable: Variable) -> Callable[[Location], None]:
+def _keeper(desk: TerminalState, variable: Variable) -> Callable[[Location], None]:
     def keep(value: Location) -> None:
         desk.controller.memory.set(variable, value)
 
     return keep
 
 
-def point(desk: Desk, rest: str, *, now: float) -> Dialogue:
+def point(desk: TerminalState, rest: str, *, now: float) -> Dialogue:
     """POINT location, POINT location = expression."""
     name, expression = halves(rest)
     variable = desk.variable(name, now=now)
@@ -98,10 +98,10 @@ def point(desk: Desk, rest: str, *, now: float) -> Dialogue:
     if (variable.prefix == "#") != isinstance(value, PrecisionPoint):
         kind = "precision point" if variable.prefix else "transformation"
         raise ValError("Invalid argument", f"{expression}: a {kind} is wanted")
-    return Change(desk, value, _keeper(desk, variable))
+    return ChangeDialogue(desk, value, _keeper(desk, variable))
 
 
-def _known(desk: Desk, variable: Variable) -> Location:
+def _known(desk: TerminalState, variable: Variable) -> Location:
     """The value that a location has; of one that has none, NULL or joint values of 0."""
     try:
         return as_location(desk.controller.memory.get(variable), variable.name)
@@ -114,7 +114,7 @@ def _known(desk: Desk, variable: Variable) -> Location:
 class Teach:
     """TEACH: records one location after the other; other commands may be given in between."""
 
-    def __init__(self, desk: Desk, first: Variable) -> None:
+    def __init__(self, desk: TerminalState, first: Variable) -> None:
         """Ask for the first."""
         self._desk, self._next = desk, first
 
@@ -143,7 +143,7 @@ class Teach:
         return text.strip().upper() in {"", "E", "END"}
 
 
-def teach(desk: Desk, rest: str, *, now: float) -> Dialogue:
+def teach(desk: TerminalState, rest: str, *, now: float) -> Dialogue:
     """TEACH location: p[1], p[2].. or p1, p2.."""
     variable = desk.variable(rest, now=now)
     _refuse_string(variable)
@@ -163,7 +163,7 @@ def following(variable: Variable) -> Variable:
     return replace(variable, name=f"{found[1]}{int(found[2]) + 1}")
 
 
-def tool(desk: Desk, rest: str, *, now: float) -> None:
+def tool(desk: TerminalState, rest: str, *, now: float) -> None:
     """TOOL, TOOL transformation."""
     if rest in {"", "?"}:
         desk.say(layout.heading(), layout.row(desk.controller.arm.tool()))
@@ -171,7 +171,7 @@ def tool(desk: Desk, rest: str, *, now: float) -> None:
         desk.controller.do(desk.instruction("TOOL", rest), now=now)
 
 
-def base(desk: Desk, rest: str, *, now: float) -> None:
+def base(desk: TerminalState, rest: str, *, now: float) -> None:
     """BASE, BASE dx,dy,dz,turn."""
     if rest in {"", "?"}:
         desk.say(layout.heading(), layout.row(desk.controller.arm.base()))

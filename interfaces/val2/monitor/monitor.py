@@ -10,13 +10,13 @@ from typing import Final
 from interfaces.val2 import events
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, settings, words
-from interfaces.val2.monitor.desk import Desk, Dialogue, Said, Style
-from interfaces.val2.monitor.dialogues import Watch
+from interfaces.val2.monitor.desk import Dialogue, Said, Style, TerminalState
+from interfaces.val2.monitor.dialogues import WatchDialogue
 from interfaces.val2.monitor.editing import Editing
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.handlers import HANDLERS
 from interfaces.val2.monitor.locations import Teach
-from interfaces.val2.monitor.switchboard import Person, Switchboard
+from interfaces.val2.monitor.switchboard import SharedOperator, Switchboard
 from interfaces.val2.monitor.text import split_word
 from vrs.errors import VrsError
 
@@ -32,7 +32,7 @@ _URGENT: Final = frozenset({"ABORT", "PANIC"})
 """What doesn't wait."""
 
 
-class Monitor:
+class TerminalMonitor:
     """One terminal's monitor. Errors are said; they never end it."""
 
     def __init__(
@@ -43,7 +43,7 @@ class Monitor:
         *,
         patient: bool = False,
         barred: str = "",
-        person: Person | None = None,
+        person: SharedOperator | None = None,
     ) -> None:
         """Begin; `start` greets.
 
@@ -59,7 +59,7 @@ class Monitor:
         """
         self._person = person
         self._board, self._patient, self.barred = board, patient, barred
-        self.desk = Desk(board.controller, files, version)
+        self.desk = TerminalState(board.controller, files, version)
         self._dialogue: Dialogue | None = None
         self._asked: str | None = None
         self._waiting: deque[str] = deque()
@@ -279,15 +279,15 @@ class Monitor:
                 desk.said.append(Said(text, Style.TYPED))
             case events.Asked(text):
                 self._asked = text
-            case events.Paused(program, step, word):
+            case events.ProgramPaused(program, step, word):
                 self._asked = None
                 if word != "XSTEP" or not desk.steps:
                     desk.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
-            case events.Ended(program, word):
+            case events.ProgramEnded(program, word):
                 self._asked, desk.steps = None, 0
                 if program or word == "ABORT":
                     desk.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
-            case events.Failed(error):
+            case events.ProgramFailed(error):
                 self._asked, desk.steps = None, 0
                 desk.fail(error)
             case events.Warned(text):
@@ -301,7 +301,7 @@ class Monitor:
         if self._greeting or now >= self._due:
             self._settle_control(now)
         self._look(now)
-        if isinstance(self._dialogue, Watch):
+        if isinstance(self._dialogue, WatchDialogue):
             self._dialogue.advance(now=now)
         self.desk.work_on(allowed=self._mine)
         self._step_on(now)
@@ -380,5 +380,5 @@ class Monitor:
         """When to call `advance` next [s]; infinity for not before a line comes."""
         if self.desk.work is not None:
             return self._looked
-        watched = self._dialogue.due if isinstance(self._dialogue, Watch) else math.inf
+        watched = self._dialogue.due if isinstance(self._dialogue, WatchDialogue) else math.inf
         return min(self._board.next_deadline(), self._due, watched, self._looked + self._board.looks)

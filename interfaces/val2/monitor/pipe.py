@@ -11,7 +11,7 @@ from collections import deque
 from typing import Final
 
 from interfaces.timer import Turning
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.teletype import Input, Output
 from vrs.clock import Clock
 
@@ -24,7 +24,7 @@ _MOST: Final = 1000
 class Pipe:
     """Lines from a file descriptor to a monitor; what it says to standard output."""
 
-    def __init__(self, monitor: Monitor, clock: Clock, *, source: int = 0) -> None:
+    def __init__(self, monitor: TerminalMonitor, clock: Clock, *, source: int = 0) -> None:
         """Begin; `run` reads.
 
         Args:

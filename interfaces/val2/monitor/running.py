@@ -6,10 +6,10 @@ import contextlib
 import re
 from typing import Final
 
-from interfaces.val2.controller import Status
+from interfaces.val2.controller import ControllerStatus
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.desk import Desk, Style
+from interfaces.val2.monitor.desk import Style, TerminalState
 from interfaces.val2.monitor.text import integer, named, nothing, pieces
 from interfaces.val2.statements import timed
 from interfaces.val2.syntax import Blank, Call, Expression
@@ -21,7 +21,7 @@ POWER: Final = "POWER"
 _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 
 
-def do(desk: Desk, rest: str, *, now: float) -> None:
+def do(desk: TerminalState, rest: str, *, now: float) -> None:
     """DO instruction; DO alone does the last again."""
     step = desk.step(rest) if rest else desk.last_do
     if step is None or isinstance(step.statement, Blank):
@@ -30,7 +30,7 @@ def do(desk: Desk, rest: str, *, now: float) -> None:
     desk.controller.do(step, now=now)
 
 
-def at(desk: Desk, rest: str, *, now: float) -> None:
+def at(desk: TerminalState, rest: str, *, now: float) -> None:
     """AT t, AT +t, before the next motion; AT t motion, AT t DO motion in one line."""
     together, places = _AT.fullmatch(rest), timed(rest)
     when, motion = rest, ""
@@ -45,13 +45,13 @@ def at(desk: Desk, rest: str, *, now: float) -> None:
         do(desk, motion, now=now)
 
 
-def execute(desk: Desk, rest: str, *, now: float) -> None:
+def execute(desk: TerminalState, rest: str, *, now: float) -> None:
     """EXECUTE program(arguments), cycles, step."""
     name, arguments, cycles, step = _program(desk, rest)
     desk.controller.execute(name, arguments, cycles=cycles, step=step, now=now)
 
 
-def xstep(desk: Desk, rest: str, *, now: float) -> None:
+def xstep(desk: TerminalState, rest: str, *, now: float) -> None:
     """XSTEP; XSTEP program(arguments), cycles, step begins one."""
     if not rest:
         desk.controller.xstep(now=now)
@@ -62,7 +62,7 @@ def xstep(desk: Desk, rest: str, *, now: float) -> None:
     desk.controller.xstep(name, cycles=cycles, step=step, now=now)
 
 
-def next_(desk: Desk, rest: str, *, now: float) -> None:
+def next_(desk: TerminalState, rest: str, *, now: float) -> None:
     """NEXT; NEXT n: so many steps of a program that stands."""
     steps = integer(rest, 1, "the number of steps")
     if not 1 <= steps <= 10_000:
@@ -71,7 +71,7 @@ def next_(desk: Desk, rest: str, *, now: float) -> None:
     desk.steps = steps - 1
 
 
-def _program(desk: Desk, rest: str) -> tuple[str, tuple[Expression, ...], int, int]:
+def _program(desk: TerminalState, rest: str) -> tuple[str, tuple[Expression, ...], int, int]:
     """Program, arguments, cycles and step of a line; of an empty one those of the last."""
     text = rest or desk.last_run
     if not text:
@@ -97,7 +97,7 @@ def _program(desk: Desk, rest: str) -> tuple[str, tuple[Expression, ...], int, i
     return name, arguments, cycles, step
 
 
-def abort(desk: Desk, rest: str, *, now: float) -> None:
+def abort(desk: TerminalState, rest: str, *, now: float) -> None:
     """ABORT."""
     nothing(rest, "ABORT")
     controller = desk.controller
@@ -106,7 +106,7 @@ def abort(desk: Desk, rest: str, *, now: float) -> None:
     controller.abort(now=now)
 
 
-def _stands(desk: Desk, now: float) -> bool:
+def _stands(desk: TerminalState, now: float) -> bool:
     """Whether the arm has nothing to do; what became of it is said elsewhere."""
     try:
         return desk.controller.arm.settled(now=now)
@@ -114,7 +114,7 @@ def _stands(desk: Desk, now: float) -> bool:
         return False
 
 
-def panic(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - it works whatever follows
+def panic(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - it works whatever follows
     """PANIC: stop, power off."""
     controller = desk.controller
     controller.switch(POWER, False)
@@ -123,25 +123,25 @@ def panic(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - it wo
     desk.say("*Arm power off* ENABLE POWER turns it on again", style=Style.ERROR)
 
 
-def proceed(desk: Desk, rest: str, *, now: float) -> None:
+def proceed(desk: TerminalState, rest: str, *, now: float) -> None:
     """PROCEED."""
     nothing(rest, "PROCEED")
     desk.controller.proceed(now=now)
 
 
-def retry(desk: Desk, rest: str, *, now: float) -> None:
+def retry(desk: TerminalState, rest: str, *, now: float) -> None:
     """RETRY."""
     nothing(rest, "RETRY")
     desk.controller.retry(now=now)
 
 
-def undo(desk: Desk, rest: str, *, now: float) -> None:
+def undo(desk: TerminalState, rest: str, *, now: float) -> None:
     """UNDO."""
     nothing(rest, "UNDO")
     desk.say(desk.controller.arm.undo(now=now))
 
 
-def timeline(desk: Desk, rest: str, *, now: float) -> None:
+def timeline(desk: TerminalState, rest: str, *, now: float) -> None:
     """TIMELINE."""
     nothing(rest, "TIMELINE")
     desk.say(f"Now {layout.fixed(now, 3)} s")
@@ -152,7 +152,7 @@ def timeline(desk: Desk, rest: str, *, now: float) -> None:
     desk.say_all(scheduled, "Nothing is scheduled")
 
 
-def status(desk: Desk, rest: str, *, now: float) -> None:
+def status(desk: TerminalState, rest: str, *, now: float) -> None:
     """STATUS."""
     nothing(rest, "STATUS")
     controller = desk.controller
@@ -172,7 +172,7 @@ def status(desk: Desk, rest: str, *, now: float) -> None:
         desk.say(f"{'':{2 * depth}}called from {name}, step {step}")
 
 
-def _program_line(state: Status) -> str:
+def _program_line(state: ControllerStatus) -> str:
     word = state.state.name.lower()
     if not state.program:
         return word

@@ -9,24 +9,24 @@ from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.commands import unique
-from interfaces.val2.monitor.desk import Desk, Dialogue, Style
+from interfaces.val2.monitor.desk import Dialogue, Style, TerminalState
 from interfaces.val2.monitor.dialogues import Confirm
 from interfaces.val2.monitor.running import POWER
 from interfaces.val2.monitor.text import halves, nothing, pieces
 from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
 
 
-def enable(desk: Desk, rest: str, *, now: float) -> None:
+def enable(desk: TerminalState, rest: str, *, now: float) -> None:
     """ENABLE switch, .."""
     _turn(desk, rest, on=True, now=now)
 
 
-def disable(desk: Desk, rest: str, *, now: float) -> None:
+def disable(desk: TerminalState, rest: str, *, now: float) -> None:
     """DISABLE switch, .."""
     _turn(desk, rest, on=False, now=now)
 
 
-def _turn(desk: Desk, rest: str, *, on: bool, now: float) -> None:
+def _turn(desk: TerminalState, rest: str, *, on: bool, now: float) -> None:
     switches = desk.controller.switches
     if not rest:
         raise ValError("Missing argument", f"one of {', '.join(sorted(switches))}")
@@ -38,14 +38,14 @@ def _turn(desk: Desk, rest: str, *, on: bool, now: float) -> None:
             desk.controller.abort(now=now)
 
 
-def switch(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def switch(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """SWITCH: which are on."""
     switches = desk.controller.switches
     names = [unique(piece.upper(), switches, "switch") for piece in pieces(rest)] or sorted(switches)
     desk.say(*layout.table([(name, "ON" if switches[name] else "OFF") for name in names]))
 
 
-def parameter(desk: Desk, rest: str, *, now: float) -> None:
+def parameter(desk: TerminalState, rest: str, *, now: float) -> None:
     """PARAMETER; PARAMETER name; PARAMETER name = value."""
     parameters = desk.controller.parameters
     given, value = halves(rest)
@@ -62,7 +62,7 @@ def parameter(desk: Desk, rest: str, *, now: float) -> None:
     parameters[names[0]] = wanted
 
 
-def speed(desk: Desk, rest: str, *, now: float) -> None:
+def speed(desk: TerminalState, rest: str, *, now: float) -> None:
     """SPEED; SPEED percent: the monitor speed."""
     arm = desk.controller.arm
     if rest in {"", "?"}:
@@ -74,7 +74,7 @@ def speed(desk: Desk, rest: str, *, now: float) -> None:
         desk.say(f"*Warning* SPEED {layout.number(wanted)} % counts as {MOST_PERCENT:g} %", style=Style.NOTE)
 
 
-def signal(desk: Desk, rest: str, *, now: float) -> None:
+def signal(desk: TerminalState, rest: str, *, now: float) -> None:
     """SIGNAL n, -m: on, off; inputs too, in the place of what would set them."""
     if not rest:
         io(desk, rest, now=now)
@@ -85,13 +85,13 @@ def signal(desk: Desk, rest: str, *, now: float) -> None:
         signals.force(number)
 
 
-def reset(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def reset(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """RESET: all outputs off."""
     nothing(rest, "RESET")
     desk.controller.signals.reset()
 
 
-def io(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def io(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """IO: a table of all signals, 1 for on."""
     nothing(rest, "IO")
     signals = desk.controller.signals
@@ -101,7 +101,7 @@ def io(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands
         desk.say(f"{title:8}  {numbers[0]:4} {eights} {numbers[-1]}")
 
 
-def calibrate(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+def calibrate(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
     """CALIBRATE: the virtual arm knows where it is, so nothing moves."""
     nothing(rest, "CALIBRATE")
     if not desk.controller.switches[POWER]:
@@ -113,7 +113,7 @@ def calibrate(desk: Desk, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001
     return Confirm("Are you sure", act)
 
 
-def state(desk: Desk, word: str) -> bool:
+def state(desk: TerminalState, word: str) -> bool:
     """What `word ?` asks for: `COARSE ?`, `FINE ?`, a switch; whether there's such a state."""
     arm = desk.controller.arm
     if word in {"COARSE", "FINE"}:

@@ -13,7 +13,7 @@ _AGAIN: Final = 0.02
 """Time between two looks whether control is there again [s]."""
 
 
-class Person(Protocol):
+class SharedOperator(Protocol):
     """Who commands the robot by a session of its own, too, and shares with the controller what it has."""
 
     @property
@@ -31,7 +31,7 @@ class Person(Protocol):
 class Control(Protocol):
     """The right to command the robot, as its site gives it."""
 
-    def wanted(self, person: Person | None = None, *, now: float) -> str | None:
+    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         """Ask for it, if it isn't there: empty if it is, why not, or None while nothing is known yet.
 
         Args:
@@ -66,7 +66,7 @@ class Free:
     kept = True
     """It's there."""
 
-    def wanted(self, person: Person | None = None, *, now: float) -> str | None:  # noqa: ARG002 - it's always there
+    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:  # noqa: ARG002 - it's always there
         """It's there."""
         return ""
 
@@ -90,7 +90,7 @@ class Free:
         return math.inf
 
 
-class Terminal(Protocol):
+class TerminalListener(Protocol):
     """What is told of what happens."""
 
     def take(self, event: Event) -> None:
@@ -108,14 +108,14 @@ class Switchboard:
             control: The right to command the robot.
         """
         self.controller, self._control = controller, control
-        self.holder: Terminal | None = None
+        self.holder: TerminalListener | None = None
         """The terminal in control."""
-        self._person: Person | None = None
+        self._person: SharedOperator | None = None
         """Who sits there."""
         self._withdraws: float | None = None
         """When to see next whether what a program asked for ahead can be taken back [s]; None where nothing is."""
 
-    def wanted(self, terminal: Terminal, person: Person | None = None, *, now: float) -> str | None:
+    def wanted(self, terminal: TerminalListener, person: SharedOperator | None = None, *, now: float) -> str | None:
         """Ask for control for a terminal: empty if it's in control, why not, or None if that isn't known yet.
 
         Args:
@@ -170,7 +170,7 @@ class Switchboard:
         """How often it's to be asked for trouble [s]."""
         return self._control.looks
 
-    def leave(self, terminal: Terminal, *, now: float) -> None:
+    def leave(self, terminal: TerminalListener, *, now: float) -> None:
         """A terminal is gone: what it ran is stopped."""
         if self.holder is not terminal:
             return

@@ -25,7 +25,7 @@ from interfaces.timer import Turning
 from interfaces.val2.monitor.colours import LineLexer, style
 from interfaces.val2.monitor.completion import hint, suggestions
 from interfaces.val2.monitor.desk import Said
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 from vrs.clock import Clock
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Keyboard(Vt100Input):
 class _Completer(Completer):
     """Completes by `suggestions`."""
 
-    def __init__(self, monitor: Monitor) -> None:
+    def __init__(self, monitor: TerminalMonitor) -> None:
         self._monitor = monitor
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
@@ -71,7 +71,7 @@ class Terminal:
 
     def __init__(
         self,
-        monitor: Monitor,
+        monitor: TerminalMonitor,
         clock: Clock,
         *,
         history: Path | None = None,

@@ -11,14 +11,14 @@ from typing import Final
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, layout
-from interfaces.val2.monitor.commands import COMMANDS, Command
-from interfaces.val2.monitor.desk import Desk
+from interfaces.val2.monitor.commands import COMMANDS, MonitorCommand
+from interfaces.val2.monitor.desk import TerminalState
 from interfaces.val2.monitor.text import split_word
 
 _ASSIGNMENT: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9._]*(\[[^\]]*\])?\s*=(?!=).*", re.DOTALL)
 
 
-def command(line: str) -> Command:
+def command(line: str) -> MonitorCommand:
     """The command that a line begins with.
 
     Raises:
@@ -82,7 +82,7 @@ def explained(word: str) -> Iterator[tuple[str, str, str]]:
         yield "instruction, V+", upper, passed if why is None else f"It isn't available: {why}."
 
 
-def help_(desk: Desk, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def help_(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
     """HELP; HELP word."""
     if not rest:
         desk.say("Commands; they may be abbreviated. HELP and a word says more of it.")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from interfaces.val2.motion.arm import Arm
 from interfaces.val2.motion.engines import EngineRobot, SiteRobot
-from interfaces.val2.motion.robot import Fate, Robot
+from interfaces.val2.motion.robot import CommandOutcome, RobotPort
 
 if TYPE_CHECKING:
     from collections.abc import MutableMapping
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from interfaces.stream.connect import Connection
     from vrs.engine import Engine
 
-__all__ = ["Arm", "EngineRobot", "Fate", "Robot", "SiteRobot", "arm_for"]
+__all__ = ["Arm", "CommandOutcome", "EngineRobot", "RobotPort", "SiteRobot", "arm_for"]
 
 
 def arm_for(robot: Engine | Connection, *, parameters: MutableMapping[str, float] | None = None) -> Arm:

@@ -31,8 +31,8 @@ from interfaces.val2.motion.places import (
     shifted,
     with_word,
 )
-from interfaces.val2.motion.robot import Fate, Robot
-from interfaces.val2.motion.speeds import Manner, Manners, Speed, bounded
+from interfaces.val2.motion.robot import CommandOutcome, RobotPort
+from interfaces.val2.motion.speeds import Manners, MotionSettings, Speed, bounded
 from interfaces.val2.ports import Where
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
@@ -62,7 +62,7 @@ class Arm:
 
     def __init__(
         self,
-        robot: Robot,
+        robot: RobotPort,
         *,
         parameters: MutableMapping[str, float] | None = None,
         gripped: Gripped | None = None,
@@ -102,7 +102,7 @@ class Arm:
         """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
         self._correction: int | None = None
         """The newest correction by ALTOUT."""
-        self._made = Manner()
+        self._made = MotionSettings()
         """How the newest motion was asked for."""
         self._made_words: tuple[str, ...] = ()
         self._now = -math.inf
@@ -603,7 +603,7 @@ class Arm:
         self._alterations.set(None)
 
 
-def _refusal(fate: Fate, straight: bool) -> ValError:
+def _refusal(fate: CommandOutcome, straight: bool) -> ValError:
     """What a refusal is in VAL's words."""
     if fate.refusal == OVERRULED:
         return ValError("Motion interrupted", TAKEN)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from interfaces.teleop.operator import OperatorSite
-from interfaces.val2.motion.robot import Fate
+from interfaces.val2.motion.robot import CommandOutcome
 from vrs.clock import ManualClock
 from vrs.commands import Command
 from vrs.engine import Engine
@@ -30,7 +30,7 @@ class EngineRobot:
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
         self._number = 0
-        self._fates: OrderedDict[int, Fate] = OrderedDict()
+        self._fates: OrderedDict[int, CommandOutcome] = OrderedDict()
 
     @property
     def model(self) -> RobotModel:
@@ -48,9 +48,13 @@ class EngineRobot:
         try:
             answer = self._do(command, now)
         except VrsError as error:
-            fate = Fate(refusal=str(error))
+            fate = CommandOutcome(refusal=str(error))
         else:
-            fate = Fate(answer) if answer is not None else Fate(refusal="there's nothing to take back")
+            fate = (
+                CommandOutcome(answer)
+                if answer is not None
+                else CommandOutcome(refusal="there's nothing to take back")
+            )
         self._fates[self._number] = fate
         if len(self._fates) > _REMEMBERED:
             self._fates.popitem(last=False)
@@ -64,15 +68,15 @@ class EngineRobot:
             return self.engine.undo()
         return self.engine.execute(command)  # type: ignore[arg-type]
 
-    def fate(self, number: int, *, now: float) -> Fate | None:  # noqa: ARG002 - answers come at once
+    def fate(self, number: int, *, now: float) -> CommandOutcome | None:  # noqa: ARG002 - answers come at once
         """What became of it; of one that's long over, nothing but that it's over."""
         fate = self._fates.get(number)
         if fate is None:
-            return Fate()
+            return CommandOutcome()
         receipt = fate.receipt
         if receipt is None or receipt.status is Status.REJECTED:
             return fate
-        return Fate(self.engine.receipt(receipt.command_id))
+        return CommandOutcome(self.engine.receipt(receipt.command_id))
 
     def trouble(self) -> str:
         """None: there's no other twin."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from interfaces.val2.motion.robot import Robot
+from interfaces.val2.motion.robot import RobotPort
 from vrs.commands import ScaleTime
 
 _AGAIN: Final = 0.05
@@ -18,7 +18,7 @@ class MonitorSpeed:
     The way to a slower pace takes a while, during which a faster one may be refused; it's asked for again then.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: RobotPort) -> None:
         self._robot = robot
         self.wanted = self._held = self._asked = 100.0
         self._number: int | None = None

@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces.designer import Issued
 from interfaces.val2.motion.engines import standing
-from interfaces.val2.motion.robot import Fate
+from interfaces.val2.motion.robot import CommandOutcome
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt
@@ -80,17 +80,17 @@ class RemoteRobot:
         self._open = number
         return number
 
-    def fate(self, number: int, *, now: float) -> Fate | None:
+    def fate(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it, once the timeline shows it."""
         try:
             issued = self._connection.designer.issued(number)
         except UnknownCommandError:
-            return Fate()
+            return CommandOutcome()
         if issued.answered_at is None:
             return None
         if number == self._open:
             self._open, self._outdated = None, self._connection.state
-        fate = Fate(issued.receipt, issued.refusal)
+        fate = CommandOutcome(issued.receipt, issued.refusal)
         if fate.reason or number not in self._asked:
             return fate
         command, before = self._asked[number]
@@ -98,7 +98,7 @@ class RemoteRobot:
             if now < self._patience(issued) + _PATIENCE:
                 return None
             if isinstance(command, MotionCommand) and not self._leads_to(issued.receipt):
-                fate = Fate(refusal="the server took it, but doesn't show what the arm does")
+                fate = CommandOutcome(refusal="the server took it, but doesn't show what the arm does")
         del self._asked[number]
         return fate
 

@@ -12,7 +12,7 @@ from vrs.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fate:
+class CommandOutcome:
     """What became of something that was asked for."""
 
     receipt: Receipt | None = None
@@ -28,7 +28,7 @@ class Fate:
         return self.refusal
 
 
-class Robot(Protocol):
+class RobotPort(Protocol):
     """A robot's timeline, and the way to it. Times are session time [s]."""
 
     @property
@@ -46,7 +46,7 @@ class Robot(Protocol):
             The number by which `fate` tells what came of it.
         """
 
-    def fate(self, number: int, *, now: float) -> Fate | None:
+    def fate(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it by now; None while nothing was heard."""
 
     def trouble(self) -> str:

@@ -56,7 +56,7 @@ def bounded(share: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class MotionSettings:
     """How a motion is made."""
 
     speed: Speed = Speed()
@@ -75,12 +75,12 @@ class Manners:
     """What holds for the next motion, and what for all after it."""
 
     def __init__(self) -> None:
-        self.always = Manner()
-        self.next = Manner()
+        self.always = MotionSettings()
+        self.next = MotionSettings()
 
     def reset(self) -> None:
         """Be as at the beginning of a program."""
-        self.always = self.next = Manner()
+        self.always = self.next = MotionSettings()
 
     def taken(self) -> None:
         """A motion was made: what was for it alone is over."""

@@ -11,7 +11,7 @@ import pytest
 
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Event, Failed, Typed
+from interfaces.val2.events import Event, ProgramFailed, Typed
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.ports import Where
 from interfaces.val2.source import parse_file
@@ -331,7 +331,7 @@ class Rig:
         self.controller.execute(name, cycles=cycles, now=self.now)
         self.advance(until)
         for _, event in self.events:
-            if isinstance(event, Failed):
+            if isinstance(event, ProgramFailed):
                 raise event.error
         return self.typed()
 

@@ -11,7 +11,7 @@ from interfaces.stream.control import Role
 from interfaces.val2.control import LeaseControl
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.switchboard import Switchboard
 from interfaces.val2.motion import Arm
 from interfaces.val2.motion.remote import RemoteRobot
@@ -102,7 +102,7 @@ class Pair:
         self.controller = Controller(arm, parameters=arm.parameters, now=self.val.now)
         self.board = Switchboard(self.controller, LeaseControl(self.val))
         self.taken = 0
-        self.monitor = Monitor(self.board, Files(directory), "a test", person=self)
+        self.monitor = TerminalMonitor(self.board, Files(directory), "a test", person=self)
         self.monitor.start(now=self.val.now)
         self.said = ""
 

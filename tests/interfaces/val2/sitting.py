@@ -8,7 +8,7 @@ from pathlib import Path
 
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.switchboard import Control, Free, Switchboard
 from interfaces.val2.motion import arm_for
 from robots import puma560
@@ -44,9 +44,9 @@ class Sitting:
         self.monitor = self.terminal(patient=patient)
         self.shown = ""
 
-    def terminal(self, *, patient: bool = False) -> Monitor:
+    def terminal(self, *, patient: bool = False) -> TerminalMonitor:
         """One more terminal."""
-        monitor = Monitor(self.board, self.files, "vrs-teleop 0: a test", patient=patient)
+        monitor = TerminalMonitor(self.board, self.files, "vrs-teleop 0: a test", patient=patient)
         monitor.start(now=self.now)
         monitor.output()
         return monitor

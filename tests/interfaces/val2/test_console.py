@@ -25,7 +25,7 @@ from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.colours import LineLexer, style
 from interfaces.val2.monitor.completion import hint, suggestions
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.switchboard import Free, Switchboard
 from interfaces.val2.monitor.terminal import Keyboard, Terminal
 from interfaces.val2.motion import arm_for
@@ -131,7 +131,7 @@ class Keys:
         arm = arm_for(self.engine)
         self.controller = Controller(arm, parameters=arm.parameters)
         self.clock = WallClock()
-        self.monitor = Monitor(Switchboard(self.controller, Free()), Files(tmp_path), "a test")
+        self.monitor = TerminalMonitor(Switchboard(self.controller, Free()), Files(tmp_path), "a test")
         self.source, self.said = source, []
         say = self.monitor.output
 

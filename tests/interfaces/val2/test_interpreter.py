@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Failed, SignalChanged
-from interfaces.val2.interpreter import MOST_CALLS, State
+from interfaces.val2.events import ProgramFailed, SignalChanged
+from interfaces.val2.interpreter import MOST_CALLS, ProgramState
 from tests.interfaces.val2.rig import FakeArm, Rig, body, failure, run
 
 
@@ -260,7 +260,7 @@ def test_an_error_stops_the_program_and_it_goes_on_after_a_mend() -> None:
     rig = Rig()
     with pytest.raises(ValError, match="Undefined value"):
         rig.run(body("TYPE 1", "TYPE x", "TYPE 3"))
-    assert rig.controller.status().state is State.PAUSED
+    assert rig.controller.status().state is ProgramState.PAUSED
     assert rig.controller.status().step == 2
     rig.do("x = 2")
     rig.controller.retry(now=rig.now)
@@ -283,4 +283,4 @@ def test_a_motion_that_is_refused_later_stops_the_program_at_it() -> None:
     rig = Rig(arm)
     with pytest.raises(ValError, match=r"\*Location out of range\*, program main, step 1"):
         rig.run(body("MOVE NULL", "TYPE 1"))
-    assert rig.when(Failed)[0][0] == 0.2
+    assert rig.when(ProgramFailed)[0][0] == 0.2

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import Monitor
+from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.pages import FRAME, UNREAD, WINDOW, PageTerminal
 from tests.interfaces.val2.sitting import Sitting
 
@@ -22,7 +22,7 @@ class Seen:
         self.text, self.prompt, self.size, self.others = "", None, 0, []
         self.tell(type="hello", token=None, session="page's", holds=True)
         files = Files(directory, examples=examples)
-        self.monitor = Monitor(self.sitting.board, files, "a test", barred=barred, person=self.terminal)
+        self.monitor = TerminalMonitor(self.sitting.board, files, "a test", barred=barred, person=self.terminal)
         self.terminal.begin(self.monitor, now=0.0)
         self.look()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from interfaces.val2 import forms
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.parser import LONGEST_LINE, _step, parse_expression, parse_line, parse_program
 from interfaces.val2.printer import print_step
 from interfaces.val2.source import parse_file
@@ -21,7 +21,7 @@ from interfaces.val2.syntax import (
     Blank,
     Call,
     Decompose,
-    End,
+    EndBlock,
     Exit,
     For,
     Format,
@@ -121,15 +121,15 @@ def test_forms_of_lines(text, tree):
 
 def test_a_line_has_a_label_a_comment_and_places():
     step = parse_line("\t100  MOVES a:b ; there;and back ")
-    assert (step.label, step.comment, step.at) == (100, " there;and back", Place(1, 7))
+    assert (step.label, step.comment, step.at) == (100, " there;and back", TextPosition(1, 7))
     (operand,) = step.statement.operands
-    assert (operand.at, operand.parts[1].at) == (Place(1, 13), Place(1, 15))
+    assert (operand.at, operand.parts[1].at) == (TextPosition(1, 13), TextPosition(1, 15))
     assert parse_line("") == parse_line("   \t")
     assert parse_line("").statement == Blank()
     assert parse_line("7 ;x").label == 7
     assert parse_line("REMARK it's \"so; or").comment == "it's \"so; or"
     program = parse_program("\n.PROGRAM p\r\n x = 1\r  y = -\t2\n.END")
-    assert program.steps[1].statement.value.at == Place(4, 7)
+    assert program.steps[1].statement.value.at == TextPosition(4, 7)
 
 
 SLIPS = [
@@ -180,7 +180,7 @@ def test_slips_are_survived(text, printed):
 @pytest.mark.parametrize("last", [".END", ".end ", ""])
 def test_heads_ends_and_line_ends(ends, head, last):
     program = parse_program(ends.join(["; of the file", head, "", " move a", "end", last]))
-    assert (program.name, [type(step.statement) for step in program.steps]) == ("p", [Blank, Instruction, End])
+    assert (program.name, [type(step.statement) for step in program.steps]) == ("p", [Blank, Instruction, EndBlock])
 
 
 def test_what_has_no_meaning_is_kept_as_it_is_written():
@@ -242,13 +242,13 @@ def test_errors_say_where_and_what_is_allowed(text, column, said):
     with pytest.raises(ValError) as caught:
         parse_line(text)
     assert said in str(caught.value)
-    assert caught.value.place == Place(1, column)
+    assert caught.value.place == TextPosition(1, column)
 
 
 def test_errors_in_programs_have_the_line_of_the_file():
     with pytest.raises(ValError) as caught:
         parse_program("\n\n.PROGRAM p\n MOVE a\n\n  MOVE )\n.END")
-    assert caught.value.place == Place(6, 8)
+    assert caught.value.place == TextPosition(6, 8)
     assert caught.value.program == "p"
     for text, place in (
         (".PROGRAM", (1, 9)),
@@ -258,7 +258,7 @@ def test_errors_in_programs_have_the_line_of_the_file():
     ):
         with pytest.raises(ValError) as caught:
             parse_program(text)
-        assert caught.value.place == Place(*place)
+        assert caught.value.place == TextPosition(*place)
     for text, what in ((".PROGRAM a(b, b)", "Duplicate name"), (".PROGRAM a(pi)", "Reserved name")):
         with pytest.raises(ValError, match=what):
             parse_program(text)

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Asked, Ended, Failed, Paused, Warned
-from interfaces.val2.interpreter import State
+from interfaces.val2.events import Asked, ProgramEnded, ProgramFailed, ProgramPaused, Warned
+from interfaces.val2.interpreter import ProgramState
 from interfaces.val2.syntax import Variable
 from tests.interfaces.val2.rig import Rig, body, failure, run
 
@@ -24,7 +24,7 @@ def test_prompt_asks_until_the_answer_is_right() -> None:
     assert [e.text for _, e in rig.when(Asked)] == ["Two? "] * 4 + ["Name? ", ""]
     assert rig.typed().count("*Illegal value*") == 3
     assert rig.typed().endswith(" 11\n< Ann, B >\n")
-    assert rig.when(Ended)
+    assert rig.when(ProgramEnded)
 
 
 def test_prompt_of_numbers_and_a_string() -> None:
@@ -62,7 +62,7 @@ def test_cycles() -> None:
     rig = Rig()
     rig.run(body("TYPE 1", "STOP", "TYPE 2"), cycles=3)
     assert rig.typed() == " 1\n" * 3
-    assert [e for _, e in rig.when(Ended)] == [Ended("main", "STOP")]
+    assert [e for _, e in rig.when(ProgramEnded)] == [ProgramEnded("main", "STOP")]
     assert rig.arm.names().count("begin_program") == 3
     rig = Rig()
     rig.run(body("n = 0", "MOVE NULL"), cycles=-1, until=9.5)
@@ -75,9 +75,9 @@ def test_cycles() -> None:
 def test_pause_and_proceed() -> None:
     rig = Rig()
     rig.run(body("MOVE NULL", "TYPE 1", "PAUSE", "TYPE 2"))
-    assert rig.when(Paused) == [(pytest.approx(1.0), Paused("main", 4, "PAUSE"))]
+    assert rig.when(ProgramPaused) == [(pytest.approx(1.0), ProgramPaused("main", 4, "PAUSE"))]
     status = rig.controller.status()
-    assert (status.state, status.program, status.step, status.word) == (State.PAUSED, "main", 4, "PAUSE")
+    assert (status.state, status.program, status.step, status.word) == (ProgramState.PAUSED, "main", 4, "PAUSE")
     rig.controller.proceed(now=rig.now)
     rig.advance()
     assert rig.typed() == " 1\n 2\n"
@@ -123,13 +123,13 @@ def test_single_steps() -> None:
     rig.controller.xstep("main", now=0.0)
     rig.advance()
     steps = []
-    while rig.controller.status().state is State.PAUSED:
+    while rig.controller.status().state is ProgramState.PAUSED:
         steps.append((rig.controller.status().program, rig.controller.status().step))
         rig.controller.xstep(now=rig.now)
         rig.advance()
     assert steps[:3] == [("main", 2), ("f", 1), ("f", 1)]
     assert rig.typed() == " 2\n"
-    assert rig.when(Ended)
+    assert rig.when(ProgramEnded)
 
 
 def test_do() -> None:
@@ -138,9 +138,9 @@ def test_do() -> None:
     assert rig.now == pytest.approx(1.0)
     rig.do("TYPE DX(HERE)")
     assert rig.typed() == " 7\n"
-    assert [e for _, e in rig.when(Ended)] == [Ended("", "DO")] * 2
+    assert [e for _, e in rig.when(ProgramEnded)] == [ProgramEnded("", "DO")] * 2
     rig.do("TYPE nothing")
-    (failed,) = (e for _, e in rig.when(Failed))
+    (failed,) = (e for _, e in rig.when(ProgramFailed))
     assert (failed.error.what, failed.error.detail, failed.error.place.column) == ("Undefined value", "nothing", 6)
     for line in ("IF TRUE THEN", "GOTO 5", "FOR i = 1 TO 2", "RETURN"):
         with pytest.raises(ValError, match="Control structure error"):

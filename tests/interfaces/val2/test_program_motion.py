@@ -9,7 +9,7 @@ import pytest
 
 from interfaces.val2.controller import STATEMENT
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Ended, Paused, SignalChanged
+from interfaces.val2.events import ProgramEnded, ProgramPaused, SignalChanged
 from interfaces.val2.values import PrecisionPoint
 from tests.interfaces.val2.rig import READY, FakeArm, Rig, body, failure, run
 
@@ -25,7 +25,7 @@ def test_forward_processing(latency: float) -> None:
     first, second = (a.t for a in rig.arm.asked if a.what == "move")
     assert first == 0.0
     assert second == pytest.approx(latency, abs=1e-3)
-    assert rig.when(Ended)[0][0] == pytest.approx(latency + 2.0, abs=1e-3)
+    assert rig.when(ProgramEnded)[0][0] == pytest.approx(latency + 2.0, abs=1e-3)
 
 
 def test_break_waits_for_the_arm() -> None:
@@ -145,7 +145,7 @@ def test_computing_takes_session_time_and_an_endless_loop_comes_to_no_harm() -> 
     assert n == pytest.approx(1.0 / STATEMENT / 3, rel=0.01)
     rig.controller.abort(now=rig.now)
     rig.advance()
-    assert [e.word for _, e in rig.when(Paused)] == ["ABORT"]
+    assert [e.word for _, e in rig.when(ProgramPaused)] == ["ABORT"]
 
 
 def test_a_late_driver_doesnt_wait_long_for_one_turn() -> None:

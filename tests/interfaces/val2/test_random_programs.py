@@ -8,7 +8,7 @@ import random
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Failed
+from interfaces.val2.events import ProgramFailed
 from interfaces.val2.parser import parse_line
 from tests.interfaces.val2.rig import FakeArm, Rig
 
@@ -110,6 +110,6 @@ def test_random_programs(seed: int) -> None:
             continue
     for _, value in rig.controller.memory.variables():
         assert not isinstance(value, float) or math.isfinite(value)
-    for _, event in rig.when(Failed):
+    for _, event in rig.when(ProgramFailed):
         assert event.error.what
         assert event.error.program == "" or event.error.step is not None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Ended
-from interfaces.val2.interpreter import State
+from interfaces.val2.events import ProgramEnded
+from interfaces.val2.interpreter import ProgramState
 from interfaces.val2.reactions import Reactions, reaction_to
 from tests.interfaces.val2.rig import FakeArm, Rig, body
 
@@ -59,7 +59,7 @@ def test_reacti_gives_up_the_motion_under_way_and_the_next_one_is_asked_anew() -
     rig.run(body("REACTI 1001, alarm", "MOVE TRANS(50)", "MOVE TRANS(100)", "TYPE DX(DEST)") + ALARM + at(0.4))
     assert times(rig) == [pytest.approx(0.4, abs=1e-3), 100.0]
     assert [round(a.t, 2) for a in rig.arm.asked if a.what == "move"] == [0.0, 0.0, 0.4]
-    assert rig.when(Ended)[0][0] == pytest.approx(1.4, abs=1e-2)
+    assert rig.when(ProgramEnded)[0][0] == pytest.approx(1.4, abs=1e-2)
 
 
 def test_a_reaction_is_done_once_or_always() -> None:
@@ -131,8 +131,8 @@ def test_without_a_program_it_returns_from_the_one_that_runs() -> None:
     rig = Rig()
     rig.run(body("REACTI 1001", "MOVE NULL", "BREAK", "TYPE 99") + at(0.3))
     assert times(rig) == []
-    assert [e.word for _, e in rig.when(Ended)] == ["END"]
-    assert rig.when(Ended)[0][0] == pytest.approx(0.3, abs=1e-3)
+    assert [e.word for _, e in rig.when(ProgramEnded)] == ["END"]
+    assert rig.when(ProgramEnded)[0][0] == pytest.approx(0.3, abs=1e-3)
 
 
 def test_a_reaction_may_end_or_stop_the_program() -> None:
@@ -142,7 +142,7 @@ def test_a_reaction_may_end_or_stop_the_program() -> None:
         cycles=5,
     )
     assert times(rig) == []
-    assert [e.word for _, e in rig.when(Ended)] == ["HALT"]
+    assert [e.word for _, e in rig.when(ProgramEnded)] == ["HALT"]
 
 
 def test_a_reaction_moves_and_the_program_goes_on() -> None:
@@ -166,11 +166,11 @@ def test_an_error_in_a_reaction_stops_the_program_there() -> None:
     rig = Rig()
     with pytest.raises(ValError, match=r"\*Undefined value\* x, program bad, step 1"):
         rig.run(body("REACT 1001, bad", "WAIT.EVENT , 5") + ".PROGRAM bad()\n TYPE x\n.END\n" + at(1.0))
-    assert rig.controller.status().state is State.PAUSED
+    assert rig.controller.status().state is ProgramState.PAUSED
     assert rig.controller.status().stack == (("main", 2), ("bad", 1))
     rig.controller.proceed(now=rig.now)
     rig.advance()
-    assert rig.when(Ended)
+    assert rig.when(ProgramEnded)
     assert rig.now == pytest.approx(5.0, abs=1e-3)
 
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.val2.errors import Place, ValError
+from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.geometry import from_oat
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.source import (
-    Entry,
+    NamedValue,
     SignalRule,
     SourceFile,
     numbers_of,
@@ -62,12 +62,12 @@ def test_every_section_is_read():
     assert source.name == "tray.v2"
     assert [p.name for p in source.programs] == ["main", "second"]
     assert source.locations == (
-        Entry(element("p1"), from_oat(0, 300.5, -200, 90, -90, 0)),
-        Entry(element("p", 1, 2), from_oat(1, 2, 3, 4, 5, 6)),
-        Entry(element("#safe"), PrecisionPoint((0, -90, 90, 0, 0, 0))),
+        NamedValue(element("p1"), from_oat(0, 300.5, -200, 90, -90, 0)),
+        NamedValue(element("p", 1, 2), from_oat(1, 2, 3, 4, 5, 6)),
+        NamedValue(element("#safe"), PrecisionPoint((0, -90, 90, 0, 0, 0))),
     )
-    assert source.reals == (Entry(element("n"), 3.0), Entry(element("x", 0), -0.0015))
-    assert source.strings == (Entry(element("$a"), "hello; x"), Entry(element("$b", 3), 'say "hi"'))
+    assert source.reals == (NamedValue(element("n"), 3.0), NamedValue(element("x", 0), -0.0015))
+    assert source.strings == (NamedValue(element("$a"), "hello; x"), NamedValue(element("$b", 3), 'say "hi"'))
     assert source.signals == (
         SignalRule(1001, parse_expression("SIG(1)"), after=2.0, lasting=0.5),
         SignalRule(2002, parse_expression("TRUE"), at_time=5.0),
@@ -105,7 +105,7 @@ lengths = st.floats(-2000, 2000)
 @given(lengths, lengths, lengths, angles, st.floats(-90, 90) | st.sampled_from([-90.0, 90.0]), angles)
 def test_every_pose_comes_back(x, y, z, o, a, t):
     pose = from_oat(x, y, z, o, a, t)
-    text = print_file(SourceFile("f", locations=(Entry(element("p"), pose),)))
+    text = print_file(SourceFile("f", locations=(NamedValue(element("p"), pose),)))
     (entry,) = parse_file(text, "f").locations
     assert np.allclose(entry.value.X, pose.X, rtol=0, atol=2e-8)
     assert print_file(SourceFile("f", locations=(entry,))) == text
@@ -120,9 +120,9 @@ def test_every_pose_comes_back(x, y, z, o, a, t):
 def test_joints_reals_and_strings_come_back_exactly(joints, real, text):
     source = SourceFile(
         "f",
-        locations=(Entry(element("#p"), PrecisionPoint(tuple(joints))),),
-        reals=(Entry(element("r", 2), real),),
-        strings=(Entry(element("$s"), text[:60]),),
+        locations=(NamedValue(element("#p"), PrecisionPoint(tuple(joints))),),
+        reals=(NamedValue(element("r", 2), real),),
+        strings=(NamedValue(element("$s"), text[:60]),),
     )
     assert parse_file(print_file(source), "f") == source
 
@@ -169,7 +169,7 @@ def test_errors_say_where(text, place, said):
     with pytest.raises(ValError) as caught:
         parse_file(text, "f.v2")
     assert said in str(caught.value)
-    assert caught.value.place == Place(*place)
+    assert caught.value.place == TextPosition(*place)
 
 
 def test_rules_take_their_times_in_any_order():

@@ -6,7 +6,7 @@ import pytest
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.parser import parse_program
-from interfaces.val2.structure import Block, structure, survey
+from interfaces.val2.structure import StructureBlock, structure, survey
 
 
 def of(*lines):
@@ -20,7 +20,7 @@ def errors(*lines):
 def test_if_jumps_behind_else_or_end():
     found = of("IF a", "MOVE a", "ELSE", "MOVE b", "END", "IF b", "END")
     assert dict(found.jumps) == {0: 3, 2: 5, 5: 7}
-    assert found.blocks[0] == found.blocks[2] == found.blocks[4] == Block("IF", 0, 4, (2,))
+    assert found.blocks[0] == found.blocks[2] == found.blocks[4] == StructureBlock("IF", 0, 4, (2,))
 
 
 def test_loops_go_back_and_leave():
@@ -34,7 +34,7 @@ def test_loops_go_back_and_leave():
 def test_case_goes_from_value_to_value():
     found = of("CASE a OF", ";note", "VALUE 1:", "MOVE a", "VALUE 2, 3:", "ANY", "MOVE b", "END")
     assert dict(found.jumps) == {0: 2, 2: 4, 4: 5}
-    assert found.blocks[5] == Block("CASE", 0, 7, (2, 4, 5))
+    assert found.blocks[5] == StructureBlock("CASE", 0, 7, (2, 4, 5))
     assert dict(of("CASE a OF", "VALUE 1:", "END").jumps) == {0: 1, 1: 3}
     assert dict(of("CASE a OF", "END").jumps) == {0: 2}
 

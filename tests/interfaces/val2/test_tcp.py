@@ -18,7 +18,7 @@ from interfaces.stream import sockets
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.desk import Said, Style
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, Monitor
+from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.switchboard import Free, Switchboard
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from interfaces.val2.motion import arm_for
@@ -130,7 +130,7 @@ async def door_here(tmp_path):
 
     def terminal(token):
         rights = {"secret": "", "look": "this token only looks"}
-        return Monitor(board, Files(tmp_path), "a test", barred=rights[token]) if token in rights else None
+        return TerminalMonitor(board, Files(tmp_path), "a test", barred=rights[token]) if token in rights else None
 
     door = ValDoor(board, clock, terminal)
     async with door.listening(sockets.bind("127.0.0.1", 0)):
