@@ -17,7 +17,7 @@ from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
-from interfaces.runtime.plan import Plan, PlannedMotion
+from interfaces.runtime.plan import PlannedMotion, RunPlan
 from interfaces.runtime.session import SETTLE
 from interfaces.runtime.virtual import run_twins
 from interfaces.stream import sockets
@@ -68,7 +68,7 @@ def figures(t: Array, virtual: Array, real: Array, reference: Array) -> tuple[fl
 def in_laboratory(seed: int) -> tuple[float, ...]:
     """A run in virtual time."""
     motions = tuple(PlannedMotion(f"command {i}", t, c) for i, (t, c) in enumerate(commands(SETTLED)))
-    plan = Plan("alike", NOMINAL, motions, ())
+    plan = RunPlan("alike", NOMINAL, motions, ())
     run = run_twins(plan, MODEL, delay_profile(PROFILE), simulated_puma(), seed=seed)
     rows = (run.t >= SETTLED - 0.5) & (run.t <= SETTLED + LONG)
     return figures(run.t[rows], run.q_shown[rows], run.q_real[rows], run.q_reference[rows])

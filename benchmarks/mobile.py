@@ -77,14 +77,14 @@ def whole_runs(length: float = 60.0, rounds: int = 3) -> dict[str, float]:
     Of the time of the whole run: it goes on after the operator stopped.
     """
     from interfaces.lab.driving.run import run
-    from interfaces.runs.drive_run import Case
+    from interfaces.runs.drive_run import DriveCase
     from interfaces.teleop.architectures import ARCHITECTURES, Transport
 
     found: dict[str, list[float]] = {}
     for _ in range(rounds):
         for name in ARCHITECTURES:
             transport = Transport.DATAGRAMS if name == "timeline" else Transport.STREAM
-            case = Case(name, transport, "mon@3.3", "bare", "figure-eight", 1, length)
+            case = DriveCase(name, transport, "mon@3.3", "bare", "figure-eight", 1, length)
             start = time.process_time()
             drive = run(case)
             drive.compare()

@@ -29,8 +29,8 @@ from interfaces.recording.track import REAL
 from interfaces.runtime.feeder import Feeder
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
-from interfaces.runtime.physics import TICK, Ended, Silent
-from interfaces.runtime.physics_messages import Fault, Measurement, Ready
+from interfaces.runtime.physics import TICK, ProcessEnded, Silent
+from interfaces.runtime.physics_messages import Fault, Measurement, PhysicsReady
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.control import Role
@@ -61,7 +61,9 @@ class LoggingRobot(LiveRobot):
         super().__init__(config, access)
         self.rows: list[list[float]] = []
 
-    def _take(self, event: Ready | Measurement | Fault | Silent | Ended, feeder: Feeder, now: float) -> None:
+    def _take(
+        self, event: PhysicsReady | Measurement | Fault | Silent | ProcessEnded, feeder: Feeder, now: float
+    ) -> None:
         site = self.host.site
         if isinstance(event, Measurement) and site is not None:
             t = event.followed * TICK + self.host.offset

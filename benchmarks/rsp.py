@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from interfaces.lab.kim2006.following import cubo_model
 from interfaces.rsp import header
-from interfaces.rsp.header import Header, Type
-from interfaces.rsp.layout import Layout, Way
-from interfaces.rsp.local import LocalConfig, LocalCore, State
+from interfaces.rsp.header import Header, PacketType
+from interfaces.rsp.layout import Layout, PacketDirection
+from interfaces.rsp.local import LocalConfig, LocalCore, LocalState
 from interfaces.rsp.period import PeriodConfig
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.security import Keyring, Rank
@@ -34,12 +34,12 @@ def coded() -> Callable[[], object]:
         model.index("right_arm"): b"arms",
         model.index("lip"): b"lip",
     }
-    head = Header(model.id, False, Type.DOWN, 5, 1000, 1 << 40, 3, 0)
+    head = Header(model.id, False, PacketType.DOWN, 5, 1000, 1 << 40, 3, 0)
 
     def once() -> None:
         data = header.encode(head) + layout.join(payloads)
         header.decode(data)
-        layout.split(data[header.SIZE :], Way.DOWN)
+        layout.split(data[header.SIZE :], PacketDirection.DOWN)
 
     return once
 
@@ -72,7 +72,7 @@ def exchanged(*, sealed: bool) -> Callable[[], object]:
 
     local.open(now=0.0)
     local.request(position, True)
-    while local.state is not State.OPEN:
+    while local.state is not LocalState.OPEN:
         once()
     return once
 

@@ -22,7 +22,7 @@ import psutil
 
 from benchmarks.steady import served
 from interfaces import connect
-from interfaces.messages import Form
+from interfaces.messages import ViewForm
 from robots import puma560
 from vrs import Insertion, JointTarget, MotionCommand, Receipt
 from vrs.model import Array
@@ -91,7 +91,7 @@ class Arm:
 
     def __init__(self, robot: Any, port: int) -> None:
         self.robot, self.port = robot, port
-        self.viewer = robot.viewer(rate=10.0, form=Form.SEGMENTS)
+        self.viewer = robot.viewer(rate=10.0, form=ViewForm.SEGMENTS)
 
     def move(self, first: float, speed: float) -> Receipt:
         """Turn the first joint there [rad], as soon as the robot may be commanded; what becomes of it."""

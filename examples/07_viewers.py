@@ -6,7 +6,7 @@ import numpy as np
 
 from interfaces import Supervisor, Viewer
 from interfaces.link import Channel, ConstantDelay
-from interfaces.messages import Form, FrameStatus
+from interfaces.messages import FrameStatus, ViewForm
 from interfaces.ports import MemoryTransport, RemotePort
 from interfaces.site import Site, drive
 from robots import puma560
@@ -30,7 +30,7 @@ def connect() -> RemotePort:
 
 
 supervisor = Supervisor(connect())
-live = Viewer(connect(), rate=25, form=Form.FRAMES)
+live = Viewer(connect(), rate=25, form=ViewForm.FRAMES)
 other = Viewer(connect(), rate=50)
 parts += [supervisor, live, other]
 now = 0.0

@@ -9,7 +9,7 @@ from queue import Queue
 import numpy as np
 
 from interfaces import connect
-from interfaces.messages import Form
+from interfaces.messages import ViewForm
 from interfaces.site import Site
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.hub import Hub
@@ -61,7 +61,7 @@ thread.start()
 try:
     with connect(f"127.0.0.1:{ports.get(timeout=10)}", name="example") as arm:
         arm.acquire()
-        viewer, frames = arm.viewer(rate=50), arm.viewer(rate=60, form=Form.FRAMES)
+        viewer, frames = arm.viewer(rate=50), arm.viewer(rate=60, form=ViewForm.FRAMES)
         issued = arm.designer.issue(MotionCommand(JointTarget(home + 0.2)), execute_in=0.2, wait=5.0)
         assert issued.receipt is not None
         print(f"{issued.receipt.status}; answered after {(issued.answered_at or 0) - issued.issued_at:.3f} s")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from interfaces.lab.driving.run import run
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 
 for architecture, transport in (
     ("II", "stream"),
@@ -11,7 +11,7 @@ for architecture, transport in (
     ("timeline", "stream"),
     ("timeline", "datagrams"),
 ):
-    drive = run(Case(architecture, transport, "thu@3.3", robot="bare", operator="slalom", seed=2, length=40.0))
+    drive = run(DriveCase(architecture, transport, "thu@3.3", robot="bare", operator="slalom", seed=2, length=40.0))
     found = drive.compare()
     assert found.path_error_max is not None
     assert found.time_difference_mean is not None

@@ -11,10 +11,10 @@ from interfaces.recording.driving.figures import summary
 from interfaces.recording.driving.recorder import DriveRecorder
 from interfaces.recording.playback import Playback
 from interfaces.recording.rerun import rerun
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
 
-CASE = Case("timeline", Transport.DATAGRAMS, "wed@3.3", robot="bare", operator="slalom", length=20.0)
+CASE = DriveCase("timeline", Transport.DATAGRAMS, "wed@3.3", robot="bare", operator="slalom", length=20.0)
 
 with TemporaryDirectory() as folder:
     path = Path(folder) / "run.mcap"

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from interfaces.rsp.creator import write_package
-from interfaces.rsp.host import RobotHost
+from interfaces.rsp.host import RspHost
 from interfaces.rsp.local import LocalCore
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import example, parse_model, write_model
@@ -28,7 +28,7 @@ core = LocalCore(rover.MODEL, secrets.token_bytes)
 robot = rover.Rover(Middleware(core, clock))
 core.open(now=0.0)
 with CuboBody() as body:
-    host = RobotHost(RobotCore(rover.MODEL, secrets.token_bytes), body, frozenset(MOVES))
+    host = RspHost(RobotCore(rover.MODEL, secrets.token_bytes), body, frozenset(MOVES))
     robot.sensing.set_active(True)
     robot.left_wheel.write(0, 150)
     robot.right_wheel.write(0, 200)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from interfaces.lab.tipsuwan.run import leg, no_delay, run
-from interfaces.middleware import Middleware, MiddlewareConfig, default_network
+from interfaces.middleware import GainSchedulingMiddleware, MiddlewareConfig, default_network
 from robots.onboard import QuadraticCurveTracker, QuadraticTrackerConfig, read_curve
 
 curve = read_curve("""
@@ -27,9 +27,13 @@ def tracker() -> QuadraticCurveTracker:
 nothing = MiddlewareConfig(predicts=False, schedules=False)
 network = leg(0.22)
 for name, agent, delay in (
-    ("no delay", Middleware(tracker().control, nothing), no_delay()),
-    ("round trips of 0.22 s", Middleware(tracker().control, nothing), network),
-    ("the same, behind the middleware", Middleware(tracker().control, network=default_network()), network),
+    ("no delay", GainSchedulingMiddleware(tracker().control, nothing), no_delay()),
+    ("round trips of 0.22 s", GainSchedulingMiddleware(tracker().control, nothing), network),
+    (
+        "the same, behind the middleware",
+        GainSchedulingMiddleware(tracker().control, network=default_network()),
+        network,
+    ),
 ):
     track = run(curve, agent, delay, seed=1)
     away = [math.dist(curve.at(curve.nearest(x, y))[:2], (x, y)) for x, y, _ in track.postures[::5].tolist()]

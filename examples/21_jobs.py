@@ -8,15 +8,15 @@ import tempfile
 from pathlib import Path
 
 from interfaces import connect_mobile
-from interfaces.jobs import Command, Forecast, JobList, Message, Move, Stage, Voice, Wait
+from interfaces.jobs import Forecast, JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.onboard.journey import Goal
 
 JOBS = JobList.of(
-    Move("door"),
-    Voice("Hello!"),
-    Message("Please put the book on my top side!"),
-    Wait(),  # for the key
-    Move(Goal(1.9, 5.4)),
+    MoveJob("door"),
+    VoiceJob("Hello!"),
+    MessageJob("Please put the book on my top side!"),
+    WaitJob(),  # for the key
+    MoveJob(Goal(1.9, 5.4)),
     places={"door": Goal(1.6, 5.4)},
 )
 
@@ -36,11 +36,11 @@ try:
         assert isinstance(forecast, Forecast)
         for entry, one in zip(JOBS.entries, forecast.jobs, strict=True):
             print(entry.job.word, "takes", "nobody knows how long" if one.lasts is None else f"{one.lasts:.1f} s")
-        robot.do(Command.RUN)
-        waits = robot.wait(lambda it: bool(it.tasks and it.tasks.progress.jobs[3].stage is Stage.RUNNING), 60.0)
+        robot.do(ListCommand.RUN)
+        waits = robot.wait(lambda it: bool(it.tasks and it.tasks.progress.jobs[3].stage is JobStage.RUNNING), 60.0)
         assert robot.tasks is not None
         print("waits for the key:", waits, "- its screen shows:", robot.tasks.shows)
-        robot.do(Command.KEY)
+        robot.do(ListCommand.KEY)
         print("comes to its end:", robot.finished(60.0))
         print("the list is", robot.tasks.progress.stage, "and kept:", '"stage": "done"' in kept.read_text())
 finally:

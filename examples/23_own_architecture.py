@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from interfaces.lab.driving.run import run
-from interfaces.runs.drive_run import Case
-from interfaces.teleop.architectures import Constants, Packet
+from interfaces.runs.drive_run import DriveCase
+from interfaces.teleop.architectures import ArcPacket, Constants
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.mobile import wrapped
 from vrs.segment import ArcSegment
@@ -24,7 +24,7 @@ class Chaser:
         """Stand where both robots begin."""
         self._goal, self.executed = posture, 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
         """Take the newest arc's end for the goal."""
         if arcs:
             self._goal = Posture(*arcs[-1].value(arcs[-1].end).tolist())
@@ -42,7 +42,7 @@ class Chaser:
 
 if __name__ == "__main__":
     for name in (f"{Path(__file__).stem}:Chaser", "I", "timeline"):
-        drive = run(Case(name, "datagrams", "thu@3.3", robot="bare", operator="corridor", seed=1, length=30.0))
+        drive = run(DriveCase(name, "datagrams", "thu@3.3", robot="bare", operator="corridor", seed=1, length=30.0))
         found = drive.compare()
         off = 100 * (found.path_error_mean or 0.0)
         print(f"{name:27} {off:5.1f} cm off the path on average, {drive.collisions} collisions")

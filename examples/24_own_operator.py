@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from interfaces.lab.driving.run import run
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.mobile import clipped
 
@@ -45,6 +45,6 @@ def square(rng: np.random.Generator, period: float) -> Square:
 if __name__ == "__main__":
     own = f"{Path(__file__).stem}:square"
     for seed in range(3):
-        found = run(Case("timeline", "datagrams", "mon", "bare", own, seed, 40.0)).compare()
+        found = run(DriveCase("timeline", "datagrams", "mon", "bare", own, seed, 40.0)).compare()
         late, off = found.time_difference_mean or 0.0, 100 * (found.path_error_max or 0.0)
         print(f"seed {seed}: at most {off:.1f} cm off the path, {late:.2f} s later on average")

@@ -10,7 +10,7 @@ from itertools import islice
 
 from interfaces.forecasts import WINDOW, Forecasts
 from interfaces.journal import Journal
-from interfaces.messages import Broadcast, Frame, FrameStatus, Verdict, Verdicts
+from interfaces.messages import Broadcast, Frame, FrameStatus, FrameVerdict, Verdicts
 from vrs.commands import finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError
@@ -26,7 +26,7 @@ DUE = 2e-9
 """How much too early [s] a deadline counts as reached: engine times are whole nanoseconds."""
 
 
-class Slot:
+class FrameSlot:
     """A viewer's place: the newest frame, and nothing else, however slow the viewer is."""
 
     def __init__(self) -> None:
@@ -73,10 +73,10 @@ class Broadcaster:
         self.journal = source if isinstance(source, Journal) else Journal(source)
         self._edit = self.journal.look()
         self._forecasts = Forecasts()
-        self._falsified: list[Verdict] = []
+        self._falsified: list[FrameVerdict] = []
         self._ranges: tuple[tuple[int, int, int | None], ...] = ()
         self._since = 1
-        self._slots: list[Slot] = []
+        self._slots: list[FrameSlot] = []
         self._begun: float | None = None
         self._beat = 0
         self.number = 0
@@ -106,7 +106,7 @@ class Broadcaster:
         """How many viewers there are."""
         return len(self._slots)
 
-    def join(self) -> Slot:
+    def join(self) -> FrameSlot:
         """Give a viewer a place.
 
         Raises:
@@ -114,11 +114,11 @@ class Broadcaster:
         """
         if len(self._slots) >= MOST_VIEWERS:
             raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_VIEWERS} a broadcaster")
-        slot = Slot()
+        slot = FrameSlot()
         self._slots.append(slot)
         return slot
 
-    def leave(self, slot: Slot) -> None:
+    def leave(self, slot: FrameSlot) -> None:
         """Give a place back; one that was given back already is none."""
         self._slots = [other for other in self._slots if other is not slot]
 
@@ -175,13 +175,13 @@ class Broadcaster:
             self._ranges, left_out = ranges(self._falsified)
             self._since = max(self._since, left_out + 1)
 
-    def status(self, number: int) -> Verdict | None:
+    def status(self, number: int) -> FrameVerdict | None:
         """What became of a predicted frame; None while that's open, if it never was, or where it's forgotten."""
         self._catch_up()
         return self._forecasts.verdict(number)
 
 
-def ranges(falsified: Iterable[Verdict]) -> tuple[tuple[tuple[int, int, int | None], ...], int]:
+def ranges(falsified: Iterable[FrameVerdict]) -> tuple[tuple[tuple[int, int, int | None], ...], int]:
     """Verdicts as ranges of numbers, the newest 64; and the highest number that's left out, or 0."""
     found: list[tuple[int, int, int | None]] = []
     for verdict in sorted(falsified, key=lambda verdict: verdict.number):
@@ -193,11 +193,11 @@ def ranges(falsified: Iterable[Verdict]) -> tuple[tuple[tuple[int, int, int | No
     return tuple(found[-RANGES:]), left_out
 
 
-def status_of(number: int, verdicts: Verdicts) -> Verdict | None:
+def status_of(number: int, verdicts: Verdicts) -> FrameVerdict | None:
     """What a message says of a frame that was predicted; None where it says nothing."""
     for first, last, command_id in verdicts.falsified:
         if first <= number <= last:
-            return Verdict(number, FrameStatus.FALSIFIED, command_id)
+            return FrameVerdict(number, FrameStatus.FALSIFIED, command_id)
     if verdicts.since <= number <= verdicts.through:
-        return Verdict(number, FrameStatus.CONFIRMED)
+        return FrameVerdict(number, FrameStatus.CONFIRMED)
     return None

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from interfaces.messages import FrameStatus, Verdict
+from interfaces.messages import FrameStatus, FrameVerdict
 from vrs.model import Array
 from vrs.timeline import Timeline
 
@@ -41,7 +41,7 @@ class Forecasts:
         self._window = window
         self._waiting: dict[int, tuple[float, Array]] = {}
         self._times: list[tuple[float, int]] = []
-        self._verdicts: dict[int, Verdict] = {}
+        self._verdicts: dict[int, FrameVerdict] = {}
         self.confirmed = 0
         """Predicted frames that came true."""
         self.falsified = 0
@@ -72,7 +72,7 @@ class Forecasts:
             self._times = sorted((t, number) for number, (t, _) in self._waiting.items())
         return FrameStatus.PREDICTED
 
-    def edited(self, timeline: Timeline, culprit: Culprit) -> tuple[Verdict, ...]:
+    def edited(self, timeline: Timeline, culprit: Culprit) -> tuple[FrameVerdict, ...]:
         """Compare what waits with a new timeline; the frames that it falsifies.
 
         Args:
@@ -85,30 +85,30 @@ class Forecasts:
         t = np.array([waiting[0] for waiting in self._waiting.values()])
         q = np.array([waiting[1] for waiting in self._waiting.values()])
         wrong = np.flatnonzero(np.abs(timeline.sample(t) - q).max(axis=1) > CHANGED)
-        found = [Verdict(numbers[i], FrameStatus.FALSIFIED, culprit(float(t[i]))) for i in wrong.tolist()]
+        found = [FrameVerdict(numbers[i], FrameStatus.FALSIFIED, culprit(float(t[i]))) for i in wrong.tolist()]
         for verdict in found:
             del self._waiting[verdict.number]
             self.falsified += 1
             self._keep(verdict)
         return tuple(found)
 
-    def settle(self, now: float) -> tuple[Verdict, ...]:
+    def settle(self, now: float) -> tuple[FrameVerdict, ...]:
         """The frames that are confirmed now that the engine's clock shows `now` [s]."""
         found = []
         while self._times and self._times[0][0] <= now:
             number = heapq.heappop(self._times)[1]
             if self._waiting.pop(number, None) is not None:
-                found.append(Verdict(number, FrameStatus.CONFIRMED))
+                found.append(FrameVerdict(number, FrameStatus.CONFIRMED))
                 self.confirmed += 1
                 self._keep(found[-1])
         return tuple(found)
 
-    def _keep(self, verdict: Verdict) -> None:
+    def _keep(self, verdict: FrameVerdict) -> None:
         self._verdicts[verdict.number] = verdict
         if len(self._verdicts) > self._window:
             del self._verdicts[next(iter(self._verdicts))]
 
-    def verdict(self, number: int) -> Verdict | None:
+    def verdict(self, number: int) -> FrameVerdict | None:
         """What became of a predicted frame; None while it waits, if it never did, or where it's forgotten."""
         return self._verdicts.get(number)
 

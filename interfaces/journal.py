@@ -27,7 +27,7 @@ NAMES = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Edit:
+class TimelineEdit:
     """A timeline, and what made it of the one before."""
 
     number: int
@@ -74,7 +74,7 @@ class Journal:
         ids = (receipt.command_id for receipt in engine.receipts)
         owners = self._timeline.owners(0, len(self._timeline))
         self._newest = max((*ids, *owners), default=0)
-        self._edits: deque[Edit] = deque(maxlen=KEPT)
+        self._edits: deque[TimelineEdit] = deque(maxlen=KEPT)
         self._parts: OrderedDict[tuple[int, int], list[History]] = OrderedDict()
         self._done: Receipt | None = None
         """What `execute` did since `look`."""
@@ -127,7 +127,7 @@ class Journal:
         return self.number
 
     def _write(self, timeline: Timeline, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
-        edit = Edit(self.number + 1, self._timeline, timeline, command_id, self._seen, others)
+        edit = TimelineEdit(self.number + 1, self._timeline, timeline, command_id, self._seen, others)
         self._edits.append(edit)
         self._timeline, self.number = timeline, edit.number
 
@@ -147,7 +147,7 @@ class Journal:
                 self._parts.popitem(last=False)
         return found
 
-    def since(self, number: int) -> tuple[Edit, ...]:
+    def since(self, number: int) -> tuple[TimelineEdit, ...]:
         """The edits after one, oldest first; where they aren't all kept, the newest alone, by nobody known."""
         missing = self.look() - number
         if missing > len(self._edits):

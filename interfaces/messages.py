@@ -28,7 +28,7 @@ class FrameStatus(enum.StrEnum):
     """A command has changed what happens at the time it shows."""
 
 
-class Form(enum.StrEnum):
+class ViewForm(enum.StrEnum):
     """What a viewer gets."""
 
     SEGMENTS = "segments"
@@ -38,7 +38,7 @@ class Form(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class FrameVerdict:
     """What a predicted frame turned out to be."""
 
     number: int
@@ -109,7 +109,7 @@ class Follow:
     kind: ClassVar[str] = "follow"
     version: ClassVar[int] = 1
     number: int
-    form: Form
+    form: ViewForm
     rate: float | None = None
     """Wished rate of frames [1/s]; the broadcaster with the nearest one is taken."""
 

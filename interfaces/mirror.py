@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from interfaces.changes import AHEAD, PART, changed
-from interfaces.messages import Change, Follow, Form, History, Pulse, Reply, Scene, Want
+from interfaces.messages import Change, Follow, History, Pulse, Reply, Scene, ViewForm, Want
 from interfaces.ports import EnginePort
 from interfaces.resending import interval_of
 from vrs.errors import InvalidValueError
@@ -25,7 +25,7 @@ class Mirror:
     def __init__(self, port: EnginePort, *, resend: float) -> None:
         self._port = port
         self._resend = interval_of(resend)
-        self._follow = Follow(port.number(), Form.SEGMENTS)
+        self._follow = Follow(port.number(), ViewForm.SEGMENTS)
         self._fetching: list[PolynomialSegment] | None = None
         self._early: dict[int, History] = {}
         self._held: dict[int, Change] = {}
@@ -104,7 +104,7 @@ class Mirror:
             try:
                 timeline = changed(self.timeline, message)
             except InvalidValueError:
-                self._follow = Follow(self._port.number(), Form.SEGMENTS)
+                self._follow = Follow(self._port.number(), ViewForm.SEGMENTS)
                 self.scene = self.timeline = None
                 self._due = now
                 return

@@ -129,7 +129,7 @@ def earliest(*times: float | None) -> float | None:
     return min((t for t in times if t is not None), default=None)
 
 
-class Way(Protocol):
+class LinkDirection(Protocol):
     """One direction of a link: a `Channel` or a `Stream`."""
 
     def send(self, payload: Any, now: float, size: int = 0) -> float | None:
@@ -157,7 +157,9 @@ class MemoryTransport:
             newer ones take their place.
     """
 
-    def __init__(self, site: Site, forward: Way, backward: Way, *, lead: float = 0.0, most: int = 256) -> None:
+    def __init__(
+        self, site: Site, forward: LinkDirection, backward: LinkDirection, *, lead: float = 0.0, most: int = 256
+    ) -> None:
         self.port = RemotePort()
         self.servlet = site.servlet(lead=lead)
         self._site, self._forward, self._backward, self._most = site, forward, backward, most

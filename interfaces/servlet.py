@@ -10,7 +10,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from interfaces.broadcast import DUE, MOST_VIEWERS, Broadcaster, Slot
+from interfaces.broadcast import DUE, MOST_VIEWERS, Broadcaster, FrameSlot
 from interfaces.changes import MOST_CHANGED
 from interfaces.forecasts import Forecasts
 from interfaces.journal import Journal, portable
@@ -18,16 +18,16 @@ from interfaces.messages import (
     Answer,
     Ask,
     Follow,
-    Form,
     Frame,
     FrameStatus,
+    FrameVerdict,
     Order,
     Outcome,
     Pulse,
     Reply,
     Request,
     Scene,
-    Verdict,
+    ViewForm,
     Want,
 )
 from interfaces.ordering import REMEMBERED, OrderBook
@@ -79,7 +79,7 @@ class Servlet:
         self._edit = self.journal.look()
         self._follow: Follow | None = None
         self._snapshot: tuple[int, Timeline] = (0, self.journal.engine.timeline)
-        self._slot: Slot | None = None
+        self._slot: FrameSlot | None = None
         self._source: Broadcaster | None = None
         self._beat: float | None = None
 
@@ -172,7 +172,7 @@ class Servlet:
             self.close()
             self._follow = follow
             self._snapshot = self._edit, self.journal.engine.timeline
-            if follow.form is Form.SEGMENTS:
+            if follow.form is ViewForm.SEGMENTS:
                 self._beat = now
             elif free := [source for source in self._broadcasters if source.viewers < MOST_VIEWERS]:
                 wished = follow.rate or max(source.rate for source in free)
@@ -215,7 +215,7 @@ class Servlet:
         """Look what has been done to the timeline, and tell the client."""
         newest = self.journal.look()
         if newest != self._edit:
-            found: list[Verdict] = []
+            found: list[FrameVerdict] = []
             for edit in self.journal.since(self._edit):
                 found += self._forecasts.settle(edit.at)
                 found += self._forecasts.edited(edit.timeline, edit.culprit)
@@ -227,7 +227,7 @@ class Servlet:
             self._revise(now)
         self._tell(self._forecasts.settle(self.journal.past), now)
 
-    def _tell(self, verdicts: Sequence[Verdict], now: float) -> None:
+    def _tell(self, verdicts: Sequence[FrameVerdict], now: float) -> None:
         for verdict in verdicts:
             frame = self._answers.get(verdict.number)
             if frame is None:

@@ -19,7 +19,7 @@ PATIENCE = 1000
 """Turns without any time passing, after which something is wrong."""
 
 
-class Part(Protocol):
+class SitePart(Protocol):
     """Anything that a driver moves on, in the users' time."""
 
     def advance(self, *, now: float) -> object:
@@ -97,7 +97,7 @@ class Site:
         return min((t - self.D for t in times if t is not None), default=None)
 
 
-def drive(parts: Sequence[Part], *, now: float, until: float, most: int = 10_000_000) -> float:
+def drive(parts: Sequence[SitePart], *, now: float, until: float, most: int = 10_000_000) -> float:
     """Run parts in virtual time: at each deadline, those that are due advance in turn, until all are quiet.
 
     Args:
@@ -112,7 +112,7 @@ def drive(parts: Sequence[Part], *, now: float, until: float, most: int = 10_000
     Raises:
         InvalidValueError: If the parts don't come to `until` within that many turns.
     """
-    due: Sequence[Part] = parts
+    due: Sequence[SitePart] = parts
     again = 0
     for _ in range(most):
         for part in due:

@@ -11,7 +11,7 @@ from typing import Protocol, TypeAlias, TypeVar
 
 from interfaces.broadcast import status_of
 from interfaces.forecasts import WINDOW, Forecasts
-from interfaces.messages import Broadcast, Follow, Form, Frame, FrameStatus, Pulse, Reply, Scene, Verdict
+from interfaces.messages import Broadcast, Follow, Frame, FrameStatus, FrameVerdict, Pulse, Reply, Scene, ViewForm
 from interfaces.mirror import Mirror
 from interfaces.observer import Observer
 from interfaces.playhead import LiveEdge
@@ -35,7 +35,7 @@ Ahead: TypeAlias = Callable[[float], float | None]
 """Where a play head will be in so many seconds [s], if nobody moves it."""
 
 
-class Source(Protocol):
+class ViewerSource(Protocol):
     """What a viewer needs of its source."""
 
     live: LiveEdge
@@ -73,7 +73,7 @@ class Source(Protocol):
             The frame; None where there's none, or none that is new.
         """
 
-    def settled(self) -> tuple[Verdict, ...]:
+    def settled(self) -> tuple[FrameVerdict, ...]:
         """What became of frames since the last call."""
 
     def next_deadline(self) -> float | None:
@@ -90,7 +90,7 @@ class SegmentSource:
         self._mirror = Mirror(port, resend=resend)
         self._lead = lead
         self._forecasts = Forecasts()
-        self._settled: list[Verdict] = []
+        self._settled: list[FrameVerdict] = []
         self.live = LiveEdge()
 
     @property
@@ -149,7 +149,7 @@ class SegmentSource:
         status = self._forecasts.add(number, t, q, now=self._mirror.past)
         return Frame(number, t, max(self._mirror.past, timeline.start), q, status)
 
-    def settled(self) -> tuple[Verdict, ...]:
+    def settled(self) -> tuple[FrameVerdict, ...]:
         """What became of frames since the last call."""
         settled, self._settled = tuple(self._settled), []
         return settled
@@ -167,7 +167,7 @@ class FrameSource:
 
     def __init__(self, port: EnginePort, *, rate: float, resend: float) -> None:
         self._port, self._resend, self._period = port, resend, 1.0 / rate
-        self._follow = Follow(port.number(), Form.FRAMES, rate)
+        self._follow = Follow(port.number(), ViewForm.FRAMES, rate)
         self._observer = Observer(port, resend=resend)
         self._due = -math.inf
         self._asked: OrderedDict[int, float] = OrderedDict()
@@ -178,7 +178,7 @@ class FrameSource:
         self._answered: OrderedDict[int, int] = OrderedDict()
         self._falsified: tuple[tuple[int, int, int | None], ...] = ()
         self._last: Frame | None = None
-        self._settled: list[Verdict] = []
+        self._settled: list[FrameVerdict] = []
         self._scene: Scene | None = None
         self.live = LiveEdge()
 
@@ -241,7 +241,7 @@ class FrameSource:
             shown = self._answered.get(frame.number)
             if shown is not None and frame.status is not FrameStatus.PREDICTED:
                 del self._answered[frame.number]
-                self._settled.append(Verdict(shown, frame.status, frame.falsified_by))
+                self._settled.append(FrameVerdict(shown, frame.status, frame.falsified_by))
 
     def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:
         """The frame nearest to a time, if it's near enough and not the last one; what comes next is asked for."""
@@ -271,7 +271,7 @@ class FrameSource:
             _put(shown, frame.number, number, WINDOW)
         return replace(frame, number=number)
 
-    def settled(self) -> tuple[Verdict, ...]:
+    def settled(self) -> tuple[FrameVerdict, ...]:
         """What became of frames since the last call."""
         settled, self._settled = tuple(self._settled), []
         return settled

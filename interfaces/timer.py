@@ -18,7 +18,7 @@ TOLD = 20
 _LOG = logging.getLogger(__name__)
 
 
-class Lateness:
+class TimerLateness:
     """How late timers fired: what the machine adds to the delays of the model."""
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Timer:
         lateness: Told by how much later.
     """
 
-    def __init__(self, clock: Clock, callback: Callable[[], None], lateness: Lateness) -> None:
+    def __init__(self, clock: Clock, callback: Callable[[], None], lateness: TimerLateness) -> None:
         self._clock, self._callback, self._lateness = clock, callback, lateness
         self._deadline: float | None = None
         self._handle: asyncio.TimerHandle | None = None
@@ -90,7 +90,7 @@ class Turning:
         self.running = False
         self.failures = 0
         """Turns that raised."""
-        self.lateness = Lateness()
+        self.lateness = TimerLateness()
         """How late turns began that were due; a deadline that was past already counts from when it was known."""
         self._timer = Timer(clock, self._now, self.lateness)
 

@@ -10,7 +10,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, replace
 
 from interfaces.forecasts import WINDOW
-from interfaces.messages import Form, FrameStatus, Reply, Scene
+from interfaces.messages import FrameStatus, Reply, Scene, ViewForm
 from interfaces.playhead import Mode, PlayHead
 from interfaces.ports import EnginePort, earliest, port_to
 from interfaces.sources import FrameSource, SegmentSource
@@ -25,7 +25,7 @@ DUE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shown:
+class ShownFrame:
     """A frame that a viewer showed."""
 
     number: int
@@ -62,7 +62,7 @@ class Viewer:
         engine: EnginePort | Engine,
         *,
         rate: float = 50.0,
-        form: Form = Form.SEGMENTS,
+        form: ViewForm = ViewForm.SEGMENTS,
         lead: float = 0.0,
         resend: float = 0.3,
     ) -> None:
@@ -84,11 +84,11 @@ class Viewer:
         if not 0.1 <= self.rate <= 1000:
             raise InvalidValueError("rate", rate, "0.1 to 1000 frames a second")
         lead = finite("lead", lead, "−60 to 60 s")
-        if abs(lead) > 60 or (lead and form is Form.FRAMES):
+        if abs(lead) > 60 or (lead and form is ViewForm.FRAMES):
             raise InvalidValueError("lead", lead, "−60 to 60 s for segments, 0 for frames")
         port, self._own = port_to(engine)
-        self.form = Form(form)
-        self._segments = SegmentSource(port, lead=lead, resend=resend) if self.form is Form.SEGMENTS else None
+        self.form = ViewForm(form)
+        self._segments = SegmentSource(port, lead=lead, resend=resend) if self.form is ViewForm.SEGMENTS else None
         self._source = self._segments or FrameSource(port, rate=self.rate, resend=resend)
         port.join(self)
         self._port = port
@@ -96,7 +96,7 @@ class Viewer:
         self._begun: float | None = None
         self._beat = 0
         self._latest = -math.inf
-        self._shown: OrderedDict[int, Shown] = OrderedDict()
+        self._shown: OrderedDict[int, ShownFrame] = OrderedDict()
         self.number = 0
         """Number of the frame that was shown last."""
         self.confirmed = 0
@@ -159,7 +159,7 @@ class Viewer:
         """Take a reply."""
         self._source.receive(message, now=now)
 
-    def advance(self, *, now: float) -> tuple[Shown, ...]:
+    def advance(self, *, now: float) -> tuple[ShownFrame, ...]:
         """Show the frame that is due, if there's one to show.
 
         Args:
@@ -189,7 +189,7 @@ class Viewer:
             return ()
         self._latest = frame.t
         self.number += 1
-        shown = Shown(self.number, frame.t, frame.q, now, t - frame.t, frame.status, frame.falsified_by)
+        shown = ShownFrame(self.number, frame.t, frame.q, now, t - frame.t, frame.status, frame.falsified_by)
         self._shown[shown.number] = shown
         self._settle()
         if len(self._shown) > WINDOW:
@@ -213,12 +213,12 @@ class Viewer:
         own = None if self._own is None else self._own.next_deadline()
         return earliest(tick, self._source.next_deadline(), own)
 
-    def shown(self, number: int) -> Shown | None:
+    def shown(self, number: int) -> ShownFrame | None:
         """A frame that was shown, with its status as it's known now; None where it's forgotten, or never was."""
         return self._shown.get(number)
 
     @property
-    def history(self) -> tuple[Shown, ...]:
+    def history(self) -> tuple[ShownFrame, ...]:
         """The newest 4096 frames that were shown, oldest first."""
         return tuple(self._shown.values())
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from interfaces.recording.runs import RunRecorder
     from interfaces.runs.attribution import Attribution, OffsetOutcome
     from interfaces.runs.twin_run import TwinRun
-    from interfaces.runtime.plan import Plan
+    from interfaces.runtime.plan import RunPlan
     from vrs.model import RobotModel
 
 ADAPTIVE = "adaptive"
@@ -98,7 +98,7 @@ def complain(recorder: RunRecorder) -> None:
 
 
 def explained(
-    plan: Plan,
+    plan: RunPlan,
     whole: TwinRun | RunRecorder,
     model: RobotModel,
     profile: DelayProfile,
@@ -160,7 +160,7 @@ def explained(
     return stages[0][0], attribute(tuple(measured for _, measured in stages)), tuple(offsets)
 
 
-def _length(plan: Plan) -> float:
+def _length(plan: RunPlan) -> float:
     """A guess at how long the run will be [s]; the bar is full at the end, whatever it was."""
     times = (motion.command.execute_at or motion.registered_at for motion in plan.motions)
     return max(times, default=0.0) + 8.0

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from interfaces.link.proxy import Proxy
 
 
-class Transport(enum.StrEnum):
+class ProxyTransport(enum.StrEnum):
     """What the proxy passes on."""
 
     TCP = "tcp"
@@ -72,8 +72,8 @@ def link(
         ),
     ] = 1000,
     transport: Annotated[
-        Transport, typer.Option("--transport", help="What to pass on; both use the same port number.")
-    ] = Transport.BOTH,
+        ProxyTransport, typer.Option("--transport", help="What to pass on; both use the same port number.")
+    ] = ProxyTransport.BOTH,
     clients: Annotated[
         int,
         typer.Option(
@@ -117,8 +117,8 @@ def link(
         parse_address("--listen", listen),
         parse_address("--to", to),
         LinkConditions(conditions(forward), conditions(backward)),
-        tcp=transport is not Transport.UDP,
-        udp=transport is not Transport.TCP,
+        tcp=transport is not ProxyTransport.UDP,
+        udp=transport is not ProxyTransport.TCP,
         most_clients=clients,
         udp_idle=idle,
     )

@@ -102,12 +102,12 @@ def generate(
 
 def _facts(robot: RobotModel) -> dict[str, Any]:
     from interfaces.rsp.header import SIZE
-    from interfaces.rsp.layout import Layout, Way
+    from interfaces.rsp.layout import Layout, PacketDirection
 
     layout = Layout(robot)
     rows = []
     for index, element in enumerate(robot):
-        down, up = (layout.sizes[way][index] for way in Way)
+        down, up = (layout.sizes[way][index] for way in PacketDirection)
         rows.append(
             {
                 "bit": index,
@@ -125,8 +125,8 @@ def _facts(robot: RobotModel) -> dict[str, Any]:
         "buffers": robot.buffers,
         "header_bytes": SIZE,
         "map_bytes": layout.map_size,
-        "longest_down_bytes": SIZE + layout.longest[Way.DOWN],
-        "longest_up_bytes": SIZE + layout.longest[Way.UP],
+        "longest_down_bytes": SIZE + layout.longest[PacketDirection.DOWN],
+        "longest_up_bytes": SIZE + layout.longest[PacketDirection.UP],
         "elements": rows,
     }
 

@@ -67,8 +67,8 @@ async def _serve(
     model: RobotModel, room: Room, keys: Keyring | None, sock: socket.socket, *, until_eof: bool
 ) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
-    from interfaces.rsp.host import RobotHost
-    from interfaces.rsp.live.robot_server import RobotServer
+    from interfaces.rsp.host import RspHost
+    from interfaces.rsp.live.robot_server import RspServer
     from interfaces.rsp.robot import RobotCore
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.priority import hasten
@@ -79,8 +79,8 @@ async def _serve(
     end_on_signal(ended)
     with CuboBody(room=room) as body:
         clock = WallClock()
-        host = RobotHost(RobotCore(model, secrets.token_bytes, keys=keys), body, frozenset(MOVES), now=clock.now())
-        server = RobotServer(host, sock, clock)
+        host = RspHost(RobotCore(model, secrets.token_bytes, keys=keys), body, frozenset(MOVES), now=clock.now())
+        server = RspServer(host, sock, clock)
         server.failed.add_done_callback(lambda _: ended.set())
         address, port = sock.getsockname()[:2]
         async with server.running():

@@ -21,12 +21,12 @@ DAMAGED: Final = ".damaged"
 """What is put behind the name of a file that can't be read, before another is written in its place."""
 
 
-class _Head(msgspec.Struct, frozen=True):
+class _FileHead(msgspec.Struct, frozen=True):
     schema: Literal["vrs.jobs"]
     version: int
 
 
-class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _JobsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     schema: Literal["vrs.jobs"]
     version: Literal[1]
     list: JobListForm
@@ -81,7 +81,7 @@ class JobFile:
 
 def written_jobs(jobs: JobList, progress: Progress) -> bytes:
     """A list as a file has it: JSON, indented."""
-    form = _File(SCHEMA, 1, JobListForm.of(jobs), ProgressForm.of(progress))
+    form = _JobsFile(SCHEMA, 1, JobListForm.of(jobs), ProgressForm.of(progress))
     return msgspec.json.format(msgspec.json.encode(form), indent=2) + b"\n"
 
 
@@ -96,10 +96,10 @@ def read_jobs(data: bytes, name: str) -> tuple[JobList, Progress]:
         FormatError: If it isn't one.
     """
     try:
-        head = msgspec.json.decode(data, type=_Head)
+        head = msgspec.json.decode(data, type=_FileHead)
         if head.version != 1:
             raise FormatError(name, f"has version {head.version}; version 1 is read")
-        form = msgspec.json.decode(data, type=_File)
+        form = msgspec.json.decode(data, type=_JobsFile)
         return form.list.read(), form.progress.read()
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, InvalidValueError) as error:
         raise FormatError(name, f"is no list of jobs: {error}") from None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from interfaces.jobs.carrying import speaking_time
-from interfaces.jobs.values import Arm, Job, JobList, Message, Move, Voice, Wait
+from interfaces.jobs.values import ArmJob, Job, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Journey, JourneyState
 from robots.onboard.routes import Point, RouteMap
@@ -63,7 +63,7 @@ def dry_run(
     roads: RouteMap,
     limits: DriveLimits,
     *,
-    arm: Callable[[Arm], float | str | None] = lambda _: None,
+    arm: Callable[[ArmJob], float | str | None] = lambda _: None,
 ) -> Forecast:
     """Do a list on the virtual robot.
 
@@ -77,7 +77,7 @@ def dry_run(
     found: list[JobForecast] = []
     t = 0.0
     for entry in jobs.entries:
-        if isinstance(entry.job, Move):
+        if isinstance(entry.job, MoveJob):
             moved, posture = _moved(entry.number, entry.job, jobs, t, posture, roads, limits)
             found.append(moved)
         else:
@@ -90,20 +90,20 @@ def dry_run(
     return Forecast(tuple(found))
 
 
-def _lasts(job: Job, arm: Callable[[Arm], float | str | None]) -> float | str | None:
+def _lasts(job: Job, arm: Callable[[ArmJob], float | str | None]) -> float | str | None:
     match job:
-        case Voice(text):
+        case VoiceJob(text):
             return speaking_time(text)
-        case Wait(seconds):
+        case WaitJob(seconds):
             return seconds
-        case Arm():
+        case ArmJob():
             return arm(job)
-        case Message() | Move():
+        case MessageJob() | MoveJob():
             return 0.0
 
 
 def _moved(
-    number: int, move: Move, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
+    number: int, move: MoveJob, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
 ) -> tuple[JobForecast, Posture]:
     """Drive to a goal; what became of it, and where the robot stands then."""
     journey, drive, t = Journey(roads), STAND, 0.0

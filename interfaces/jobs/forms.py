@@ -7,7 +7,7 @@ from typing import Annotated, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from interfaces.jobs.progress import JobProgress, Progress, Stage
+from interfaces.jobs.progress import JobProgress, JobStage, Progress
 from interfaces.jobs.values import (
     LONGEST_NAME,
     LONGEST_SOURCE,
@@ -15,14 +15,14 @@ from interfaces.jobs.values import (
     LONGEST_WAIT,
     MOST_JOBS,
     MOST_PLACES,
-    Arm,
-    Entry,
+    ArmJob,
     Job,
+    JobEntry,
     JobList,
-    Message,
-    Move,
-    Voice,
-    Wait,
+    MessageJob,
+    MoveJob,
+    VoiceJob,
+    WaitJob,
 )
 from robots.onboard.journey import Goal
 
@@ -58,73 +58,73 @@ class _JobForm(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="do"):
 
 
 class MoveForm(_JobForm, frozen=True, omit_defaults=True, tag="move"):
-    """`Move`."""
+    """`MoveJob`."""
 
     to: GoalForm | _Name
 
     def read(self) -> Job:
         """What is meant."""
-        return Move(self.to.read() if isinstance(self.to, GoalForm) else self.to)
+        return MoveJob(self.to.read() if isinstance(self.to, GoalForm) else self.to)
 
 
 class VoiceForm(_JobForm, frozen=True, omit_defaults=True, tag="voice"):
-    """`Voice`."""
+    """`VoiceJob`."""
 
     text: _Text
 
     def read(self) -> Job:
         """What is meant."""
-        return Voice(self.text)
+        return VoiceJob(self.text)
 
 
 class MessageForm(_JobForm, frozen=True, omit_defaults=True, tag="message"):
-    """`Message`."""
+    """`MessageJob`."""
 
     text: _Text
 
     def read(self) -> Job:
         """What is meant."""
-        return Message(self.text)
+        return MessageJob(self.text)
 
 
 class WaitForm(_JobForm, frozen=True, omit_defaults=True, tag="wait"):
-    """`Wait`."""
+    """`WaitJob`."""
 
     seconds: _Seconds | None = None
 
     def read(self) -> Job:
         """What is meant."""
-        return Wait(self.seconds)
+        return WaitJob(self.seconds)
 
 
 class ArmForm(_JobForm, frozen=True, omit_defaults=True, tag="arm"):
-    """`Arm`."""
+    """`ArmJob`."""
 
     program: _Name
     source: Annotated[str, Meta(max_length=LONGEST_SOURCE)] = ""
 
     def read(self) -> Job:
         """What is meant."""
-        return Arm(self.program, self.source)
+        return ArmJob(self.program, self.source)
 
 
 JobForm: TypeAlias = MoveForm | VoiceForm | MessageForm | WaitForm | ArmForm
 """A job, as it's written."""
 
 
-def job_form(entry: Entry) -> JobForm:
+def job_form(entry: JobEntry) -> JobForm:
     """A job of a list, as it's written."""
     number, job = entry.number, entry.job
     match job:
-        case Move(to):
+        case MoveJob(to):
             return MoveForm(number, GoalForm.of(to) if isinstance(to, Goal) else to)
-        case Voice(text):
+        case VoiceJob(text):
             return VoiceForm(number, text)
-        case Message(text):
+        case MessageJob(text):
             return MessageForm(number, text)
-        case Wait(seconds):
+        case WaitJob(seconds):
             return WaitForm(number, seconds)
-        case Arm(program, source):
+        case ArmJob(program, source):
             return ArmForm(number, program, source)
 
 
@@ -146,7 +146,7 @@ class JobListForm(msgspec.Struct, frozen=True, omit_defaults=True):
         Raises:
             InvalidValueError: If a move goes to a place that isn't there, or a number is there twice.
         """
-        entries = tuple(Entry(form.number, form.read()) for form in self.jobs)
+        entries = tuple(JobEntry(form.number, form.read()) for form in self.jobs)
         return JobList(entries, {name: form.read() for name, form in self.places.items()})
 
 
@@ -154,7 +154,7 @@ class JobProgressForm(msgspec.Struct, frozen=True, omit_defaults=True):
     """`JobProgress`."""
 
     number: _Number
-    stage: Stage = Stage.PLANNED
+    stage: JobStage = JobStage.PLANNED
     reason: _Reason = ""
     left: _Seconds | None = None
 
@@ -162,7 +162,7 @@ class JobProgressForm(msgspec.Struct, frozen=True, omit_defaults=True):
 class ProgressForm(msgspec.Struct, frozen=True, omit_defaults=True):
     """`Progress`."""
 
-    stage: Stage = Stage.PLANNED
+    stage: JobStage = JobStage.PLANNED
     jobs: Annotated[tuple[JobProgressForm, ...], Meta(max_length=MOST_JOBS)] = ()
     reason: _Reason = ""
 

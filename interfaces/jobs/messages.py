@@ -11,7 +11,7 @@ from interfaces.jobs.values import JobList
 from robots.onboard.journey import Goal
 
 
-class Command(enum.StrEnum):
+class ListCommand(enum.StrEnum):
     """What a person asks of a list."""
 
     RUN = "run"
@@ -34,7 +34,7 @@ class Load:
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class OperatorLost:
     """Nobody is heard any more who could stop the robot: the policy says what follows."""
 
     reason: str
@@ -55,20 +55,20 @@ class Done:
 
 
 @dataclass(frozen=True, slots=True)
-class Failed:
+class JobFailed:
     """What was asked for can't be done."""
 
     attempt: int
     reason: str
 
 
-Input: TypeAlias = Command | Load | Lost | Interrupted | Done | Failed
+Input: TypeAlias = ListCommand | Load | OperatorLost | Interrupted | Done | JobFailed
 """What a runner is told."""
 
 
 @dataclass(frozen=True, slots=True)
 class MoveTo:
-    """Go to a goal; answer with `Done` or `Failed`."""
+    """Go to a goal; answer with `Done` or `JobFailed`."""
 
     attempt: int
     goal: Goal
@@ -99,11 +99,11 @@ class RunArm:
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class EndJob:
     """Stop with what was asked for, at once; no answer is expected, and none counts."""
 
     attempt: int
 
 
-Request: TypeAlias = MoveTo | Speak | Show | RunArm | End
+Request: TypeAlias = MoveTo | Speak | Show | RunArm | EndJob
 """What a runner asks for."""

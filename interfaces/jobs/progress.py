@@ -9,7 +9,7 @@ from typing import Final
 from interfaces.jobs.values import JobList
 
 
-class Stage(enum.StrEnum):
+class JobStage(enum.StrEnum):
     """How far a job, or a list, is."""
 
     PLANNED = "planned"
@@ -45,7 +45,7 @@ class JobProgress:
     """How far a job is."""
 
     number: int
-    stage: Stage = Stage.PLANNED
+    stage: JobStage = JobStage.PLANNED
     reason: str = ""
     """Why it's paused or has failed."""
     left: float | None = None
@@ -56,7 +56,7 @@ class JobProgress:
 class Progress:
     """How far a list is."""
 
-    stage: Stage = Stage.PLANNED
+    stage: JobStage = JobStage.PLANNED
     jobs: tuple[JobProgress, ...] = ()
     """In the list's order."""
     reason: str = ""
@@ -70,4 +70,4 @@ class Progress:
     @property
     def running(self) -> JobProgress | None:
         """The job that is being done."""
-        return next((job for job in self.jobs if job.stage is Stage.RUNNING), None)
+        return next((job for job in self.jobs if job.stage is JobStage.RUNNING), None)

@@ -11,22 +11,22 @@ import math
 from dataclasses import dataclass, replace
 
 from interfaces.jobs.messages import (
-    Command,
     Done,
-    End,
-    Failed,
+    EndJob,
     Input,
     Interrupted,
+    JobFailed,
+    ListCommand,
     Load,
-    Lost,
     MoveTo,
+    OperatorLost,
     Request,
     RunArm,
     Show,
     Speak,
 )
-from interfaces.jobs.progress import JobProgress, OperatorLoss, Progress, Stage
-from interfaces.jobs.values import Arm, Entry, JobList, Message, Move, Voice, Wait
+from interfaces.jobs.progress import JobProgress, JobStage, OperatorLoss, Progress
+from interfaces.jobs.values import ArmJob, JobEntry, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
 from vrs.checks import finite, number_in
 
 RUNS = "the list is being done: pause or abort it first"
@@ -76,12 +76,12 @@ def carried_over(jobs: JobList, progress: Progress, load: Load) -> Progress:
         known.get(entry.number, JobProgress(entry.number)) if entry in same else JobProgress(entry.number)
         for entry in load.jobs.entries
     )
-    if given.stage is Stage.RUNNING:
-        paused = tuple(replace(job, stage=Stage.PAUSED, reason=ANEW) for job in states)
-        states = tuple(p if job.stage is Stage.RUNNING else job for p, job in zip(paused, states, strict=True))
-        given = Progress(Stage.PAUSED, reason=ANEW)
+    if given.stage is JobStage.RUNNING:
+        paused = tuple(replace(job, stage=JobStage.PAUSED, reason=ANEW) for job in states)
+        states = tuple(p if job.stage is JobStage.RUNNING else job for p, job in zip(paused, states, strict=True))
+        given = Progress(JobStage.PAUSED, reason=ANEW)
     stages = {job.stage for job in states}
-    if given.stage not in stages or (given.stage is Stage.DONE and len(stages) > 1):
+    if given.stage not in stages or (given.stage is JobStage.DONE and len(stages) > 1):
         return Progress(jobs=states)
     return replace(given, jobs=states)
 
@@ -122,13 +122,13 @@ class JobRunner:
     @property
     def running(self) -> bool:
         """Whether the list is being done."""
-        return self.progress.stage is Stage.RUNNING
+        return self.progress.stage is JobStage.RUNNING
 
     @property
     def waits_for_key(self) -> bool:
         """Whether the key would end a WAIT."""
         entry = self._current()
-        return entry is not None and entry.job == Wait()
+        return entry is not None and entry.job == WaitJob()
 
     def receive(self, message: Input, *, now: float) -> str:
         """Take in what a person asks for, or what became of a request.
@@ -144,11 +144,11 @@ class JobRunner:
         match message:
             case Load():
                 return self._load(message)
-            case Command():
+            case ListCommand():
                 return self._commanded(message, now)
-            case Done() | Failed():
+            case Done() | JobFailed():
                 self._answered(message, now)
-            case Lost(reason):
+            case OperatorLost(reason):
                 if self._config.loss is OperatorLoss.STOP:
                     self._pause(reason, now)
             case Interrupted(reason):
@@ -167,16 +167,16 @@ class JobRunner:
             return -math.inf
         return None if math.isinf(self._due) else self._due
 
-    def _commanded(self, command: Command, now: float) -> str:
-        if command is Command.KEY:
+    def _commanded(self, command: ListCommand, now: float) -> str:
+        if command is ListCommand.KEY:
             if not self.waits_for_key:
                 return NO_KEY
             self._finish(now)
-        elif command is Command.PAUSE:
+        elif command is ListCommand.PAUSE:
             if not self.running:
                 return STANDS
             self._pause("", now)
-        elif command is Command.ABORT:
+        elif command is ListCommand.ABORT:
             return self._abort()
         else:
             return self._begin(command, now)
@@ -188,27 +188,27 @@ class JobRunner:
         self.jobs, self.progress = message.jobs, carried_over(self.jobs, self.progress, message)
         return ""
 
-    def _begin(self, command: Command, now: float) -> str:
+    def _begin(self, command: ListCommand, now: float) -> str:
         if self.running:
             return RUNS
         if not self.jobs.entries:
             return EMPTY
-        if command is Command.RUN:
+        if command is ListCommand.RUN:
             self.progress = Progress.of(self.jobs)
-        elif all(job.stage is Stage.DONE for job in self.progress.jobs):
+        elif all(job.stage is JobStage.DONE for job in self.progress.jobs):
             return ALL_DONE
-        self.progress = replace(self.progress, stage=Stage.RUNNING, reason="")
+        self.progress = replace(self.progress, stage=JobStage.RUNNING, reason="")
         self._next(now)
         return ""
 
     def _abort(self) -> str:
-        if self.progress.stage not in (Stage.RUNNING, Stage.PAUSED):
+        if self.progress.stage not in (JobStage.RUNNING, JobStage.PAUSED):
             return STANDS
         self._end()
         for job in self.progress.jobs:
-            if job.stage in (Stage.RUNNING, Stage.PAUSED):
-                self._mark(JobProgress(job.number, Stage.ABORTED))
-        self.progress = replace(self.progress, stage=Stage.ABORTED, reason="")
+            if job.stage in (JobStage.RUNNING, JobStage.PAUSED):
+                self._mark(JobProgress(job.number, JobStage.ABORTED))
+        self.progress = replace(self.progress, stage=JobStage.ABORTED, reason="")
         self._requests.append(Show(""))
         return ""
 
@@ -218,9 +218,9 @@ class JobRunner:
             return
         left = self._due - now if self._waiting() is not None else math.inf
         self._end()
-        self._stage_of_running(Stage.PAUSED, reason, None if math.isinf(left) else max(0.0, left))
+        self._stage_of_running(JobStage.PAUSED, reason, None if math.isinf(left) else max(0.0, left))
 
-    def _stage_of_running(self, stage: Stage, reason: str, left: float | None = None) -> None:
+    def _stage_of_running(self, stage: JobStage, reason: str, left: float | None = None) -> None:
         """Let the list, and the job that's running, be at a stage."""
         job = self.progress.running
         if job is not None:
@@ -230,57 +230,57 @@ class JobRunner:
     def _end(self) -> None:
         """Nobody carries out anything any more."""
         if self._open:
-            self._requests.append(End(self._attempt))
+            self._requests.append(EndJob(self._attempt))
         self._open, self._due = False, math.inf
 
-    def _answered(self, answer: Done | Failed, now: float) -> None:
+    def _answered(self, answer: Done | JobFailed, now: float) -> None:
         if not self._open or answer.attempt != self._attempt:
             return
         self._open, self._due = False, math.inf
         if isinstance(answer, Done):
             self._finish(now)
         else:
-            self._stage_of_running(Stage.FAILED, answer.reason)
+            self._stage_of_running(JobStage.FAILED, answer.reason)
 
     def _finish(self, now: float) -> None:
         """The running job is done: on to the next."""
         job = self.progress.running
         assert job is not None
         self._due = math.inf
-        self._mark(JobProgress(job.number, Stage.DONE))
+        self._mark(JobProgress(job.number, JobStage.DONE))
         self._next(now)
 
     def _next(self, now: float) -> None:
         """Begin the first job that isn't done; messages, which take no time, as well as what follows them."""
         for entry in self.jobs.entries:
             before = self._of(entry)
-            if before.stage is Stage.DONE:
+            if before.stage is JobStage.DONE:
                 continue
-            self._mark(JobProgress(entry.number, Stage.RUNNING))
-            if not isinstance(entry.job, Message):
+            self._mark(JobProgress(entry.number, JobStage.RUNNING))
+            if not isinstance(entry.job, MessageJob):
                 self._ask(entry, before, now)
                 return
             self._requests.append(Show(entry.job.text))
-            self._mark(JobProgress(entry.number, Stage.DONE))
-        self.progress = replace(self.progress, stage=Stage.DONE, reason="")
+            self._mark(JobProgress(entry.number, JobStage.DONE))
+        self.progress = replace(self.progress, stage=JobStage.DONE, reason="")
 
-    def _ask(self, entry: Entry, before: JobProgress, now: float) -> None:
+    def _ask(self, entry: JobEntry, before: JobProgress, now: float) -> None:
         """Let a job be carried out."""
         job, config = entry.job, self._config
-        if isinstance(job, Wait):
+        if isinstance(job, WaitJob):
             seconds = job.seconds if before.left is None else before.left
             self._due = math.inf if seconds is None else now + seconds
             return
         self._attempt += 1
         self._open = True
         match job:
-            case Move():
+            case MoveJob():
                 self._requests.append(MoveTo(self._attempt, self.jobs.goal(job)))
                 self._due = now + config.longest_move
-            case Voice(text):
+            case VoiceJob(text):
                 self._requests.append(Speak(self._attempt, text))
                 self._due = now + config.longest_voice
-            case Arm(program, source):
+            case ArmJob(program, source):
                 self._requests.append(RunArm(self._attempt, program, source))
                 self._due = now + config.longest_arm
 
@@ -292,19 +292,19 @@ class JobRunner:
                 self._finish(due)
             else:
                 self._end()
-                self._stage_of_running(Stage.FAILED, "it took longer than is allowed")
+                self._stage_of_running(JobStage.FAILED, "it took longer than is allowed")
 
-    def _current(self) -> Entry | None:
+    def _current(self) -> JobEntry | None:
         """The job that is being done."""
         job = self.progress.running
         return None if job is None else self.jobs.entries[self.jobs.index(job.number)]
 
-    def _waiting(self) -> Wait | None:
+    def _waiting(self) -> WaitJob | None:
         """The WAIT that is being done."""
         entry = self._current()
-        return entry.job if entry is not None and isinstance(entry.job, Wait) else None
+        return entry.job if entry is not None and isinstance(entry.job, WaitJob) else None
 
-    def _of(self, entry: Entry) -> JobProgress:
+    def _of(self, entry: JobEntry) -> JobProgress:
         return next(job for job in self.progress.jobs if job.number == entry.number)
 
     def _mark(self, progress: JobProgress) -> None:

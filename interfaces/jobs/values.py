@@ -36,7 +36,7 @@ def _text(name: str, value: object, longest: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class MoveJob:
     """Go somewhere."""
 
     word: ClassVar[str] = "MOVE"
@@ -49,7 +49,7 @@ class Move:
 
 
 @dataclass(frozen=True, slots=True)
-class Voice:
+class VoiceJob:
     """Say something."""
 
     word: ClassVar[str] = "VOICE"
@@ -61,7 +61,7 @@ class Voice:
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class MessageJob:
     """Show something on the robot's screen; it stays there until something else is shown."""
 
     word: ClassVar[str] = "MESSAGE"
@@ -73,7 +73,7 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class Wait:
+class WaitJob:
     """Wait."""
 
     word: ClassVar[str] = "WAIT"
@@ -87,7 +87,7 @@ class Wait:
 
 
 @dataclass(frozen=True, slots=True)
-class Arm:
+class ArmJob:
     """Let the arm carry out a VAL-II program."""
 
     word: ClassVar[str] = "ARM"
@@ -102,12 +102,12 @@ class Arm:
             raise InvalidValueError("source", self.source, f"at most {LONGEST_SOURCE} characters")
 
 
-Job: TypeAlias = Move | Voice | Message | Wait | Arm
+Job: TypeAlias = MoveJob | VoiceJob | MessageJob | WaitJob | ArmJob
 """One thing to be done."""
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class JobEntry:
     """A job of a list."""
 
     number: int
@@ -125,7 +125,7 @@ class Entry:
 class JobList:
     """Jobs in their order, and the places that they name. Every edit makes another list."""
 
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[JobEntry, ...] = ()
     """At most 64, each number once."""
     places: Mapping[str, Goal] = field(default_factory=dict)
     """By name, at most 64."""
@@ -142,15 +142,15 @@ class JobList:
         for name in self.places:
             _text("place", name, LONGEST_NAME)
         for entry in self.entries:
-            if isinstance(entry.job, Move):
+            if isinstance(entry.job, MoveJob):
                 self.goal(entry.job)
 
     @classmethod
     def of(cls, *jobs: Job, places: Mapping[str, Goal] | None = None) -> JobList:
         """A list of jobs, numbered from 1."""
-        return cls(tuple(Entry(k, job) for k, job in enumerate(jobs, 1)), {} if places is None else places)
+        return cls(tuple(JobEntry(k, job) for k, job in enumerate(jobs, 1)), {} if places is None else places)
 
-    def goal(self, move: Move) -> Goal:
+    def goal(self, move: MoveJob) -> Goal:
         """Where a move goes.
 
         Raises:
@@ -167,7 +167,7 @@ class JobList:
         """With one more job, before the one at an index; at the end unless given."""
         number = max((entry.number for entry in self.entries), default=0) + 1
         place = len(self.entries) if at is None else self._index(at, len(self.entries))
-        return replace(self, entries=(*self.entries[:place], Entry(number, job), *self.entries[place:]))
+        return replace(self, entries=(*self.entries[:place], JobEntry(number, job), *self.entries[place:]))
 
     def removed(self, number: int) -> JobList:
         """Without a job."""

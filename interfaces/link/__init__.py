@@ -1,27 +1,27 @@
 """The emulated network between operator and robot."""
 
 from interfaces.link.channel import Channel, Delivery
-from interfaces.link.clock_sync import ClockEstimate, ClockSync, ClockSyncConfig, DriftEstimate, Evidence
+from interfaces.link.clock_sync import ClockEstimate, ClockEvidence, ClockSync, ClockSyncConfig, DriftEstimate
 from interfaces.link.conditions import Conditions, LinkConditions, Service
 from interfaces.link.delay import ConstantDelay, DelayProfile, DelaySource
 from interfaces.link.gamma import GammaDelay
-from interfaces.link.gauge import Gauge, Measured
+from interfaces.link.gauge import Gauge, LinkFigures
 from interfaces.link.lane import Lane
 from interfaces.link.link import Direction, Link, LinkTotals, direction
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
 from interfaces.link.measured import HeavyTailedDelay
 from interfaces.link.packets import LossReason, PacketLog, PacketRecord, Totals
-from interfaces.link.path import Fate, Path
+from interfaces.link.path import LinkPath, PacketOutcome
 from interfaces.link.profiles import delay_profile
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.link.repeater import Bundle, Repeater, RepeatReceiver
 from interfaces.link.round_trip import (
     DelayStatistics,
     Echo,
+    EchoRefusal,
     LinkStatistics,
     Probe,
     ProbeConfig,
-    Refusal,
     RelativeDelays,
     RoundTrip,
     RoundTripEstimator,
@@ -36,6 +36,7 @@ __all__ = [
     "Bundle",
     "Channel",
     "ClockEstimate",
+    "ClockEvidence",
     "ClockSync",
     "ClockSyncConfig",
     "Conditions",
@@ -47,8 +48,7 @@ __all__ = [
     "Direction",
     "DriftEstimate",
     "Echo",
-    "Evidence",
-    "Fate",
+    "EchoRefusal",
     "GammaDelay",
     "Gauge",
     "GilbertElliottLoss",
@@ -57,17 +57,17 @@ __all__ = [
     "Lane",
     "Link",
     "LinkConditions",
+    "LinkFigures",
+    "LinkPath",
     "LinkStatistics",
     "LinkTotals",
     "LossModel",
     "LossReason",
-    "Measured",
     "PacketLog",
+    "PacketOutcome",
     "PacketRecord",
-    "Path",
     "Probe",
     "ProbeConfig",
-    "Refusal",
     "RelativeDelays",
     "RepeatReceiver",
     "Repeater",

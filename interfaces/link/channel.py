@@ -11,7 +11,7 @@ import numpy as np
 from interfaces.link.conditions import MAX_COUNT, Conditions, Service
 from interfaces.link.delay import DelayProfile
 from interfaces.link.packets import LossReason, PacketLog, PacketRecord
-from interfaces.link.path import Path
+from interfaces.link.path import LinkPath
 from vrs.checks import integer_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
@@ -53,7 +53,7 @@ class Channel(Generic[T]):
         service: Service = Service.IN_ORDER,
         capacity: int = 10_000,
         *,
-        path: Path | None = None,
+        path: LinkPath | None = None,
         log: PacketLog | None = None,
     ) -> None:
         if isinstance(profile, Conditions):
@@ -62,7 +62,7 @@ class Channel(Generic[T]):
             integer_in("capacity", capacity, 1, MAX_COUNT)
             conditions = Conditions(delay=profile, service=Service(service), capacity=capacity)
         self._conditions = conditions
-        self._path = Path(conditions, rng) if path is None else path
+        self._path = LinkPath(conditions, rng) if path is None else path
         self._flight: list[tuple[float, int, Delivery[T], PacketRecord]] = []
         self._order = 0
         self._sent = -float("inf")

@@ -61,7 +61,7 @@ class ClockSyncConfig:
             raise InvalidValueError("history", corners, "an integer in [2, 1,000,000]")
 
 
-class Evidence(enum.StrEnum):
+class ClockEvidence(enum.StrEnum):
     """What a round trip said about B's clock."""
 
     FIRST = "first"
@@ -123,7 +123,7 @@ class ClockSync:
         self._heard = -math.inf
         self._anchors: list[tuple[float, float, float]] = []
 
-    def receive(self, trip: RoundTrip) -> Evidence:
+    def receive(self, trip: RoundTrip) -> ClockEvidence:
         """Take a round trip into account.
 
         Args:
@@ -145,19 +145,19 @@ class ClockSync:
         echo = _Bounds((t0, t1 - t0 + margin), (t3, t2 - t3 - margin), rho)
         low, high = echo.at(t3)
         if high < low or t2 < t1:
-            return Evidence.IMPOSSIBLE
+            return ClockEvidence.IMPOSSIBLE
         known = self._bounds
-        evidence = Evidence.FIRST if known is None else self._judge(known, t0, low, high)
-        if evidence in {Evidence.WIDE, Evidence.OVERTAKEN}:
+        evidence = ClockEvidence.FIRST if known is None else self._judge(known, t0, low, high)
+        if evidence in {ClockEvidence.WIDE, ClockEvidence.OVERTAKEN}:
             return evidence
-        if known is not None and evidence is Evidence.TAKEN:
+        if known is not None and evidence is ClockEvidence.TAKEN:
             self._bounds = known.narrowed(echo, t3)
         else:
             self._bounds = echo
             self._anchors.clear()
-        if t0 > self._verified or evidence is not Evidence.TAKEN:
+        if t0 > self._verified or evidence is not ClockEvidence.TAKEN:
             self._verified, self._settled = t0, t3
-        if evidence is Evidence.STEP and self._map is not None:
+        if evidence is ClockEvidence.STEP and self._map is not None:
             self._steps = (high + low) / 2 - (self._map.remote(t3) - t3)
             self._step_count += 1
         self._anchor((t0 + t3) / 2, (t1 - t0 + t2 - t3) / 2, (high - low) / 2)
@@ -277,13 +277,13 @@ class ClockSync:
         )
         return DriftEstimate(drift, width, start, end)
 
-    def _judge(self, known: _Bounds, t0: float, low: float, high: float) -> Evidence:
+    def _judge(self, known: _Bounds, t0: float, low: float, high: float) -> ClockEvidence:
         lower, upper = known.at(self._now)
         if low > upper or high < lower:
-            return Evidence.STEP if t0 >= self._settled else Evidence.OVERTAKEN
+            return ClockEvidence.STEP if t0 >= self._settled else ClockEvidence.OVERTAKEN
         if (upper - lower) + (high - low) < self.config.smallest_step:
-            return Evidence.TAKEN
-        return Evidence.BETTER if high - low < upper - lower and t0 >= self._verified else Evidence.WIDE
+            return ClockEvidence.TAKEN
+        return ClockEvidence.BETTER if high - low < upper - lower and t0 >= self._verified else ClockEvidence.WIDE
 
     def _present(self, now: float) -> None:
         if finite("now", now, "finite seconds") < self._now:

@@ -48,7 +48,7 @@ class GammaDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays from the stationary distribution."""
-        return _Draws(self, rng)
+        return _GammaState(self, rng)
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of packets does not exceed [s]; share in (0, 1)."""
@@ -62,7 +62,7 @@ class GammaDelay:
         return min(self.low + float(value) * (self.mean - self.low) / self.shape, MAX_DELAY)
 
 
-class _Draws:
+class _GammaState:
     """State of one link with gamma delays."""
 
     def __init__(self, profile: GammaDelay, rng: np.random.Generator) -> None:

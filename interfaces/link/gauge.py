@@ -15,7 +15,7 @@ MOST = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class LinkFigures:
     """Sums over the newest packets."""
 
     packets: int
@@ -43,7 +43,7 @@ class Gauge:
         if not record.copy:
             self._known.append(record)
 
-    def measured(self, *, now: float) -> Measured:
+    def measured(self, *, now: float) -> LinkFigures:
         """What is known of the packets of the last 30 s.
 
         Losses are counted among those that were sent in that time. A packet that is lost is known at once, one that
@@ -61,7 +61,7 @@ class Gauge:
         lost = sum(record.arrived is None for record in sent) / packets if packets else None
         delays = sorted(r.arrived - r.sent for r in known if r.arrived is not None and r.arrived >= oldest)
         span = max(0.0, min(WINDOW, now - self.since))
-        return Measured(packets, lost, _quantile(delays, 0.5), _quantile(delays, 0.95), span)
+        return LinkFigures(packets, lost, _quantile(delays, 0.5), _quantile(delays, 0.95), span)
 
 
 def _quantile(values: list[float], share: float) -> float | None:

@@ -11,7 +11,7 @@ import numpy as np
 from interfaces.link.channel import Channel, Delivery, moment
 from interfaces.link.conditions import Conditions, Service
 from interfaces.link.packets import PacketLog
-from interfaces.link.path import Path
+from interfaces.link.path import LinkPath
 from interfaces.link.stream import Stream
 from vrs.commands import finite
 
@@ -38,7 +38,7 @@ class Lane(Generic[T]):
         self.log = PacketLog() if log is None else log
         """What became of each packet."""
         self._rng = rng
-        self._path = Path(conditions, rng)
+        self._path = LinkPath(conditions, rng)
         self._channel: Channel[T] | None = None
         self._stream: Stream[T] | None = None
         self._now = -math.inf

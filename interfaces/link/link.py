@@ -11,7 +11,7 @@ from interfaces.link.channel import Channel
 from interfaces.link.conditions import Conditions, LinkConditions, Service
 from interfaces.link.lane import Lane
 from interfaces.link.packets import MAX_RECORDS, PacketLog, Totals
-from interfaces.link.path import Path
+from interfaces.link.path import LinkPath
 from interfaces.link.stream import Stream
 
 T = TypeVar("T")
@@ -64,7 +64,7 @@ class Link(Generic[T, U]):
 
 
 def direction(
-    conditions: Conditions, rng: np.random.Generator, *, path: Path | None = None, log: PacketLog | None = None
+    conditions: Conditions, rng: np.random.Generator, *, path: LinkPath | None = None, log: PacketLog | None = None
 ) -> Channel[T] | Stream[T]:
     """Make one direction: a `Channel` for datagrams, a `Stream` for in-order service."""
     if conditions.service is Service.IN_ORDER:

@@ -49,14 +49,14 @@ class HeavyTailedDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays from the stationary distribution."""
-        return _Draws(self, rng)
+        return _HeavyTailState(self, rng)
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of packets does not exceed [s]; share in (0, 1)."""
         return self.delay(NormalDist().inv_cdf(share_of(share)))
 
 
-class _Draws:
+class _HeavyTailState:
     """State of one heavy-tailed link."""
 
     def __init__(self, profile: HeavyTailedDelay, rng: np.random.Generator) -> None:

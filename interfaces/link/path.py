@@ -16,7 +16,7 @@ from interfaces.link.packets import LossReason
 
 
 @dataclass(frozen=True, slots=True)
-class Fate:
+class PacketOutcome:
     """What becomes of a packet."""
 
     departure: float
@@ -27,7 +27,7 @@ class Fate:
     """Why it is lost."""
 
 
-class Path:
+class LinkPath:
     """Decides the fate of packets in the order in which they are sent.
 
     Each impairment draws from a stream of its own: switching one on leaves what the others do as it was,
@@ -59,7 +59,7 @@ class Path:
         if conditions.loss != before.loss:
             self._losses = conditions.loss.source(self._loss)
 
-    def fate(self, now: float, size: int = 0, *, waits: bool = False) -> Fate:
+    def fate(self, now: float, size: int = 0, *, waits: bool = False) -> PacketOutcome:
         """Decide the fate of a packet.
 
         Args:
@@ -72,18 +72,18 @@ class Path:
         conditions = self._conditions
         departure = self._enter(now, size, waits=waits)
         if departure is None:
-            return Fate(now, (), LossReason.QUEUE)
+            return PacketOutcome(now, (), LossReason.QUEUE)
         delay = self._delays.draw(departure, size)
         if self._losses.lost() or delay is None:
-            return Fate(departure, (), LossReason.ON_THE_WAY)
+            return PacketOutcome(departure, (), LossReason.ON_THE_WAY)
         if conditions.reorder > 0 and self._reorder.random() < conditions.reorder:
             delay += conditions.reorder_by
         arrival = departure + delay
         if conditions.duplicate > 0 and self._duplicate.random() < conditions.duplicate:
             other = self._other_delays.draw(departure, size)
             if other is not None:
-                return Fate(departure, (min(arrival, departure + other), max(arrival, departure + other)))
-        return Fate(departure, (arrival,))
+                return PacketOutcome(departure, (min(arrival, departure + other), max(arrival, departure + other)))
+        return PacketOutcome(departure, (arrival,))
 
     def _enter(self, now: float, size: int, *, waits: bool) -> float | None:
         """When the packet's last bit has entered the link [s]; None when the queue is full."""

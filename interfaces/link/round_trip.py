@@ -104,7 +104,7 @@ class RoundTrip:
         return max(0.0, (self.arrived - self.sent) - (self.replied - self.received))
 
 
-class Refusal(enum.StrEnum):
+class EchoRefusal(enum.StrEnum):
     """Why an echo was of no use."""
 
     FOREIGN = "foreign"
@@ -310,7 +310,7 @@ class RoundTripEstimator:
         self._due = due if due > now else now + self.config.period
         return probe
 
-    def receive(self, echo: Echo, *, now: float) -> RoundTrip | Refusal:
+    def receive(self, echo: Echo, *, now: float) -> RoundTrip | EchoRefusal:
         """Take an echo.
 
         Args:
@@ -370,18 +370,18 @@ class RoundTripEstimator:
             refused=self._refused,
         )
 
-    def _refuse(self, echo: Echo, now: float) -> Refusal | None:
+    def _refuse(self, echo: Echo, now: float) -> EchoRefusal | None:
         if echo.session != self._session:
-            return Refusal.FOREIGN
+            return EchoRefusal.FOREIGN
         sent = self._in_flight.get(echo.sequence)
         if sent is None or sent != echo.sent:
-            return Refusal.UNEXPECTED
+            return EchoRefusal.UNEXPECTED
         if not (abs(echo.received) <= LARGEST and abs(echo.replied) <= LARGEST):
-            return Refusal.IMPOSSIBLE
+            return EchoRefusal.IMPOSSIBLE
         held = echo.replied - echo.received
         # The other clock may run faster than ours, by less than a hundredth; a reading has its rounding.
         rounding = 4 * math.ulp(max(abs(echo.received), abs(echo.replied), abs(now)))
-        return None if 0 <= held <= (now - sent) * 1.01 + rounding else Refusal.IMPOSSIBLE
+        return None if 0 <= held <= (now - sent) * 1.01 + rounding else EchoRefusal.IMPOSSIBLE
 
     def _advance(self, now: float) -> None:
         if finite("now", now, "finite seconds") < self._now:

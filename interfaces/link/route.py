@@ -110,7 +110,7 @@ class RouteDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays from the stationary distribution."""
-        return _Draws(self, rng)
+        return _LoadState(self, rng)
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of nominal messages does not exceed [s]; share in (0, 1)."""
@@ -138,7 +138,7 @@ def _sum_quantile(means: np.ndarray[tuple[int], np.dtype[np.float64]], share: fl
     return float(brentq(excess, 0.0, high, xtol=1e-12 * high, rtol=1e-12))
 
 
-class _Draws:
+class _LoadState:
     """State of the load of one route."""
 
     def __init__(self, profile: RouteDelay, rng: np.random.Generator) -> None:

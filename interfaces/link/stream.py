@@ -13,7 +13,7 @@ import numpy as np
 from interfaces.link.channel import Delivery, moment
 from interfaces.link.conditions import Conditions
 from interfaces.link.packets import LossReason, PacketLog, PacketRecord
-from interfaces.link.path import Path
+from interfaces.link.path import LinkPath
 from vrs.checks import integer_in
 from vrs.commands import finite
 
@@ -60,11 +60,11 @@ class Stream(Generic[T]):
         conditions: Conditions,
         rng: np.random.Generator,
         *,
-        path: Path | None = None,
+        path: LinkPath | None = None,
         log: PacketLog | None = None,
     ) -> None:
         self._conditions = conditions
-        self._path = Path(conditions, rng) if path is None else path
+        self._path = LinkPath(conditions, rng) if path is None else path
         self._waiting: dict[int, _Waiting[T]] = {}
         self._events: list[tuple[float, int, int, bool]] = []
         self._ready: deque[tuple[Delivery[T], PacketRecord]] = deque()

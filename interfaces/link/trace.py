@@ -36,7 +36,7 @@ class TraceDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:  # noqa: ARG002
         """Start at the first row."""
-        return _Replay(self.delays)
+        return _TracePosition(self.delays)
 
     def quantile(self, share: float) -> float:
         """Smallest recorded delay that the share of arriving packets keeps within [s]; 0 if none arrives."""
@@ -44,7 +44,7 @@ class TraceDelay:
         return arriving[max(0, math.ceil(share_of(share) * len(arriving)) - 1)] if arriving else 0.0
 
 
-class _Replay:
+class _TracePosition:
     """Position in a trace."""
 
     def __init__(self, delays: tuple[float | None, ...]) -> None:

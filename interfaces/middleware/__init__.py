@@ -4,8 +4,8 @@ Source: Tipsuwan, Chow, *Model Predictive Path Tracking via Middleware for Netwo
 """
 
 from interfaces.middleware.action_agent import ActionAgent, ActionAgentConfig
-from interfaces.middleware.messages import Command, Feedback
-from interfaces.middleware.middleware import Controller, Middleware, MiddlewareConfig
+from interfaces.middleware.messages import DriveFeedback, DriveSetpoint
+from interfaces.middleware.middleware import Controller, GainSchedulingMiddleware, MiddlewareConfig
 from interfaces.middleware.network import (
     Formulation,
     GainNetwork,
@@ -22,14 +22,14 @@ from interfaces.middleware.training import Errors, TrainingConfig, train
 __all__ = [
     "ActionAgent",
     "ActionAgentConfig",
-    "Command",
     "Controller",
+    "DriveFeedback",
+    "DriveSetpoint",
     "Errors",
-    "Feedback",
     "Formulation",
     "GainNetwork",
     "GainScheduler",
-    "Middleware",
+    "GainSchedulingMiddleware",
     "MiddlewareConfig",
     "Ranges",
     "ScheduleCounts",

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from interfaces.link.round_trip import Echo, Probe
-from interfaces.middleware.messages import Command, Feedback
+from interfaces.middleware.messages import DriveFeedback, DriveSetpoint
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import number_in
 
@@ -34,13 +34,13 @@ class ActionAgent:
     def __init__(self, config: ActionAgentConfig | None = None) -> None:
         """Stand until the first command."""
         self.config = ActionAgentConfig() if config is None else config
-        self._newest: Command | None = None
+        self._newest: DriveSetpoint | None = None
         self._since = -math.inf
         self._reports = 0
         self.stale = 0
         """Commands that were dropped, as they came behind a newer one."""
 
-    def receive(self, message: Command | Probe, *, now: float) -> Echo | None:
+    def receive(self, message: DriveSetpoint | Probe, *, now: float) -> Echo | None:
         """Take a message from the control agent.
 
         Args:
@@ -59,7 +59,7 @@ class ActionAgent:
             self._newest, self._since = message, now
         return None
 
-    def sample(self, posture: Posture, *, now: float) -> Feedback:
+    def sample(self, posture: Posture, *, now: float) -> DriveFeedback:
         """Have a turn: what to drive from now on is in the report that goes back.
 
         Args:
@@ -67,7 +67,7 @@ class ActionAgent:
             now: By the robot's clock [s].
         """
         self._reports += 1
-        return Feedback(self._reports - 1, posture, self.driving(now=now))
+        return DriveFeedback(self._reports - 1, posture, self.driving(now=now))
 
     def driving(self, *, now: float) -> Drive:
         """What the robot drives now [s], by its own clock."""

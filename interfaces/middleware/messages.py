@@ -8,7 +8,7 @@ from robots.onboard.driving import Drive, Posture
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class DriveSetpoint:
     """What the robot is to drive until it hears otherwise."""
 
     number: int
@@ -20,7 +20,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Feedback:
+class DriveFeedback:
     """What the robot reports at each of its sampling times."""
 
     number: int

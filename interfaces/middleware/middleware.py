@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from interfaces.link.round_trip import Echo, Probe, ProbeConfig, RoundTripEstimator, WindowConfig
-from interfaces.middleware.messages import Command, Feedback
+from interfaces.middleware.messages import DriveFeedback, DriveSetpoint
 from interfaces.middleware.network import GainNetwork
 from interfaces.middleware.performance import tolerance
 from interfaces.middleware.predictor import predicted
@@ -45,7 +45,7 @@ class MiddlewareConfig:
         tolerance(self.epsilon)
 
 
-class Middleware:
+class GainSchedulingMiddleware:
     """Between a controller and the network; with neither prediction nor scheduling it passes everything on."""
 
     def __init__(
@@ -91,7 +91,7 @@ class Middleware:
         """Give the next probe if it's due; see `RoundTripEstimator.to_send`."""
         return self.traffic.to_send(now=now) if self._probes else None
 
-    def receive(self, message: Echo | Feedback, *, now: float) -> Command | None:
+    def receive(self, message: Echo | DriveFeedback, *, now: float) -> DriveSetpoint | None:
         """Take a message from the robot.
 
         Args:
@@ -112,7 +112,7 @@ class Middleware:
         if drive is None:
             return None
         self._sent += 1
-        return Command(self._sent - 1, drive)
+        return DriveSetpoint(self._sent - 1, drive)
 
     def drive(self, posture: Posture, driving: Drive) -> Drive | None:
         """Say what a robot is to drive that was at a posture, driving so, half a round trip before.

@@ -31,7 +31,7 @@ from interfaces.recording.messages import (
     segment_entries,
 )
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.teleop import Correction, Deed, OperatorSite, Report, Sample
+from interfaces.teleop import CommandRecord, Correction, OperatorSite, Report, Sample
 from interfaces.wire.commands import command_wire
 from interfaces.wire.fields import text
 from vrs.commands import Profile
@@ -65,7 +65,7 @@ class Put(Protocol):
 class _Happened(NamedTuple):
     """A command or a correction, and the timelines before and after it."""
 
-    what: Deed | tuple[Correction, Timeline]
+    what: CommandRecord | tuple[Correction, Timeline]
     before: Timeline
     after: Timeline
 
@@ -129,7 +129,7 @@ class Capture:
             receipt = FullReceipt.of(self._named(known.receipt))
             yield GivenEntry(now, receipt, command, known.profile is Profile.JERK_LIMITED)
 
-    def commanded(self, deed: Deed) -> None:
+    def commanded(self, deed: CommandRecord) -> None:
         """Note a command."""
         self._note(deed)
 
@@ -151,7 +151,7 @@ class Capture:
         """Let a run in virtual time fail: what it records is all that comes of it."""
         raise error
 
-    def _note(self, what: Deed | tuple[Correction, Timeline]) -> None:
+    def _note(self, what: CommandRecord | tuple[Correction, Timeline]) -> None:
         before, self._timeline = self._timeline, self.operator.engine.timeline
         self._happened.append(_Happened(what, before, self._timeline))
         if len(self._happened) >= _WAITING:
@@ -235,7 +235,7 @@ class Capture:
         while self._happened:
             what, before, after = self._happened.popleft()
             self._number += 1
-            if isinstance(what, Deed):
+            if isinstance(what, CommandRecord):
                 at, command_id = what.at, None if what.receipt is None else what.receipt.command_id
                 receipt = None if what.receipt is None else self._named(what.receipt)
                 entry = CommandEntry.of(self._number, at, what.command, receipt, refused=what.refused)

@@ -20,7 +20,7 @@ from interfaces.runs.attribution import Attribution, OffsetOutcome
 from interfaces.runs.events import waits
 from interfaces.runs.offset import ADAPTIVE
 from interfaces.runs.summary import Json, summarize
-from interfaces.runs.twin_run import Event, Packet, Samples, TwinRun, carried_out
+from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun, TwinSamples, carried_out
 from interfaces.teleop import Correction
 from robots.onboard.playout import PlayoutConfig
 from vrs.comparison import measured_rows
@@ -181,14 +181,14 @@ class _Reading:
             raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
         return np.maximum.accumulate(play), q, reference
 
-    def _samples(self, track: SampleTrack, alone: Timeline, shown: Timeline) -> Samples | None:
+    def _samples(self, track: SampleTrack, alone: Timeline, shown: Timeline) -> TwinSamples | None:
         """See `TwinRun.samples`; of very many, some."""
         if self.begin.sampled is None:
             return None
         every = -(-len(track.t) // MOST_ROWS)
         t, play, q, reference = (column[::every] for column in (track.t, track.play, track.q, track.reference))
         reference = np.where(np.isfinite(reference), reference, shown.sample(play))
-        return Samples(t, alone.sample(t), shown.sample(t), alone.sample(play), q, reference)
+        return TwinSamples(t, alone.sample(t), shown.sample(t), alone.sample(play), q, reference)
 
     def _shown(self, again: Rerun) -> Timeline:
         """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
@@ -219,7 +219,7 @@ class _Reading:
         sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
         return carried_out(*begun(self.recording), sent)
 
-    def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[Packet, ...]:
+    def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[CommandPacket, ...]:
         if not self._live:
             if self.end is None:
                 self.missing.append("what became of commands that weren't answered yet")
@@ -236,7 +236,7 @@ class _Reading:
             there = arrivals[np.isfinite(arrivals)]
             answered = receipt.command_id in known
             found.append(
-                Packet(
+                CommandPacket(
                     receipt.command_id,
                     entry.at,
                     float(there.min()) if answered and len(there) else None,
@@ -246,7 +246,9 @@ class _Reading:
             )
         return tuple(found)
 
-    def _events(self, t: Array, play: Array, q_reference: Array, measured: NDArray[np.bool_]) -> tuple[Event, ...]:
+    def _events(
+        self, t: Array, play: Array, q_reference: Array, measured: NDArray[np.bool_]
+    ) -> tuple[RunEvent, ...]:
         events = list(self.recording.events)
         # A whole recording of the laboratory has them.
         whole = self.end is not None and not self._live

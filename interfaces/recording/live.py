@@ -19,7 +19,7 @@ from interfaces.recording.recorder import Recorder
 from interfaces.recording.sink import Sink
 from interfaces.runs.events import correction_events
 from interfaces.software import software
-from interfaces.teleop import Correction, Deed, Report, RobotLine, Sample
+from interfaces.teleop import CommandRecord, Correction, Report, RobotLine, Sample
 from interfaces.teleop.measured import PERIOD
 from interfaces.wire import fields
 from vrs.ledger import Receipt, Status
@@ -66,7 +66,7 @@ class _LiveCapture(Capture):
         self.failure = ""
         """What raised while a note was taken; empty if nothing did."""
 
-    def commanded(self, deed: Deed) -> None:
+    def commanded(self, deed: CommandRecord) -> None:
         super().commanded(deed)
         receipt = deed.receipt
         if receipt is not None and receipt.status is not Status.REJECTED and receipt.execute_at is not None:

@@ -21,7 +21,7 @@ from vrs.timeline import Timeline
 if TYPE_CHECKING:
     from interfaces.recording.history import AnyTimeline, RecordedEdit
     from interfaces.recording.recording import Recording
-    from interfaces.runs.twin_run import Event
+    from interfaces.runs.twin_run import RunEvent
 
 CHANGED: Final = 1e-9
 """A predicted position that is off by more [rad] was falsified."""
@@ -202,7 +202,7 @@ def _changed(before: RecordedEdit, edit: RecordedEdit) -> Iterator[Mark]:
         yield Mark(edit.at, MarkKind.FALSIFIED, text, span, edit.command_id)
 
 
-def _happened(event: Event) -> Iterator[Mark]:
+def _happened(event: RunEvent) -> Iterator[Mark]:
     """The mark of an event; corrections are among the commands, exactly."""
     kind = OF_EVENTS.get(event.kind, MarkKind.OTHER)
     if kind is not MarkKind.CORRECTED:

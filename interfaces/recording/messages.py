@@ -233,7 +233,7 @@ class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receip
 
 
 class PacketEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
-    """A command on its way across the link, as `interfaces.runs.twin_run.Packet`."""
+    """A command on its way across the link, as `interfaces.runs.twin_run.CommandPacket`."""
 
     number: Number
     """Place in the order of sending, from 1."""
@@ -314,7 +314,7 @@ class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
 
 
 class EventEntry(Wire, frozen=True, omit_defaults=True, gc=False):
-    """Something that happened, as `interfaces.runs.twin_run.Event`."""
+    """Something that happened, as `interfaces.runs.twin_run.RunEvent`."""
 
     t: Time
     kind: Word

@@ -32,7 +32,7 @@ from interfaces.recording.messages import (
 from interfaces.recording.scan import NUMBERS, Blocks
 from interfaces.recording.source import FileSource
 from interfaces.recording.track import SampleTrack, Tracks
-from interfaces.runs.twin_run import Event, Packet
+from interfaces.runs.twin_run import CommandPacket, RunEvent
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.model import Array, RobotModel, frozen_array
@@ -192,10 +192,12 @@ class Recording:
         return tuple(found[command_id].read() for command_id in sorted(found))
 
     @property
-    def packets(self) -> tuple[Packet, ...]:
+    def packets(self) -> tuple[CommandPacket, ...]:
         """Commands on their way across the link, in the order of sending; what is newest about each."""
         found = {entry.number: entry for entry in self._commands() if isinstance(entry, PacketEntry)}
-        return tuple(Packet(e.command_id, e.sent, e.arrived, e.real_id, e.lost) for _, e in sorted(found.items()))
+        return tuple(
+            CommandPacket(e.command_id, e.sent, e.arrived, e.real_id, e.lost) for _, e in sorted(found.items())
+        )
 
     @property
     def given(self) -> tuple[Known, ...]:
@@ -213,10 +215,10 @@ class Recording:
         return self._logs["/commands"].entries()
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[RunEvent, ...]:
         """What else happened, by time."""
         entries: list[EventEntry] = self._logs["/events"].entries()
-        return tuple(Event(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
+        return tuple(RunEvent(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
 
     @property
     def changes(self) -> tuple[AnyHistory | AnyChange, ...]:

@@ -19,7 +19,7 @@ from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.attribution import CAUSES, Attribution, Measures, OffsetOutcome
 from interfaces.runs.keeper import RunFacts, Turn
-from interfaces.runs.twin_run import Event, Packet, TwinRun
+from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun
 from interfaces.software import software
 from interfaces.teleop import OperatorSite
 from interfaces.wire.fields import text
@@ -39,8 +39,8 @@ class RunRecorder:
         self._writer: RecordingWriter | None = None
         self._capture: Capture | None = None
         self._real, self._links = Paced(POSE_RATE), Paced(LINK_RATE)
-        self._events: set[Event] = set()
-        self._packets: dict[int, Packet] = {}
+        self._events: set[RunEvent] = set()
+        self._packets: dict[int, CommandPacket] = {}
         self._end = 0.0
 
     def begin(self, facts: RunFacts, operator: OperatorSite) -> None:
@@ -100,12 +100,12 @@ class RunRecorder:
             for row, X, Y in zip(rows, virtual, real, strict=True):
                 capture.add(t[row], link_transforms(t[row], (("virtual", X[1:]), ("real", Y[1:]))))
 
-    def _tell_event(self, event: Event, t: float) -> None:
+    def _tell_event(self, event: RunEvent, t: float) -> None:
         if event not in self._events and self._capture is not None:
             self._events.add(event)
             self._capture.add(t, EventEntry(float(event.t), event.kind, text(event.text)))
 
-    def _tell_packet(self, number: int, packet: Packet, t: float) -> None:
+    def _tell_packet(self, number: int, packet: CommandPacket, t: float) -> None:
         if self._packets.get(number) != packet and self._capture is not None:
             self._packets[number] = packet
             entry = PacketEntry(

@@ -14,13 +14,13 @@ from interfaces.lab.driving.pictures import of_drives
 from interfaces.report.driven import FIGURES, shown
 from interfaces.report.markup import card, table
 from interfaces.runs.drive_run import DriveRun
-from interfaces.runs.twin_run import Event
+from interfaces.runs.twin_run import RunEvent
 
 FACTS: Final = ("architecture", "transport", "delay", "robot", "operator", "seed")
 """What a run is, of its summary."""
 
 
-def render(drive: DriveRun, summary: Mapping[str, Any], events: Sequence[Event]) -> str:
+def render(drive: DriveRun, summary: Mapping[str, Any], events: Sequence[RunEvent]) -> str:
     """Return the report as one HTML text; equal runs give equal texts.
 
     Args:

@@ -11,7 +11,7 @@ from typing import Generic, TypeVar, cast
 from interfaces.rsp.errors import DeadlineError
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model.elements import Command, Effector, Event, Monitor, Sensor
-from interfaces.rsp.outbox import Outcome
+from interfaces.rsp.outbox import DeliveryOutcome
 from vrs.checks import finite, integer_in
 from vrs.errors import InvalidValueError
 
@@ -218,7 +218,7 @@ class SensorDevice(Requested, Generic[V]):
         return cast("tuple[V, ...]", self._format.unpack(payload))
 
 
-class Receipt:
+class CommandTicket:
     """A command or memory command that was given."""
 
     def __init__(self, device: Device, number: int) -> None:
@@ -226,11 +226,11 @@ class Receipt:
         self._device, self.id = device, number
 
     @property
-    def outcome(self) -> Outcome | None:
+    def outcome(self) -> DeliveryOutcome | None:
         """What became of it; None while nobody knows."""
         return self._device._middleware.outcome(self._device._index, self.id)
 
-    def wait(self, timeout: float) -> Outcome:
+    def wait(self, timeout: float) -> DeliveryOutcome:
         """Wait until that's known, at most so long [s].
 
         Raises:
@@ -242,7 +242,7 @@ class Receipt:
 class CommandDevice(Device, Generic[V]):
     """A command that must be transferred."""
 
-    def send(self, *values: V) -> Receipt:
+    def send(self, *values: V) -> CommandTicket:
         """Give the command.
 
         Raises:
@@ -259,7 +259,7 @@ class CommandDevice(Device, Generic[V]):
             raise InvalidValueError(self.name, values, allowed)
         packed = element.format.pack(*(int(v) if whole else v for v in values))
         with self._middleware.changed:
-            return Receipt(self, self._middleware.core.command(self._index, packed))
+            return CommandTicket(self, self._middleware.core.command(self._index, packed))
 
 
 class ModuleDevice(Requested):
@@ -290,7 +290,7 @@ class EventDevice(Requested, Generic[V]):
 class MemoryCommandDevice(Device):
     """Data that the robot gets exactly once."""
 
-    def send(self, data: bytes, *, timeout: float) -> Receipt:
+    def send(self, data: bytes, *, timeout: float) -> CommandTicket:
         """Give the data, to be settled within a time [s].
 
         Raises:
@@ -299,7 +299,7 @@ class MemoryCommandDevice(Device):
         """
         with self._middleware.changed:
             deadline = self._middleware.clock.now() + finite("timeout", timeout, "finite seconds")
-            return Receipt(self, self._middleware.core.store(self._index, data, deadline=deadline))
+            return CommandTicket(self, self._middleware.core.store(self._index, data, deadline=deadline))
 
 
 class MemoryEventDevice(Device):

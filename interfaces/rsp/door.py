@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from interfaces.rsp import handshake
-from interfaces.rsp.handshake import Answer, Cookies, Refusal
-from interfaces.rsp.header import Header, Type
+from interfaces.rsp.handshake import Cookies, HandshakeAnswer, SessionRefusal
+from interfaces.rsp.header import Header, PacketType
 from interfaces.rsp.numbers import MODULUS
 from interfaces.rsp.security import TAG, Keyring, Opener, Rank, Sealer
-from interfaces.rsp.session import Drop, Dropped, Session, milliseconds
+from interfaces.rsp.session import DropReason, PacketDropped, SessionNumbers, milliseconds
 from interfaces.stream.limits import Bucket
 
 RATE: Final = 100.0
@@ -19,10 +19,10 @@ RATE: Final = 100.0
 
 
 @dataclass(slots=True, eq=False)
-class Claim:
+class SessionClaim:
     """A session and whose it is."""
 
-    session: Session
+    session: SessionNumbers
     address: bytes
     nonce: bytes
     """Of the local system."""
@@ -36,7 +36,7 @@ class Claim:
         return head.session == self.session.id and address == self.address
 
 
-class Door:
+class SessionDoor:
     """Answers who asks for a session."""
 
     def __init__(
@@ -62,7 +62,7 @@ class Door:
         self._cookies = Cookies(random_bytes(32))
         self._allowed = {proven: Bucket(RATE, RATE, 0.0) for proven in (False, True)}
         """Requests by whether their address is proven: who makes addresses up takes nothing from who has one."""
-        self.pending: Claim | None = None
+        self.pending: SessionClaim | None = None
         """A session that was given, and in which nothing came yet; whoever asks next has it instead."""
 
     def opened(
@@ -83,41 +83,41 @@ class Door:
         """
         body, rank = handshake.received(data, self._keys, Rank)
         if rank is None:
-            raise Dropped(Drop.AUTHENTICATION)
+            raise PacketDropped(DropReason.AUTHENTICATION)
         asked = handshake.decode_open(body)
         if self._keys is not None and asked.rank is not rank:
-            raise Dropped(Drop.AUTHENTICATION)
+            raise PacketDropped(DropReason.AUTHENTICATION)
         proven = self._cookies.good(asked, address, now)
         if not self._allowed[proven].take(now):
-            raise Dropped(Drop.UNEXPECTED)
+            raise PacketDropped(DropReason.UNEXPECTED)
 
-        def answer(kind: Type, body: bytes, session: int = 0) -> list[tuple[bytes, bytes]]:
+        def answer(kind: PacketType, body: bytes, session: int = 0) -> list[tuple[bytes, bytes]]:
             made = Header(self._model, False, kind, 0, milliseconds(now), session, MODULUS - 1, 0)
             return [(handshake.sent(kind, body, made, self._keys, asked.rank), address)]
 
         if not proven:
             cookie = self._cookies.cookie(address, asked.nonce, now)
-            return answer(Type.CHALLENGE, handshake.encode_answer(Answer(asked.nonce, cookie)))
+            return answer(PacketType.CHALLENGE, handshake.encode_answer(HandshakeAnswer(asked.nonce, cookie)))
         refusal = self._refusal(asked, heard, now)
         if refusal is not None:
-            return answer(Type.REFUSED, handshake.encode_refused(asked.nonce, refusal))
+            return answer(PacketType.REFUSED, handshake.encode_refused(asked.nonce, refusal))
         claim, over = self.pending, []
         if claim is None or claim.nonce != asked.nonce or claim.address != address:
             if claim is not None and claim.address != address:
-                over = [(claim.session.make(Type.ENDED, b"", now), claim.address)]
+                over = [(claim.session.make(PacketType.ENDED, b"", now), claim.address)]
             claim = self.pending = self._claim(asked, address, head.stamp)
-        given = handshake.encode_answer(Answer(claim.nonce, claim.given))
-        return [*over, *answer(Type.OPENED, given, claim.session.id)]
+        given = handshake.encode_answer(HandshakeAnswer(claim.nonce, claim.given))
+        return [*over, *answer(PacketType.OPENED, given, claim.session.id)]
 
-    def _refusal(self, asked: handshake.Open, heard: float | None, now: float) -> Refusal | None:
+    def _refusal(self, asked: handshake.Open, heard: float | None, now: float) -> SessionRefusal | None:
         if heard is None or now - heard >= self._idle:
             return None
         if not asked.takeover:
-            return Refusal.BUSY
+            return SessionRefusal.BUSY
         may = self._takeover if self._keys is None else asked.rank is Rank.ADMIN
-        return None if may else Refusal.FORBIDDEN
+        return None if may else SessionRefusal.FORBIDDEN
 
-    def _claim(self, asked: handshake.Open, address: bytes, stamp: int) -> Claim:
+    def _claim(self, asked: handshake.Open, address: bytes, stamp: int) -> SessionClaim:
         number = 0
         while not number:
             number = int.from_bytes(self._random(6), "big")
@@ -126,4 +126,4 @@ class Door:
         if self._keys is not None:
             down, up = self._keys.session(asked.rank, asked.nonce + given, number)
             sealer, opener = Sealer(up), Opener(down)
-        return Claim(Session(self._model, number, sealer, opener), address, asked.nonce, given, stamp)
+        return SessionClaim(SessionNumbers(self._model, number, sealer, opener), address, asked.nonce, given, stamp)

@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 from interfaces.rsp import header
 from interfaces.rsp.errors import PacketError
-from interfaces.rsp.header import Header, Type
+from interfaces.rsp.header import Header, PacketType
 from interfaces.rsp.security import TAG, Keyring, Rank
 
 _OPEN: Final = struct.Struct("!BB16s16s")
@@ -32,7 +32,7 @@ COOKIE_LIFE: Final = 10.0
 """A cookie counts for so long at least, twice as long at most [s]."""
 
 
-class Refusal(enum.IntEnum):
+class SessionRefusal(enum.IntEnum):
     """Why a robot gives no session."""
 
     BUSY = 1
@@ -52,7 +52,7 @@ class Open(NamedTuple):
     cookie: bytes = NO_COOKIE
 
 
-class Answer(NamedTuple):
+class HandshakeAnswer(NamedTuple):
     """CHALLENGE or OPENED."""
 
     nonce: bytes
@@ -80,12 +80,12 @@ def decode_open(body: bytes) -> Open:
     return Open(Rank(rank), takeover == 1, nonce, cookie)
 
 
-def encode_answer(answer: Answer) -> bytes:
+def encode_answer(answer: HandshakeAnswer) -> bytes:
     """The body of CHALLENGE or OPENED."""
     return _ANSWER.pack(*answer)
 
 
-def decode_answer(body: bytes) -> Answer:
+def decode_answer(body: bytes) -> HandshakeAnswer:
     """Read the body of CHALLENGE or OPENED.
 
     Raises:
@@ -93,15 +93,15 @@ def decode_answer(body: bytes) -> Answer:
     """
     if len(body) != _ANSWER.size:
         raise PacketError("the length of its body")
-    return Answer(*_ANSWER.unpack(body))
+    return HandshakeAnswer(*_ANSWER.unpack(body))
 
 
-def encode_refused(nonce: bytes, refusal: Refusal) -> bytes:
+def encode_refused(nonce: bytes, refusal: SessionRefusal) -> bytes:
     """The body of REFUSED."""
     return _REFUSED.pack(nonce, refusal)
 
 
-def decode_refused(body: bytes) -> tuple[bytes, Refusal]:
+def decode_refused(body: bytes) -> tuple[bytes, SessionRefusal]:
     """Read the body of REFUSED.
 
     Raises:
@@ -110,12 +110,12 @@ def decode_refused(body: bytes) -> tuple[bytes, Refusal]:
     if len(body) != _REFUSED.size:
         raise PacketError("the length of its body")
     nonce, refusal = _REFUSED.unpack(body)
-    if refusal not in set(Refusal):
+    if refusal not in set(SessionRefusal):
         raise PacketError("its reason")
-    return nonce, Refusal(refusal)
+    return nonce, SessionRefusal(refusal)
 
 
-def sent(kind: Type, body: bytes, head: Header, keys: Keyring | None, rank: Rank) -> bytes:
+def sent(kind: PacketType, body: bytes, head: Header, keys: Keyring | None, rank: Rank) -> bytes:
     """A packet of the handshake, with its tag if there are keys; type and flag of the header are set here."""
     packet = header.encode(head._replace(type=kind, encrypted=keys is not None)) + body
     return packet if keys is None else packet + keys.mac(rank, packet)

@@ -20,7 +20,7 @@ LONGEST: Final = 65_507
 """Of a packet [byte]: what UDP over IPv4 carries."""
 
 
-class Type(enum.IntEnum):
+class PacketType(enum.IntEnum):
     """What a packet carries."""
 
     DOWN = 1
@@ -47,7 +47,7 @@ class Header(NamedTuple):
     model: int
     """Model ID, of the robot, 0 to 65535."""
     encrypted: bool
-    type: Type
+    type: PacketType
     number: int
     """Sequence number of this packet, modulo 65536, from 0."""
     stamp: int
@@ -60,7 +60,7 @@ class Header(NamedTuple):
     """Down: how often the data buffer was cleared, modulo 256. Up: number of free buffers, 255 at most."""
 
 
-_TYPES: Final = {int(kind): kind for kind in Type}
+_TYPES: Final = {int(kind): kind for kind in PacketType}
 
 
 def encode(header: Header) -> bytes:

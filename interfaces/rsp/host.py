@@ -21,7 +21,7 @@ MOST_BEHIND: Final = 0.25
 """How much the body makes up for at most when its host was late [s]; the rest of the time it stood still."""
 
 
-class Body(Protocol):
+class HostedBody(Protocol):
     """What a host needs of a body; values are in the units of its bindings."""
 
     def move(self, binding: str, values: Values) -> None:
@@ -51,11 +51,11 @@ class Body(Protocol):
         """Of its physics [s]."""
 
 
-class RobotHost:
+class RspHost:
     """Runs a body and a robot's core together; it knows no socket and no clock."""
 
     def __init__(
-        self, core: RobotCore, body: Body, moves: frozenset[str], *, period: float = 0.016, now: float = 0.0
+        self, core: RobotCore, body: HostedBody, moves: frozenset[str], *, period: float = 0.016, now: float = 0.0
     ) -> None:
         """Join a body to a core.
 

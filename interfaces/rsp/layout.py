@@ -53,7 +53,7 @@ _MOST_PLANNED: Final = 16_384
 """Payloads whose places are kept, of all maps: a stranger's maps mustn't fill the memory."""
 
 
-class Way(enum.IntEnum):
+class PacketDirection(enum.IntEnum):
     """Which way a packet goes."""
 
     DOWN = 0
@@ -62,9 +62,9 @@ class Way(enum.IntEnum):
     """To the local system."""
 
 
-def _size(element: Element, model: RobotModel, way: Way) -> int | None:
+def _size(element: Element, model: RobotModel, way: PacketDirection) -> int | None:
     """Bytes of an element's payload; −1 where it says so itself, None where the bit can't be 1."""
-    down = way is Way.DOWN
+    down = way is PacketDirection.DOWN
     match element:
         case Effector():
             whole = FRAGMENT.size + element.stream if element.stream else element.format.size
@@ -95,21 +95,21 @@ class Layout:
         self.map_size = -(-self.count // 8)
         """Of the device map [byte]."""
         self._spare = 8 * self.map_size - self.count
-        self.sizes = tuple(tuple(_size(element, model, way) for element in model) for way in Way)
+        self.sizes = tuple(tuple(_size(element, model, way) for element in model) for way in PacketDirection)
         """By way and element: bytes of the payload, −1 if it says so itself, None if there can be none."""
         self._plans: tuple[dict[int, tuple[tuple[int, int, int], ...] | None], ...] = ({}, {})
-        self.longest = tuple(self._longest(way) for way in Way)
+        self.longest = tuple(self._longest(way) for way in PacketDirection)
         """Longest body, by way [byte]."""
-        self.room = tuple(self._room(way) for way in Way)
+        self.room = tuple(self._room(way) for way in PacketDirection)
         """For memory items in a packet, by way [byte]: what's left beside all values, but always for one."""
 
-    def _longest(self, way: Way) -> int:
+    def _longest(self, way: PacketDirection) -> int:
         total = self.map_size
         for index, size in enumerate(self.sizes[way]):
             total += STORED.size + self.longest_data(index) if size == -1 else size or 0
         return total
 
-    def _room(self, way: Way) -> int:
+    def _room(self, way: PacketDirection) -> int:
         sizes = zip(self.model, self.sizes[way], strict=True)
         values = sum(size or 0 for element, size in sizes if size != -1 and not getattr(element, "stream", 0))
         items = [STORED.size + self.longest_data(k) for k, size in enumerate(self.sizes[way]) if size == -1]
@@ -145,7 +145,7 @@ class Layout:
         parts += [payloads[index] for index in sorted(payloads)]
         return b"".join(parts)
 
-    def split(self, body: bytes, way: Way) -> dict[int, bytes]:
+    def split(self, body: bytes, way: PacketDirection) -> dict[int, bytes]:
         """Take a body apart.
 
         Returns:
@@ -176,7 +176,7 @@ class Layout:
         last = self.count - 1 + self._spare
         return [index for index in range(self.count) if bits >> (last - index) & 1]
 
-    def _plan(self, bits: int, way: Way) -> tuple[tuple[int, int, int], ...] | None:
+    def _plan(self, bits: int, way: PacketDirection) -> tuple[tuple[int, int, int], ...] | None:
         """Where payloads of a map begin and end; None if one of them says how long it is."""
         if bits & ((1 << self._spare) - 1):
             raise PacketError("a device bit beyond its elements")
@@ -191,7 +191,7 @@ class Layout:
             at += size
         return tuple(plan) if fixed else None
 
-    def _searched(self, body: bytes, bits: int, way: Way) -> dict[int, bytes]:
+    def _searched(self, body: bytes, bits: int, way: PacketDirection) -> dict[int, bytes]:
         at, found = self.map_size, {}
         for index in self._indices(bits):
             size = self.sizes[way][index]

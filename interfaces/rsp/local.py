@@ -14,17 +14,17 @@ from typing import Final
 from interfaces.rsp import handshake, header
 from interfaces.rsp.errors import PacketError, RspError
 from interfaces.rsp.handshake import Open
-from interfaces.rsp.header import Header, Type
-from interfaces.rsp.layout import ID, Layout, Way
+from interfaces.rsp.header import Header, PacketType
+from interfaces.rsp.layout import ID, Layout, PacketDirection
 from interfaces.rsp.model.elements import Effector, Event, MemoryCommand, MemoryEvent
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.numbers import MODULUS
-from interfaces.rsp.outbox import CommandOutbox, MemoryInbox, MemoryOutbox, Outcome, Settled
-from interfaces.rsp.outputs import Began, Ended, EndReason, LocalOutput, Occurred, Refused, Stored, Told
+from interfaces.rsp.outbox import CommandOutbox, DeliveryOutcome, MemoryInbox, MemoryOutbox, Settled
+from interfaces.rsp.outputs import Began, EndReason, LocalOutput, Occurred, Refused, SessionEnded, Stored, Told
 from interfaces.rsp.period import PeriodConfig, PeriodControl
-from interfaces.rsp.round_trip import RoundTrip
+from interfaces.rsp.round_trip import PacketRoundTrip
 from interfaces.rsp.security import TAG, Keyring, Opener, Rank, Sealer
-from interfaces.rsp.session import SLACK, Drop, Dropped, Session, milliseconds
+from interfaces.rsp.session import SLACK, DropReason, PacketDropped, SessionNumbers, milliseconds
 from interfaces.rsp.streams import StreamOutbox
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
@@ -33,7 +33,7 @@ MOST_PATIENCE: Final = 600.0
 """Most of a local system's patience [s]."""
 
 
-class State(enum.StrEnum):
+class LocalState(enum.StrEnum):
     """Where a local system is."""
 
     CLOSED = "closed"
@@ -107,14 +107,14 @@ class LocalCore:
         self.model, self.layout = model, Layout(model)
         self._config = LocalConfig() if config is None else config
         self._keys, self._rank, self._random = keys, rank, random_bytes
-        self.state = State.CLOSED
-        self.dropped = dict.fromkeys(Drop, 0)
+        self.state = LocalState.CLOSED
+        self.dropped = dict.fromkeys(DropReason, 0)
         """Datagrams that were dropped, by reason."""
         self.streams = StreamOutbox(model.buffers)
         self.period = PeriodControl(self._config.period)
         self._outputs: list[LocalOutput] = []
         self._asked = Open(rank, False, bytes(TAG))
-        self._session: Session | None = None
+        self._session: SessionNumbers | None = None
         self._next = self._until = math.inf
         self._heard = -math.inf
         self._active: set[int] = set()
@@ -123,10 +123,10 @@ class LocalCore:
 
     def _reset(self) -> None:
         self._commands, self._inbox = CommandOutbox(), MemoryInbox()
-        self._memory = MemoryOutbox(self.layout.room[Way.DOWN])
+        self._memory = MemoryOutbox(self.layout.room[PacketDirection.DOWN])
         self._written: dict[int, _Written] = {}
         self._events: dict[int, int] = {}
-        self._round_trip = RoundTrip()
+        self._round_trip = PacketRoundTrip()
         self._clears = 0
         self.streams = StreamOutbox(self.model.buffers)
 
@@ -147,18 +147,18 @@ class LocalCore:
         Raises:
             RspError: If there is one, or it's asked for.
         """
-        if self.state is not State.CLOSED:
+        if self.state is not LocalState.CLOSED:
             raise RspError(f"the session is {self.state.value} already")
         self._reset()
         self._asked = Open(self._rank, takeover, self._random(TAG))
-        self.state, self._session = State.OPENING, Session(self.model.id, 0)
+        self.state, self._session = LocalState.OPENING, SessionNumbers(self.model.id, 0)
         self._next, self._until = now, now + self._config.patience
 
     def end(self, *, now: float) -> None:
         """End the session; what isn't acknowledged by now is reported as failed."""
-        if self.state is State.OPEN:
-            self.state, self._next, self._until = State.ENDING, now, now + self._config.patience
-        elif self.state is State.OPENING:
+        if self.state is LocalState.OPEN:
+            self.state, self._next, self._until = LocalState.ENDING, now, now + self._config.patience
+        elif self.state is LocalState.OPENING:
             self._close(EndReason.CLOSED)
 
     def write(self, index: int, payload: bytes) -> None:
@@ -215,43 +215,45 @@ class LocalCore:
         try:
             self._receive(data, now)
         except PacketError:
-            self.dropped[Drop.MALFORMED] += 1
-        except Dropped as drop:
+            self.dropped[DropReason.MALFORMED] += 1
+        except PacketDropped as drop:
             self.dropped[drop.reason] += 1
 
     def to_send(self, *, now: float) -> list[bytes]:
         """Datagrams that are due by now [s]."""
         self._outputs += self._memory.expire(now)
-        if self.state is State.OPEN and now - self._heard >= self._config.lifetime:
+        if self.state is LocalState.OPEN and now - self._heard >= self._config.lifetime:
             self._close(EndReason.LOST)
-        if self.state is State.CLOSED or now < self._next - SLACK:
+        if self.state is LocalState.CLOSED or now < self._next - SLACK:
             return []
         session = self._session
         assert session is not None
-        if self.state is not State.OPEN and now >= self._until:
-            self._close(EndReason.CLOSED if self.state is State.ENDING else EndReason.LOST)
+        if self.state is not LocalState.OPEN and now >= self._until:
+            self._close(EndReason.CLOSED if self.state is LocalState.ENDING else EndReason.LOST)
             return []
-        if self.state is State.OPENING:
+        if self.state is LocalState.OPENING:
             self._next = now + self._config.retry
-            head = Header(self.model.id, False, Type.OPEN, 0, milliseconds(now), 0, MODULUS - 1, 0)
-            return [handshake.sent(Type.OPEN, handshake.encode_open(self._asked), head, self._keys, self._rank)]
-        if self.state is State.ENDING:
+            head = Header(self.model.id, False, PacketType.OPEN, 0, milliseconds(now), 0, MODULUS - 1, 0)
+            return [
+                handshake.sent(PacketType.OPEN, handshake.encode_open(self._asked), head, self._keys, self._rank)
+            ]
+        if self.state is LocalState.ENDING:
             self._next = now + self._config.retry
-            return [session.make(Type.END, b"", now)]
+            return [session.make(PacketType.END, b"", now)]
         # From the time that was due, so that T is kept; not from one long past.
         self._next = max(self._next + self.period.T, now + 0.5 * self.period.T)
         return [self._down(session, now)]
 
     def next_deadline(self) -> float | None:
         """When something is to be sent [s]; None while closed."""
-        return None if self.state is State.CLOSED else self._next
+        return None if self.state is LocalState.CLOSED else self._next
 
     def take(self) -> list[LocalOutput]:
         """What happened since the last call."""
         outputs, self._outputs = self._outputs, []
         return outputs
 
-    def _down(self, session: Session, now: float) -> bytes:
+    def _down(self, session: SessionNumbers, now: float) -> bytes:
         number = session.number
         payloads: dict[int, bytes] = dict.fromkeys(self._requested, b"")
         for index, written in self._written.items():
@@ -264,28 +266,28 @@ class LocalCore:
         self._inbox.fill(payloads, number)
         self.streams.fill(payloads, number, self.layout.left(payloads))
         self._round_trip.sent(number, now)
-        return session.make(Type.DOWN, self.layout.join(payloads), now, self._clears)
+        return session.make(PacketType.DOWN, self.layout.join(payloads), now, self._clears)
 
     def _receive(self, data: bytes, now: float) -> None:
         head = header.decode(data)
         if head.model != self.model.id:
-            raise Dropped(Drop.MODEL)
+            raise PacketDropped(DropReason.MODEL)
         if head.encrypted != (self._keys is not None):
-            raise Dropped(Drop.DOWNGRADE)
+            raise PacketDropped(DropReason.DOWNGRADE)
         session = self._session
         if session is None or head.type not in _EXPECTED[self.state]:
-            raise Dropped(Drop.UNEXPECTED)
-        if self.state is State.OPENING:
+            raise PacketDropped(DropReason.UNEXPECTED)
+        if self.state is LocalState.OPENING:
             self._answered(head, data, now)
             return
         if head.session != session.id:
-            raise Dropped(Drop.SESSION)
+            raise PacketDropped(DropReason.SESSION)
         body, number = session.take(head, data)
-        if head.type is Type.ENDED:
+        if head.type is PacketType.ENDED:
             session.newest, self._heard = number, now
-            self._close(EndReason.CLOSED if self.state is State.ENDING else EndReason.TAKEN)
+            self._close(EndReason.CLOSED if self.state is LocalState.ENDING else EndReason.TAKEN)
             return
-        payloads = self.layout.split(body, Way.UP)
+        payloads = self.layout.split(body, PacketDirection.UP)
         session.newest, self._heard = number, now
         self._acknowledged(session.acknowledged(head), head, now)
         self._told(payloads)
@@ -294,18 +296,18 @@ class LocalCore:
         """Take an answer of the handshake."""
         body, rank = handshake.received(data, self._keys, (self._rank,))
         if rank is None:
-            raise Dropped(Drop.AUTHENTICATION)
-        if head.type is Type.REFUSED:
+            raise PacketDropped(DropReason.AUTHENTICATION)
+        if head.type is PacketType.REFUSED:
             nonce, refusal = handshake.decode_refused(body)
             if nonce != self._asked.nonce:
-                raise Dropped(Drop.SESSION)
+                raise PacketDropped(DropReason.SESSION)
             self._outputs.append(Refused(refusal))
-            self.state, self._session = State.CLOSED, None
+            self.state, self._session = LocalState.CLOSED, None
             return
         answer = handshake.decode_answer(body)
         if answer.nonce != self._asked.nonce:
-            raise Dropped(Drop.SESSION)
-        if head.type is Type.CHALLENGE:
+            raise PacketDropped(DropReason.SESSION)
+        if head.type is PacketType.CHALLENGE:
             if self._asked.cookie == handshake.NO_COOKIE:
                 # Somebody is there: the second round trip has as much time as the first.
                 self._until = now + self._config.patience
@@ -316,8 +318,8 @@ class LocalCore:
         if self._keys is not None:
             down, up = self._keys.session(self._rank, answer.nonce + answer.given, head.session)
             sealer, opener = Sealer(down), Opener(up)
-        self._session = Session(self.model.id, head.session, sealer, opener)
-        self.state, self._heard, self._next = State.OPEN, now, now
+        self._session = SessionNumbers(self.model.id, head.session, sealer, opener)
+        self.state, self._heard, self._next = LocalState.OPEN, now, now
         self._outputs.append(Began(head.session))
 
     def _acknowledged(self, last: int, head: Header, now: float) -> None:
@@ -357,16 +359,16 @@ class LocalCore:
 
     def _close(self, reason: EndReason) -> None:
         session = 0 if self._session is None else self._session.id
-        self._outputs += [Settled(item.index, item.id, Outcome.FAILED) for item in self._commands.drain()]
-        self._outputs += [Settled(item.index, item.id, Outcome.FAILED) for item in self._memory.drain()]
-        self._outputs.append(Ended(session, reason))
-        self.state, self._session = State.CLOSED, None
+        self._outputs += [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self._commands.drain()]
+        self._outputs += [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self._memory.drain()]
+        self._outputs.append(SessionEnded(session, reason))
+        self.state, self._session = LocalState.CLOSED, None
 
 
 _EXPECTED: Final = {
-    State.CLOSED: frozenset[Type](),
-    State.OPENING: frozenset({Type.CHALLENGE, Type.OPENED, Type.REFUSED}),
-    State.OPEN: frozenset({Type.UP, Type.ENDED}),
-    State.ENDING: frozenset({Type.ENDED}),
+    LocalState.CLOSED: frozenset[PacketType](),
+    LocalState.OPENING: frozenset({PacketType.CHALLENGE, PacketType.OPENED, PacketType.REFUSED}),
+    LocalState.OPEN: frozenset({PacketType.UP, PacketType.ENDED}),
+    LocalState.ENDING: frozenset({PacketType.ENDED}),
 }
 """What comes in each state."""

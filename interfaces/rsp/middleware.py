@@ -14,11 +14,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from interfaces.rsp.handshake import Refusal
+from interfaces.rsp.handshake import SessionRefusal
 from interfaces.rsp.layout import Layout
-from interfaces.rsp.local import LocalCore, State
-from interfaces.rsp.outbox import Outcome, Settled
-from interfaces.rsp.outputs import Began, Ended, EndReason, LocalOutput, Occurred, Refused, Stored, Told
+from interfaces.rsp.local import LocalCore, LocalState
+from interfaces.rsp.outbox import DeliveryOutcome, Settled
+from interfaces.rsp.outputs import Began, EndReason, LocalOutput, Occurred, Refused, SessionEnded, Stored, Told
 from vrs.checks import finite
 from vrs.clock import Clock
 
@@ -37,7 +37,7 @@ class Middleware:
         self.layout: Layout = core.layout
         self.changed = threading.Condition(threading.RLock())
         """Guards the core, and is notified whenever something came."""
-        self.refused: Refusal | None = None
+        self.refused: SessionRefusal | None = None
         """Why the robot gave no session, the last time."""
         self.ended: EndReason | None = None
         """Why the last session ended."""
@@ -45,7 +45,7 @@ class Middleware:
         """How often what sensors and monitors say has changed, as the robot repeats it; and the newest payload."""
         self._came: dict[int, deque[bytes]] = {}
         self._listeners: dict[int, list[Callable[[bytes], None]]] = {}
-        self._outcomes: dict[tuple[int, int], Outcome] = {}
+        self._outcomes: dict[tuple[int, int], DeliveryOutcome] = {}
 
     def advance(self, datagrams: Sequence[bytes], *, now: float) -> list[bytes]:
         """Take what came, and return what is to be sent, as of now [s]."""
@@ -72,7 +72,7 @@ class Middleware:
     @property
     def is_open(self) -> bool:
         """Whether there is a session."""
-        return self.core.state is State.OPEN
+        return self.core.state is LocalState.OPEN
 
     def payload(self, index: int) -> tuple[int, bytes | None]:
         """How often what a sensor or monitor says has changed, and what it said last."""
@@ -85,7 +85,7 @@ class Middleware:
             waiting = self._came.get(index)
             return waiting.popleft() if waiting else None
 
-    def outcome(self, index: int, number: int) -> Outcome | None:
+    def outcome(self, index: int, number: int) -> DeliveryOutcome | None:
         """What became of a command or memory command; None while nobody knows."""
         with self.changed:
             return self._outcomes.get((index, number))
@@ -118,7 +118,7 @@ class Middleware:
             case Refused(reason=refusal):
                 self.refused = refusal
                 return []
-            case Ended(reason=reason):
+            case SessionEnded(reason=reason):
                 self.ended = reason
                 return []
             case Began():

@@ -20,7 +20,7 @@ MOST_WAITING: Final = 4096
 """Items that wait in an outbox, and that aren't acknowledged yet."""
 
 
-class Outcome(enum.StrEnum):
+class DeliveryOutcome(enum.StrEnum):
     """What became of something that must arrive."""
 
     DONE = "done"
@@ -38,7 +38,7 @@ class Settled:
     """Of its element."""
     id: int
     """As it was given out."""
-    outcome: Outcome
+    outcome: DeliveryOutcome
 
 
 @dataclass(slots=True)
@@ -95,14 +95,14 @@ class CommandOutbox:
     def drain(self) -> list[Settled]:
         """Give up all."""
         left, self._flying, self._waiting = [*self._flying, *self._waiting], [], deque()
-        return [Settled(item.index, item.id, Outcome.FAILED) for item in left]
+        return [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in left]
 
     def acknowledge(self, last: int) -> list[Settled]:
         """Take the other side's last received number."""
         done = [item for item in self._flying if item.first <= last]
         if done:
             self._flying = [item for item in self._flying if item.first > last]
-        return [Settled(item.index, item.id, Outcome.DONE) for item in done]
+        return [Settled(item.index, item.id, DeliveryOutcome.DONE) for item in done]
 
 
 class MemoryOutbox:
@@ -171,7 +171,7 @@ class MemoryOutbox:
         upto = up_to(ID.unpack(payload)[0], self._flight[-1].id)
         done = [item for item in self._flight if item.index == index and item.id <= upto]
         self._flight = [item for item in self._flight if item not in done]
-        return [Settled(item.index, item.id, Outcome.DONE) for item in done]
+        return [Settled(item.index, item.id, DeliveryOutcome.DONE) for item in done]
 
     def drain(self) -> list[Settled]:
         """Give up all."""
@@ -183,7 +183,7 @@ class MemoryOutbox:
         if late:
             self._flight = [item for item in self._flight if item.deadline > now]
             self._waiting = deque(item for item in self._waiting if item.deadline > now)
-        return [Settled(item.index, item.id, Outcome.FAILED) for item in late]
+        return [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in late]
 
 
 class MemoryInbox:

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from interfaces.rsp.handshake import Refusal
+from interfaces.rsp.handshake import SessionRefusal
 from interfaces.rsp.outbox import Settled
 
 
@@ -32,11 +32,11 @@ class Began:
 class Refused:
     """The robot gives no session."""
 
-    reason: Refusal
+    reason: SessionRefusal
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class SessionEnded:
     """A session ended."""
 
     session: int
@@ -84,14 +84,14 @@ class Cleared:
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class LinkLost:
     """Nothing came for the time of the watchdog: effectors that rest on loss do so."""
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class LinkRestored:
     """Something came again."""
 
 
-LocalOutput: TypeAlias = Began | Refused | Ended | Told | Occurred | Stored | Settled
-RobotOutput: TypeAlias = Began | Ended | Commanded | Stored | Cleared | Lost | Found | Settled
+LocalOutput: TypeAlias = Began | Refused | SessionEnded | Told | Occurred | Stored | Settled
+RobotOutput: TypeAlias = Began | SessionEnded | Commanded | Stored | Cleared | LinkLost | LinkRestored | Settled

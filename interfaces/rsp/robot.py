@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from interfaces.rsp import header
-from interfaces.rsp.door import Claim, Door
+from interfaces.rsp.door import SessionClaim, SessionDoor
 from interfaces.rsp.errors import PacketError
-from interfaces.rsp.header import Header, Type
-from interfaces.rsp.layout import ID, Layout, Way
+from interfaces.rsp.header import Header, PacketType
+from interfaces.rsp.layout import ID, Layout, PacketDirection
 from interfaces.rsp.model.elements import (
     Command,
     Effector,
@@ -26,10 +26,20 @@ from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig, Values
 from interfaces.rsp.numbers import HALF, STAMPS, unwrapped
 from interfaces.rsp.outbox import MemoryInbox, MemoryOutbox
-from interfaces.rsp.outputs import Began, Cleared, Commanded, Ended, EndReason, Found, Lost, RobotOutput, Stored
-from interfaces.rsp.round_trip import RoundTrip
+from interfaces.rsp.outputs import (
+    Began,
+    Cleared,
+    Commanded,
+    EndReason,
+    LinkLost,
+    LinkRestored,
+    RobotOutput,
+    SessionEnded,
+    Stored,
+)
+from interfaces.rsp.round_trip import PacketRoundTrip
 from interfaces.rsp.security import Keyring
-from interfaces.rsp.session import SLACK, Drop, Dropped
+from interfaces.rsp.session import SLACK, DropReason, PacketDropped
 from interfaces.rsp.streams import StreamInbox
 from interfaces.rsp.telling import Telling
 from vrs.checks import number_in
@@ -89,8 +99,10 @@ class RobotCore:
         self.model, self.layout = model, Layout(model)
         self._config = RobotConfig() if config is None else config
         self._sealed = keys is not None
-        self._door = Door(model.id, random_bytes, keys, idle=self._config.idle, takeover=self._config.takeover)
-        self.dropped = dict.fromkeys(Drop, 0)
+        self._door = SessionDoor(
+            model.id, random_bytes, keys, idle=self._config.idle, takeover=self._config.takeover
+        )
+        self.dropped = dict.fromkeys(DropReason, 0)
         """Datagrams that were dropped, by reason."""
         self.motion = MotionFilter(model, self._config.filter)
         self.streams = StreamInbox(model.buffers)
@@ -98,8 +110,8 @@ class RobotCore:
         self._limits = {i: e.wire_limits for i, e in enumerate(model) if isinstance(e, Effector)}
         self._floats = {i: e for i, e in enumerate(model) if isinstance(e, Command) and e.type is Scalar.F32}
         self._outputs: list[RobotOutput] = []
-        self._claim: Claim | None = None
-        self._over: Claim | None = None
+        self._claim: SessionClaim | None = None
+        self._over: SessionClaim | None = None
         """The last session that ended: whoever didn't hear that asks again."""
         self._stopping = False
         self._telling = Telling(model, self._config.repeats)
@@ -119,8 +131,8 @@ class RobotCore:
                 self.motion.set(index, values)
         self._changed |= {index for index in self._formats if self.motion.given(index) != given[index]}
         self._command = -1
-        self._inbox, self._round_trip = MemoryInbox(), RoundTrip()
-        self._memory = MemoryOutbox(self.layout.room[Way.UP])
+        self._inbox, self._round_trip = MemoryInbox(), PacketRoundTrip()
+        self._memory = MemoryOutbox(self.layout.room[PacketDirection.UP])
         self._telling.reset()
         self._clears = 0
         self._told: dict[int, Values] = {}
@@ -184,8 +196,8 @@ class RobotCore:
         try:
             self._receive(data, address, now)
         except PacketError:
-            self.dropped[Drop.MALFORMED] += 1
-        except Dropped as drop:
+            self.dropped[DropReason.MALFORMED] += 1
+        except PacketDropped as drop:
             self.dropped[drop.reason] += 1
 
     def to_send(self, *, now: float) -> list[tuple[bytes, bytes]]:
@@ -213,50 +225,50 @@ class RobotCore:
     def _receive(self, data: bytes, address: bytes, now: float) -> None:
         head = header.decode(data)
         if head.model != self.model.id:
-            raise Dropped(Drop.MODEL)
+            raise PacketDropped(DropReason.MODEL)
         if head.encrypted != self._sealed:
-            raise Dropped(Drop.DOWNGRADE)
-        if head.type is Type.OPEN:
+            raise PacketDropped(DropReason.DOWNGRADE)
+        if head.type is PacketType.OPEN:
             held = None if self._claim is None else self._heard
             self._answers += self._door.opened(head, data, address, held, now=now)
             return
-        if head.type not in (Type.DOWN, Type.END):
-            raise Dropped(Drop.UNEXPECTED)
+        if head.type not in (PacketType.DOWN, PacketType.END):
+            raise PacketDropped(DropReason.UNEXPECTED)
         claim = self._claim_of(head, address)
         body, number = claim.session.take(head, data)
         if claim not in (self._claim, self._over):
             self._begin(claim, now)
         if self._stopping and claim is self._claim:
-            raise Dropped(Drop.STOPPING)
-        if head.type is Type.END:
+            raise PacketDropped(DropReason.STOPPING)
+        if head.type is PacketType.END:
             claim.session.newest = number
-            self._answers.append((claim.session.make(Type.ENDED, b"", now), claim.address))
+            self._answers.append((claim.session.make(PacketType.ENDED, b"", now), claim.address))
             if claim is self._claim:
                 self._end(EndReason.CLOSED, now)
             return
-        payloads = self.layout.split(body, Way.DOWN)
+        payloads = self.layout.split(body, PacketDirection.DOWN)
         told = self._values(payloads)
         before, claim.session.newest = claim.session.newest, number
         self._paced(head, number - before)
         self._carry_out(claim, head, payloads, told, now)
 
-    def _claim_of(self, head: Header, address: bytes) -> Claim:
+    def _claim_of(self, head: Header, address: bytes) -> SessionClaim:
         """Whose packet it may be: of the session in force, of one that was given, or the end of the last one again.
 
         Raises:
             Dropped: If it's nobody's.
         """
-        for claim in (self._claim, self._door.pending, self._over if head.type is Type.END else None):
+        for claim in (self._claim, self._door.pending, self._over if head.type is PacketType.END else None):
             if claim is not None and claim.fits(head, address):
                 return claim
-        raise Dropped(Drop.SESSION)
+        raise PacketDropped(DropReason.SESSION)
 
-    def _begin(self, claim: Claim, now: float) -> None:
+    def _begin(self, claim: SessionClaim, now: float) -> None:
         """A session proved to be there: it's in force, and an older one is over."""
         old = self._claim
         if old is not None:
             over = old.session
-            self._answers += [(over.make(Type.ENDED, b"", now), old.address) for _ in range(3)]
+            self._answers += [(over.make(PacketType.ENDED, b"", now), old.address) for _ in range(3)]
             self._end(EndReason.TAKEN, now)
             self._stopping = True
         self._door.pending, self._claim = None, claim
@@ -265,7 +277,7 @@ class RobotCore:
 
     def _end(self, reason: EndReason, now: float) -> None:
         assert self._claim is not None
-        self._outputs += [*self._memory.drain(), Ended(self._claim.session.id, reason), Cleared()]
+        self._outputs += [*self._memory.drain(), SessionEnded(self._claim.session.id, reason), Cleared()]
         self._over, self._claim = self._claim, None
         self._reset(now)
 
@@ -299,7 +311,12 @@ class RobotCore:
         self._stamp = stamp
 
     def _carry_out(
-        self, claim: Claim, head: Header, payloads: Mapping[int, bytes], told: Mapping[int, Values], now: float
+        self,
+        claim: SessionClaim,
+        head: Header,
+        payloads: Mapping[int, bytes],
+        told: Mapping[int, Values],
+        now: float,
     ) -> None:
         self._heard = now
         if self._lost:
@@ -344,7 +361,7 @@ class RobotCore:
                 self._command = number
                 self._outputs.append(Commanded(index, number, values))
 
-    def _up(self, claim: Claim, now: float) -> bytes:
+    def _up(self, claim: SessionClaim, now: float) -> bytes:
         number = claim.session.number
         payloads: dict[int, bytes] = {}
         self._telling.fill(payloads, number)
@@ -353,7 +370,7 @@ class RobotCore:
         )
         self._inbox.fill(payloads, number)
         self._round_trip.sent(number, now)
-        return claim.session.make(Type.UP, self.layout.join(payloads), now, min(self.streams.free, 255))
+        return claim.session.make(PacketType.UP, self.layout.join(payloads), now, min(self.streams.free, 255))
 
     def _watch(self, now: float) -> None:
         """Rest what rests on loss, and end what is lost for good."""
@@ -370,7 +387,7 @@ class RobotCore:
                     assert isinstance(element, Effector)
                     self.motion.set(index, (element.initial,) * element.count)
                     self._changed.add(index)
-            self._outputs.append(Lost())
+            self._outputs.append(LinkLost())
 
     def _find(self, told: Mapping[int, Values]) -> None:
         """Go on with what was told last: the local system takes it as known; but for what is told anew."""
@@ -379,7 +396,7 @@ class RobotCore:
             if self._rests(index) and index not in told:
                 self.motion.set(index, values)
                 self._changed.add(index)
-        self._outputs.append(Found())
+        self._outputs.append(LinkRestored())
 
     def _rests(self, index: int) -> bool:
         element = self.model.elements[index]

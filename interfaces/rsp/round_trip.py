@@ -9,7 +9,7 @@ _MOST: Final = 4096
 """Packets whose round trip may still be measured."""
 
 
-class RoundTrip:
+class PacketRoundTrip:
     """Measured by the last received numbers that the other side's packets carry; it knows no clock."""
 
     def __init__(self) -> None:

@@ -6,7 +6,7 @@ import enum
 from typing import Final
 
 from interfaces.rsp import header
-from interfaces.rsp.header import Header, Type
+from interfaces.rsp.header import Header, PacketType
 from interfaces.rsp.numbers import MODULUS, unwrapped, up_to
 from interfaces.rsp.security import NotAuthenticError, Opener, ReplayError, Sealer
 
@@ -14,7 +14,7 @@ SLACK: Final = 1e-9
 """A deadline that's less than this ahead counts as due [s]: times are sums of periods."""
 
 
-class Drop(enum.StrEnum):
+class DropReason(enum.StrEnum):
     """Why a datagram was dropped."""
 
     MALFORMED = "malformed"
@@ -37,10 +37,10 @@ class Drop(enum.StrEnum):
     """The robot comes to rest after a take-over; the new session's packets count after that."""
 
 
-class Dropped(Exception):  # noqa: N818 - it says what becomes of a packet, and never leaves a core
+class PacketDropped(Exception):  # noqa: N818 - it says what becomes of a packet, and never leaves a core
     """A packet isn't taken."""
 
-    def __init__(self, reason: Drop) -> None:
+    def __init__(self, reason: DropReason) -> None:
         self.reason = reason
         super().__init__(reason)
 
@@ -50,7 +50,7 @@ def milliseconds(now: float) -> int:
     return round(now * 1000.0) & 0xFFFFFFFF
 
 
-class Session:
+class SessionNumbers:
     """One side's numbers of a session, and its keys."""
 
     def __init__(
@@ -65,7 +65,7 @@ class Session:
         self.newest = -1
         """Number of the newest packet that came, without end."""
 
-    def make(self, kind: Type, body: bytes, now: float, buffers: int = 0) -> bytes:
+    def make(self, kind: PacketType, body: bytes, now: float, buffers: int = 0) -> bytes:
         """The next packet.
 
         Args:
@@ -103,13 +103,13 @@ class Session:
             try:
                 body, number = self._opener.open(data)
             except NotAuthenticError:
-                raise Dropped(Drop.AUTHENTICATION) from None
+                raise PacketDropped(DropReason.AUTHENTICATION) from None
             except ReplayError:
-                raise Dropped(Drop.REPLAY) from None
+                raise PacketDropped(DropReason.REPLAY) from None
             if number % MODULUS != head.number:
-                raise Dropped(Drop.MALFORMED)
+                raise PacketDropped(DropReason.MALFORMED)
         if number <= self.newest:
-            raise Dropped(Drop.LATE)
+            raise PacketDropped(DropReason.LATE)
         return body, number
 
     def acknowledged(self, head: Header) -> int:

@@ -8,7 +8,13 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link.link import Link
-from interfaces.teleop.architectures import Constants, OperatorSite, Packet, Report, Transport
+from interfaces.teleop.architectures import (
+    ArchitectureOperatorSite,
+    ArchitectureReport,
+    ArcPacket,
+    Constants,
+    Transport,
+)
 from interfaces.teleop.architectures.equipment import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
 from robots.ipr.reality import MobileReality
@@ -20,12 +26,12 @@ from vrs.model import Array
 
 ROBOTS = ("ipr", "micro", "bare")
 """Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""
-DriveLink: TypeAlias = Link[Packet, Report]
+DriveLink: TypeAlias = Link[ArcPacket, ArchitectureReport]
 """What is between both sites."""
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class DriveCase:
     """What is run."""
 
     architecture: str = "timeline"
@@ -65,7 +71,7 @@ class Case:
 class DriveRun:
     """What happened in a run."""
 
-    case: Case
+    case: DriveCase
     t: Array
     """Times [s], (k,)."""
     virtual: Array
@@ -114,7 +120,9 @@ class DriveRun:
 class Witness(Protocol):
     """Who notes what happens in a run, and changes nothing of it."""
 
-    def begun(self, case: Case, start: Posture, body: MobileRobot, site: OperatorSite, link: DriveLink) -> None:
+    def begun(
+        self, case: DriveCase, start: Posture, body: MobileRobot, site: ArchitectureOperatorSite, link: DriveLink
+    ) -> None:
         """The run begins; the site and the link tell those who listen."""
 
     def sent(self, direction: str, now: float, size: int) -> None:

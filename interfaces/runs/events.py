@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from interfaces.runs.twin_run import Event, Packet
+from interfaces.runs.twin_run import CommandPacket, RunEvent
 from interfaces.teleop import Correction
 from vrs.ledger import Receipt, Status
 from vrs.model import Array
@@ -20,8 +20,8 @@ _SAME = 1e-9
 
 
 def command_events(
-    packet: Packet, sent: Receipt, answer: Receipt | None, *, play_at: Callable[[float], float]
-) -> Iterator[Event]:
+    packet: CommandPacket, sent: Receipt, answer: Receipt | None, *, play_at: Callable[[float], float]
+) -> Iterator[RunEvent]:
     """Tell where a command was lost, late or refused at the robot.
 
     Args:
@@ -35,21 +35,21 @@ def command_events(
         fate = (
             "" if packet.arrived is None else f", and came {packet.arrived - packet.sent:.3f} s after it was sent"
         )
-        yield Event(packet.sent, "lost", f"the message with command {command} was lost on the link{fate}")
+        yield RunEvent(packet.sent, "lost", f"the message with command {command} was lost on the link{fate}")
     if answer is None or packet.arrived is None:
         return
     asked = sent.execute_at
     if answer.status is Status.REJECTED or answer.execute_at is None or asked is None:
         text = f"the real robot rejected command {command}: {answer.reason}"
-        yield Event(packet.arrived, "diverged", text)
+        yield RunEvent(packet.arrived, "diverged", text)
     elif answer.execute_at > asked + _SAME:
         late = play_at(packet.arrived) - asked
         why = f"came {late:.3f} s too late" if late > 0 else "met a plan that had changed"
         text = f"command {command} {why}: executed at {answer.execute_at:.3f} s instead of {asked:.3f} s"
-        yield Event(packet.arrived, "late", text)
+        yield RunEvent(packet.arrived, "late", text)
 
 
-def waits(t: Array, play: Array, q_reference: Array, *, slowest: float) -> Iterator[Event]:
+def waits(t: Array, play: Array, q_reference: Array, *, slowest: float) -> Iterator[RunEvent]:
     """Tell when the robot slowed down or waited, since messages were late.
 
     Args:
@@ -78,13 +78,13 @@ def waits(t: Array, play: Array, q_reference: Array, *, slowest: float) -> Itera
         text = (
             f"messages were late: the real robot {what} until {t[high]:.2f} s, and is {grown:.3f} s further behind"
         )
-        yield Event(float(t[low]), "slowed" if moving else "waited", text)
+        yield RunEvent(float(t[low]), "slowed" if moving else "waited", text)
 
 
-def correction_events(corrections: Sequence[Correction]) -> Iterator[Event]:
+def correction_events(corrections: Sequence[Correction]) -> Iterator[RunEvent]:
     """Tell when the virtual robot was put where the real one was going."""
     for made in corrections:
-        yield Event(made.t, "corrected", correction_text(made.end, made.error, made.reason))
+        yield RunEvent(made.t, "corrected", correction_text(made.end, made.error, made.reason))
 
 
 def correction_text(end: float, error: Array, reason: str) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from interfaces.link import PacketRecord
-from interfaces.runs.twin_run import Event, Packet, TwinRun
+from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun
 from interfaces.teleop import OperatorSite
 from vrs.model import Array, RobotModel
 
@@ -45,8 +45,8 @@ class Turn(NamedTuple):
     """What became of messages to the robot."""
     back: tuple[PacketRecord, ...]
     """The same of those to the operator."""
-    events: tuple[Event, ...]
-    packets: tuple[tuple[int, Packet], ...]
+    events: tuple[RunEvent, ...]
+    packets: tuple[tuple[int, CommandPacket], ...]
     """Of commands that the robot has answered, with their places in the order of sending, from 1."""
 
 

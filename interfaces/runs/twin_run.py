@@ -21,7 +21,7 @@ from vrs.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
+class CommandPacket:
     """One motion command on its way across the link."""
 
     command_id: int
@@ -37,7 +37,7 @@ class Packet:
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Event:
+class RunEvent:
     """Something that happened to the real robot or the link."""
 
     t: float
@@ -49,7 +49,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class TwinSamples:
     """Where both robots were whenever the real one was measured; the joints as in `TwinRun`, (m, n)."""
 
     t: Array
@@ -102,16 +102,16 @@ class TwinRun:
     """Receipts of the operator's engine."""
     receipts_real: tuple[Receipt, ...]
     """Receipts of the real robot's engine."""
-    packets: tuple[Packet, ...]
+    packets: tuple[CommandPacket, ...]
     """Every command that was sent, in the order of sending."""
     messages: Array
     """Every message to the robot, heartbeats too: when it was sent and arrived, user time [s], (m, 2); NaN for one
     that was lost or was still under way at the end."""
     corrections: tuple[Correction, ...]
     """When the virtual robot was put where the real one was going."""
-    events: tuple[Event, ...]
+    events: tuple[RunEvent, ...]
     """Everything else that happened, by time, kind and text."""
-    samples: Samples | None = None
+    samples: TwinSamples | None = None
     """Where both robots were whenever the real one was measured; None where that's on the grid."""
     gap_s: float = 0.0
     """For how long nothing was measured of the real robot, between its first and its last sample [s]."""
@@ -137,12 +137,12 @@ class TwinRun:
         return measured_rows(self.q_real)
 
     @property
-    def at_samples(self) -> Samples:
+    def at_samples(self) -> TwinSamples:
         """Where both robots were whenever the real one was measured."""
         if self.samples is not None:
             return self.samples
         joints = (self.q_virtual, self.q_shown, self.q_matched, self.q_real, self.q_reference)
-        return Samples(self.t[self.measured], *(q[self.measured] for q in joints))
+        return TwinSamples(self.t[self.measured], *(q[self.measured] for q in joints))
 
     @property
     def dt(self) -> float:

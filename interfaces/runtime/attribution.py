@@ -9,7 +9,7 @@ from interfaces.runs.attribution import OffsetOutcome, measures
 from interfaces.runs.keeper import RunKeeper
 from interfaces.runs.twin_run import TwinRun
 from interfaces.runtime.bodies import exact_arm, simulated_puma
-from interfaces.runtime.plan import Plan
+from interfaces.runtime.plan import RunPlan
 from interfaces.runtime.session import Progress
 from interfaces.runtime.virtual import run_twins
 from vrs.model import RobotModel
@@ -17,7 +17,7 @@ from vrs.model import RobotModel
 
 def run_without(
     causes: frozenset[str],
-    plan: Plan,
+    plan: RunPlan,
     model: RobotModel,
     profile: DelayProfile,
     *,
@@ -54,7 +54,7 @@ def run_without(
 
 
 def offset_outcome(
-    plan: Plan,
+    plan: RunPlan,
     model: RobotModel,
     profile: DelayProfile,
     *,

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from interfaces.runtime.session import Arm, ArmFactory
-from interfaces.teleop import Reference
+from interfaces.runtime.session import ArmBody, ArmFactory
+from interfaces.teleop import JointReference
 from vrs.model import Array
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class ExactArm:
     """A body with no dynamics: it is where its reference is, whatever it holds."""
 
-    def follow(self, reference: Reference) -> Array:
+    def follow(self, reference: JointReference) -> Array:
         """Return the references (m, n) [rad]."""
         return reference.q
 
@@ -34,7 +34,7 @@ class _Puma:
     def __init__(self, arm: RealArm) -> None:
         self._arm = arm
 
-    def follow(self, reference: Reference) -> Array:
+    def follow(self, reference: JointReference) -> Array:
         return self._arm.run(*reference).q
 
     def attach(self, mass: float) -> None:
@@ -47,7 +47,7 @@ class _Puma:
 
 
 @contextmanager
-def exact_arm(q: Array) -> Iterator[Arm]:  # noqa: ARG001
+def exact_arm(q: Array) -> Iterator[ArmBody]:  # noqa: ARG001
     """Make a body that follows exactly."""
     yield ExactArm()
 
@@ -56,7 +56,7 @@ def simulated_puma(*, friction: bool = True) -> ArmFactory:
     """Say how to make a PyBullet PUMA 560, with or without friction in its joints."""
 
     @contextmanager
-    def make(q: Array) -> Iterator[Arm]:
+    def make(q: Array) -> Iterator[ArmBody]:
         from robots.bullet import Reality
         from robots.puma560.body import RealArm
 

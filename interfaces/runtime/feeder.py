@@ -12,7 +12,7 @@ from typing import Protocol
 from interfaces.link.round_trip import Ping
 from interfaces.runtime.physics import TICK, References
 from interfaces.runtime.physics_messages import Fault
-from interfaces.teleop import Reference, Report, RobotHost
+from interfaces.teleop import JointReference, Report, RobotHost
 
 FEED = 0.1
 """Longest time between two lots of references [s]."""
@@ -21,7 +21,7 @@ FEED = 0.1
 class Fed(Protocol):
     """What takes references; see `PhysicsProcess`."""
 
-    def feed(self, reference: Reference, start: int, *, placed: bool = False) -> bool:
+    def feed(self, reference: JointReference, start: int, *, placed: bool = False) -> bool:
         """Give references from a tick on."""
 
     def acknowledge(self, fault: Fault) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from interfaces.link import Lane, Link, LinkConditions
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
-from interfaces.teleop.robot import Reference, RobotSite
+from interfaces.teleop.robot import JointReference, RobotSite
 from robots.onboard.playout import PlayState
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
@@ -29,10 +29,10 @@ Action: TypeAlias = Callable[[float], None]
 """What is done at a time, which it's told [s]."""
 
 
-class Body(Protocol):
+class RobotBody(Protocol):
     """What follows references, a row a tick."""
 
-    def follow(self, reference: Reference) -> Array:
+    def follow(self, reference: JointReference) -> Array:
         """Follow references for a tick each; return measured joints after each, (m, n) [rad]."""
 
 
@@ -52,7 +52,7 @@ class Laboratory:
         now: float = 0.0,
         tick: float = 0.02,
         every: int = 1,
-        body: Body | None = None,
+        body: RobotBody | None = None,
     ) -> None:
         """Put everything in its place.
 
@@ -85,7 +85,7 @@ class Laboratory:
         self._cues: list[tuple[float, int, Action]] = []
         self._order = count()
         self._play: list[Array] = []
-        self._followed: list[Reference] = []
+        self._followed: list[JointReference] = []
         self._measured: list[Array] = []
 
     def schedule(self, t: float, action: Action) -> None:
@@ -160,7 +160,7 @@ class Laboratory:
         if self._body is not None:
             reference = self.robot.reference(play)
             measured = self._body.follow(reference)
-            self._followed.append(Reference(*(column[rows].copy() for column in reference)))
+            self._followed.append(JointReference(*(column[rows].copy() for column in reference)))
             self._measured.append(measured[rows].copy())
             self.robot.measured(measured[-1], now=float(t[-1]))
 
@@ -186,12 +186,12 @@ class Laboratory:
         return np.concatenate(self._play) if self._play else np.empty((0, 4))
 
     @property
-    def reference(self) -> Reference:
+    def reference(self) -> JointReference:
         """What the robot's site asked of its body, (k, n) each."""
         if self._body is None:
             _, p, pace, rate = self.play.T
             return self.robot.reference(PlayState(p, pace, rate))
-        return Reference(*(np.concatenate([r[i] for r in self._followed]) for i in range(3)))
+        return JointReference(*(np.concatenate([r[i] for r in self._followed]) for i in range(3)))
 
     @property
     def measured(self) -> Array:

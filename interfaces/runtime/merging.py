@@ -28,7 +28,7 @@ _SAME = 1e-11
 """Positions nearer than this [rad] are one: their change in a tick is a speed."""
 
 
-class Merging:
+class ReferenceBlending:
     """Brings joints onto their references, a tick at a time."""
 
     def __init__(self, limits: Limits, tick: float) -> None:

@@ -25,14 +25,14 @@ from interfaces.runtime.physics_messages import (
     Measurement,
     News,
     Order,
-    Ready,
-    Release,
+    PhysicsReady,
+    PhysicsSetup,
+    ReleaseLoad,
     Rows,
-    Setup,
     decode_news,
     encode,
 )
-from interfaces.teleop import Reference
+from interfaces.teleop import JointReference
 from vrs.checks import number_in
 from vrs.clock import WallClock
 from vrs.commands import finite_array
@@ -95,14 +95,14 @@ class Silent:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class ProcessEnded:
     """The process is no more."""
 
     status: int | None
     """Its exit status, negative for the signal that ended it; None if the system doesn't know it yet."""
 
 
-Event: TypeAlias = Ready | Measurement | Fault | Silent | Ended
+Event: TypeAlias = PhysicsReady | Measurement | Fault | Silent | ProcessEnded
 
 
 class PhysicsStartError(VrsError):
@@ -131,7 +131,7 @@ class PhysicsProcess:
         """
         self._n, self._run = config.limits.dof, 0
         self._heard, self._ready, self._silent = clock.now(), False, False
-        self._ended: Ended | None = None
+        self._ended: ProcessEnded | None = None
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         for end in (ours, theirs):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
@@ -155,7 +155,7 @@ class PhysicsProcess:
         limits = config.limits
         bounds = (limits.q_min, limits.q_max, limits.qd_max, limits.qdd_max, limits.qddd_max)
         self._send(
-            Setup(
+            PhysicsSetup(
                 config.body, config.friction, TICK, config.every, clock.origin, os.getpid(),
                 tuple(config.q.tolist()), tuple(tuple(bound.tolist()) for bound in bounds),  # type: ignore[arg-type]
             )
@@ -170,7 +170,7 @@ class PhysicsProcess:
         """The descriptor that can be read when there's something to `poll`."""
         return self._socket.fileno()
 
-    def feed(self, reference: Reference, start: int, *, placed: bool = False) -> bool:
+    def feed(self, reference: JointReference, start: int, *, placed: bool = False) -> bool:
         """Give references, which count for their ticks and instead of all that was given for later ones.
 
         After the last one its position is held, if it's at rest; if it's not, the body brakes and tells a fault.
@@ -210,7 +210,7 @@ class PhysicsProcess:
 
     def release(self) -> bool:
         """Let the body drop its load; returns whether that was sent."""
-        return self._send(Release())
+        return self._send(ReleaseLoad())
 
     def poll(self, *, now: float) -> tuple[Event, ...]:
         """Take in what the process said, and notice if it says nothing or has ended.
@@ -233,7 +233,7 @@ class PhysicsProcess:
                 break
             news: News = decode_news(data)
             self._heard, self._silent = now, False
-            self._ready = self._ready or isinstance(news, Ready)
+            self._ready = self._ready or isinstance(news, PhysicsReady)
             events.append(news)
         if self._ended is None and not self._silent and now - self._heard > self._patience:
             if not self._ready:
@@ -258,7 +258,7 @@ class PhysicsProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._ended = self._ended or Ended(self._process.returncode)
+        self._ended = self._ended or ProcessEnded(self._process.returncode)
         self._socket.close()
 
     def __enter__(self) -> Self:
@@ -269,11 +269,11 @@ class PhysicsProcess:
     ) -> None:
         self.close()
 
-    def _end(self) -> Ended:
+    def _end(self) -> ProcessEnded:
         """The process has closed its end of the socket."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_STATUS_TIME)
-        self._ended = Ended(self._process.returncode)
+        self._ended = ProcessEnded(self._process.returncode)
         return self._ended
 
     def _send(self, order: Order) -> bool:
@@ -291,7 +291,12 @@ class References:
     """What the body is to follow, ahead of time: what is decided, and what follows if nobody decides more."""
 
     def __init__(
-        self, reference: Callable[[Array], Reference], *, now: float, tick: float = TICK, horizon: float = HORIZON
+        self,
+        reference: Callable[[Array], JointReference],
+        *,
+        now: float,
+        tick: float = TICK,
+        horizon: float = HORIZON,
     ) -> None:
         """Begin with the first tick after now.
 
@@ -309,7 +314,7 @@ class References:
         """Leave out what was before now [s]: after a fault the body holds, and follows from here on."""
         self._next = self._after(now)
 
-    def take(self, *, now: float) -> tuple[int, Reference]:
+    def take(self, *, now: float) -> tuple[int, JointReference]:
         """Say what to `feed`: from where it was last taken on, as all that was decided since may differ.
 
         Args:
@@ -325,7 +330,7 @@ class References:
         reference = self._reference(t)
         moving = np.flatnonzero(reference.qd.any(axis=1) | reference.qdd.any(axis=1))
         count = min(int(moving[-1]) + 2 if len(moving) else 1, len(t))
-        return first, Reference(*(part[:count] for part in reference))
+        return first, JointReference(*(part[:count] for part in reference))
 
     def _after(self, now: float) -> int:
         return math.floor(now / self._tick + 1e-9) + 1

@@ -53,7 +53,7 @@ class FaultKind(StrEnum):
     """The body itself failed; the process ends."""
 
 
-class Doing(StrEnum):
+class PhysicsActivity(StrEnum):
     """What the process does."""
 
     FOLLOWING = "following"
@@ -62,7 +62,7 @@ class Doing(StrEnum):
     """At rest after a fault, until that is acknowledged."""
 
 
-class Setup(msgspec.Struct, frozen=True, tag="setup"):
+class PhysicsSetup(msgspec.Struct, frozen=True, tag="setup"):
     """The first message to the process."""
 
     body: BodyKind
@@ -119,7 +119,7 @@ class Attach(msgspec.Struct, frozen=True, tag="attach"):
     """[kg]."""
 
 
-class Release(msgspec.Struct, frozen=True, tag="release"):
+class ReleaseLoad(msgspec.Struct, frozen=True, tag="release"):
     """Drop the load."""
 
 
@@ -127,7 +127,7 @@ class Close(msgspec.Struct, frozen=True, tag="close"):
     """Come to rest and end."""
 
 
-class Ready(msgspec.Struct, frozen=True, tag="ready"):
+class PhysicsReady(msgspec.Struct, frozen=True, tag="ready"):
     """The body stands and takes references."""
 
     tick: int
@@ -180,7 +180,7 @@ class Measurement(msgspec.Struct, frozen=True, tag="measured"):
     """Where the body is after a tick."""
 
     tick: int
-    doing: Doing
+    doing: PhysicsActivity
     q: Row
     """Encoder readings [rad]."""
     qd: Row
@@ -210,9 +210,9 @@ class Fault(msgspec.Struct, frozen=True, tag="fault"):
     """When, if no tick is skipped."""
 
 
-Order: TypeAlias = Setup | Rows | Attach | Release | Close
+Order: TypeAlias = PhysicsSetup | Rows | Attach | ReleaseLoad | Close
 """To the process."""
-News: TypeAlias = Ready | Measurement | Fault
+News: TypeAlias = PhysicsReady | Measurement | Fault
 """From the process."""
 
 M = TypeVar("M")

@@ -20,7 +20,7 @@ from interfaces.runtime.physics_messages import (
     BodyKind,
     Measurement,
     News,
-    Setup,
+    PhysicsSetup,
     decode_order,
     encode,
 )
@@ -90,7 +90,7 @@ class PumaTicks:
 
 
 @contextmanager
-def tick_body(setup: Setup) -> Iterator[TickBody]:
+def tick_body(setup: PhysicsSetup) -> Iterator[TickBody]:
     """Make the body that the parent wants."""
     if setup.body is BodyKind.EXACT:
         yield ExactTicks()
@@ -159,7 +159,7 @@ def run(connection: socket.socket) -> int:
         setup = decode_order(connection.recv(MESSAGE_MOST))
     except (OSError, FormatError):
         return 2
-    if not isinstance(setup, Setup):
+    if not isinstance(setup, PhysicsSetup):
         return 2
     connection.setblocking(False)
     clock, parent = WallClock.since(setup.origin), _Parent(connection, setup.parent)

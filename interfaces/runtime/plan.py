@@ -71,7 +71,7 @@ class PlannedPayload:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class RunPlan:
     """What happens in a run, by time; equal times keep the order of the file."""
 
     title: str
@@ -117,13 +117,13 @@ _HEADER = ("schema", "title", "start")
 _MOTION = ("register", "execute", "speed", "motion", "profile", "insertion")
 
 
-def default_plan(model: RobotModel) -> Plan:
+def default_plan(model: RobotModel) -> RunPlan:
     """Read the plan of the demo."""
     source = resources.files("interfaces.runtime").joinpath("default_plan.jsonl")
     return parse_plan(source.read_bytes(), "default_plan.jsonl", model)
 
 
-def read_plan(path: Path, model: RobotModel) -> Plan:
+def read_plan(path: Path, model: RobotModel) -> RunPlan:
     """Read a plan file.
 
     Raises:
@@ -133,7 +133,7 @@ def read_plan(path: Path, model: RobotModel) -> Plan:
     return parse_plan(read_within(path, MAX_BYTES), str(path), model)
 
 
-def parse_plan(data: bytes, name: str, model: RobotModel) -> Plan:
+def parse_plan(data: bytes, name: str, model: RobotModel) -> RunPlan:
     """Parse the bytes of a plan file.
 
     Args:
@@ -170,7 +170,7 @@ def parse_plan(data: bytes, name: str, model: RobotModel) -> Plan:
     motions.sort(key=lambda motion: motion.registered_at)
     payloads.sort(key=lambda payload: payload.t)
     _check_hand(payloads)
-    return Plan(title, start, tuple(motions), tuple(payloads))
+    return RunPlan(title, start, tuple(motions), tuple(payloads))
 
 
 def _lines(data: bytes, name: str) -> Iterator[tuple[str, _Line]]:

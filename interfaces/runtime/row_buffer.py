@@ -16,7 +16,7 @@ _BLOCKS_MOST = 1024
 """Most blocks that are kept; a parent sends one every few ticks, and each cuts the one before."""
 
 
-class _Block(NamedTuple):
+class _RowBlock(NamedTuple):
     start: int
     """Tick of the first row."""
     rows: Array
@@ -27,7 +27,7 @@ class RowBuffer:
     """Rows (q, qd, qdd) by tick; it keeps what is still to come, and a little of what was."""
 
     def __init__(self) -> None:
-        self._blocks: deque[_Block] = deque()
+        self._blocks: deque[_RowBlock] = deque()
 
     def clear(self) -> None:
         """Forget everything."""
@@ -46,8 +46,8 @@ class RowBuffer:
             return False
         if blocks and blocks[-1].start + len(blocks[-1].rows) > start:
             last = blocks.pop()
-            blocks.append(_Block(last.start, np.array(last.rows[: start - last.start])))
-        blocks.append(_Block(start, rows))
+            blocks.append(_RowBlock(last.start, np.array(last.rows[: start - last.start])))
+        blocks.append(_RowBlock(start, rows))
         return True
 
     def take(self, tick: int, most: int) -> Array | None:

@@ -17,8 +17,8 @@ from interfaces.link import LinkConditions, PacketRecord
 from interfaces.runs.events import command_events, correction_events, waits
 from interfaces.runs.keeper import RunFacts, RunKeeper, Turn
 from interfaces.runs.offset import spelled
-from interfaces.runs.twin_run import Event, Packet, TwinRun, commands_alone
-from interfaces.runtime.laboratory import Body, Laboratory
+from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun, commands_alone
+from interfaces.runtime.laboratory import Laboratory, RobotBody
 from interfaces.runtime.plan import PlannedCommand
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from interfaces.wire.fields import text
@@ -42,7 +42,7 @@ LINK_LOSS = "hold"
 """What the robot does when messages stay away."""
 
 
-class Arm(Body, Protocol):
+class ArmBody(RobotBody, Protocol):
     """A robot's body, with a hand."""
 
     def attach(self, mass: float) -> None:
@@ -52,7 +52,7 @@ class Arm(Body, Protocol):
         """Drop the load."""
 
 
-ArmFactory: TypeAlias = Callable[[Array], AbstractContextManager[Arm]]
+ArmFactory: TypeAlias = Callable[[Array], AbstractContextManager[ArmBody]]
 """Makes a body at rest at the given joints [rad]."""
 Progress: TypeAlias = Callable[[float], None]
 """Told the user time reached [s]."""
@@ -66,7 +66,7 @@ class TwinSession:
         start: Array,
         model: RobotModel,
         conditions: LinkConditions,
-        body: Arm,
+        body: ArmBody,
         *,
         title: str,
         seed: int,
@@ -95,9 +95,9 @@ class TwinSession:
         )  # fmt: skip
         self._sent: list[tuple[float, PlannedCommand, Receipt]] = []
         self._messages: list[PacketRecord] = []
-        self._events: list[Event] = []
+        self._events: list[RunEvent] = []
         self._lost: set[float] = set()
-        self._packets: list[Packet | None] = []
+        self._packets: list[CommandPacket | None] = []
         self._unsettled: dict[int, None] = {}
         self._told = self._corrected = self._blocks = self._rows = 0
         self._halted: set[int] = set()
@@ -209,7 +209,7 @@ class TwinSession:
             self._tell(t, "payload", f"the real gripper took {mass:g} kg")
 
     def _tell(self, t: float, kind: str, text: str) -> None:
-        self._events.append(Event(t, kind, text))
+        self._events.append(RunEvent(t, kind, text))
 
     def record(self, end: float) -> TwinRun:
         """Write down what happened up to the end [s]."""
@@ -256,7 +256,7 @@ class TwinSession:
         """What the robot's engine answered to each command that was sent."""
         return [self.lab.answers.get((1, number)) for number in range(1, len(self._sent) + 1)]
 
-    def _settle(self, *, all_of_them: bool = False) -> tuple[tuple[int, Packet], ...]:
+    def _settle(self, *, all_of_them: bool = False) -> tuple[tuple[int, CommandPacket], ...]:
         """Find out what became of commands that weren't answered before, if they are now; at the end, of all."""
         found = []
         for number in list(self._unsettled):
@@ -267,7 +267,7 @@ class TwinSession:
             sent, _, receipt = self._sent[number - 1]
             real_id = None if answer is None else answer.command_id
             arrived = self.lab.arrivals.get((1, number))
-            packet = self._packets[number - 1] = Packet(
+            packet = self._packets[number - 1] = CommandPacket(
                 receipt.command_id, sent, arrived, real_id, sent in self._lost
             )
             self._events += command_events(packet, receipt, answer, play_at=self._play_at)

@@ -20,18 +20,18 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from interfaces.runtime.merging import Merging
+from interfaces.runtime.merging import ReferenceBlending
 from interfaces.runtime.physics_messages import (
     Attach,
     Close,
-    Doing,
     Fault,
     FaultKind,
     Measurement,
     News,
     Order,
-    Ready,
-    Release,
+    PhysicsActivity,
+    PhysicsReady,
+    ReleaseLoad,
     Row,
     Rows,
     TickCounter,
@@ -90,7 +90,7 @@ class TickBody(Protocol):
         """Drop the load."""
 
 
-class _Step(NamedTuple):
+class _TickState(NamedTuple):
     q: list[float]
     qd: list[float]
     qdd: list[float]
@@ -117,25 +117,25 @@ class TickLoop:
         self._body, self._limits, self._tick, self._every = body, limits, tick, every
         self._speeds, self._changes = (_OVER * limits.qd_max).tolist(), (_TICKS * tick * limits.qdd_max).tolist()
         self._last = math.floor(now / tick + _SAME)
-        self._at = _Step(list(q), [0.0] * len(q), [0.0] * len(q), None)
+        self._at = _TickState(list(q), [0.0] * len(q), [0.0] * len(q), None)
         self._measured, self._measured_tick = Moved(q, [0.0] * len(q), ()), (self._last, self._last)
         self._monitor, self._blind = SensorMonitor(limits), False
-        self._buffer, self._ahead = RowBuffer(), deque[tuple[int, _Step]]()
+        self._buffer, self._ahead = RowBuffer(), deque[tuple[int, _TickState]]()
         self._placing: int | None = None
         self._lag = 0
-        self._merging, self._belated = Merging(limits, tick), False
+        self._merging, self._belated = ReferenceBlending(limits, tick), False
         self._merged_at = -1
-        self._brake: deque[_Step] = deque()
-        self._doing = Doing.FOLLOWING
+        self._brake: deque[_TickState] = deque()
+        self._doing = PhysicsActivity.FOLLOWING
         self._faults = self._acknowledged = 0
         self._alone = self._failed = False
         self._counter = TickCounter(tick)
-        self._news: deque[News] = deque([Ready(self._last, realtime)])
+        self._news: deque[News] = deque([PhysicsReady(self._last, realtime)])
 
     @property
     def finished(self) -> bool:
         """Whether there's nothing more to be done: the body failed, or the parent left and the arm rests."""
-        return self._failed or (self._alone and self._doing is Doing.HOLDING)
+        return self._failed or (self._alone and self._doing is PhysicsActivity.HOLDING)
 
     @property
     def failed(self) -> bool:
@@ -160,7 +160,7 @@ class TickLoop:
                     self._take_rows(order)
                 case Attach(mass=mass):
                     self._body.attach(mass)
-                case Release():
+                case ReleaseLoad():
                     self._body.release()
                 case Close():
                     self.leave()
@@ -171,14 +171,14 @@ class TickLoop:
 
     def refuse(self, problem: str) -> None:
         """Come to rest, as the parent sends what makes no sense."""
-        if self._doing is Doing.FOLLOWING:
+        if self._doing is PhysicsActivity.FOLLOWING:
             self._fail(FaultKind.REFUSED, problem, self._last + 1)
 
     def leave(self) -> None:
         """Come to rest for good: the parent has ended, or wants it."""
         if not self._alone:
             self._alone = True
-            if self._doing is Doing.FOLLOWING:
+            if self._doing is PhysicsActivity.FOLLOWING:
                 self._stop()
 
     def advance(self, *, now: float) -> None:
@@ -190,7 +190,7 @@ class TickLoop:
         if late > PAUSE:
             self._counter.skipped += (missed := math.floor(now / self._tick + _SAME) - k)
             k += missed
-            if self._doing is Doing.FOLLOWING and any(self._at.qd):
+            if self._doing is PhysicsActivity.FOLLOWING and any(self._at.qd):
                 self._fail(FaultKind.PAUSED, f"the physics stood still for {late:.3f} s", k)
         self._counter.add(late)
         step = self._step(k)
@@ -204,7 +204,7 @@ class TickLoop:
             return
         self._at, self._last = step, k
         self._see(moved, k)
-        if self._doing is Doing.BRAKING and not self._brake:
+        if self._doing is PhysicsActivity.BRAKING and not self._brake:
             self._settle()
         if k % self._every == 0:
             q, qd, tau = map(tuple, self._measured)
@@ -218,7 +218,7 @@ class TickLoop:
             self._measured, self._measured_tick, self._blind = moved, (k, k - self._lag), False
             return
         fault = self._monitor.blind(now=now)
-        if fault is not None and self._doing is Doing.FOLLOWING and (not self._blind or any(self._at.qd)):
+        if fault is not None and self._doing is PhysicsActivity.FOLLOWING and (not self._blind or any(self._at.qd)):
             self._blind = True
             self._fail(FaultKind.SENSOR, str(fault), k + 1)
 
@@ -238,18 +238,18 @@ class TickLoop:
         if message.placed:
             self._placing = message.start
         self._acknowledged = message.run
-        if self._doing is Doing.HOLDING:
-            self._doing = Doing.FOLLOWING
+        if self._doing is PhysicsActivity.HOLDING:
+            self._doing = PhysicsActivity.FOLLOWING
 
-    def _step(self, k: int) -> _Step:
+    def _step(self, k: int) -> _TickState:
         """What the body does in a tick."""
-        if self._doing is Doing.FOLLOWING:
+        if self._doing is PhysicsActivity.FOLLOWING:
             step = self._following(k)
             if step is not None:
                 return step
         return self._brake.popleft() if self._brake else self._held()
 
-    def _following(self, k: int) -> _Step | None:
+    def _following(self, k: int) -> _TickState | None:
         """The reference of a tick; None if the arm must brake instead."""
         if self._lag and not any(self._at.qd):
             self._catch_up(k)
@@ -275,7 +275,7 @@ class TickLoop:
         self._fail(FaultKind.JUMPED, text, k)
         return None
 
-    def _belated_step(self, k: int, step: _Step, *, jumps: bool) -> _Step | None:
+    def _belated_step(self, k: int, step: _TickState, *, jumps: bool) -> _TickState | None:
         """What to do instead of a reference's step as rows came late; None if it's followed, or not at all."""
         if jumps and not any(self._at.qd):
             later = self._depart_later(k)
@@ -283,7 +283,7 @@ class TickLoop:
                 return later
         return self._merged(step) if self._belated else None
 
-    def _row(self, tick: int) -> _Step | None:
+    def _row(self, tick: int) -> _TickState | None:
         """The reference for a tick; None if there's none."""
         while self._ahead and self._ahead[0][0] < tick:
             self._ahead.popleft()
@@ -296,7 +296,7 @@ class TickLoop:
             self._ahead = deque(zip(range(tick, tick + len(rows)), self._prepared(rows), strict=True))
         return self._ahead.popleft()[1]
 
-    def _depart_later(self, k: int) -> _Step | None:
+    def _depart_later(self, k: int) -> _TickState | None:
         """Begin a motion late whose first rows came too late; None if none begins where the arm rests."""
         for first, rows in self._buffer.kept(k):
             rests = (np.abs(rows[:, 0] - self._at.q) <= _HERE).all(axis=1) & ~rows[:, 1].any(axis=1)
@@ -307,7 +307,7 @@ class TickLoop:
                 return step
         return None
 
-    def _merged(self, step: _Step) -> _Step | None:
+    def _merged(self, step: _TickState) -> _TickState | None:
         """On the way onto a reference whose row came late; None if the arm is there, or too far away."""
         at, row = self._at, np.array((step.q, step.qd, step.qdd))
         here = self._merging.there(at.q, at.qd, row)
@@ -326,7 +326,7 @@ class TickLoop:
                 return
         self._lag = 0
 
-    def _jump(self, step: _Step) -> int | None:
+    def _jump(self, step: _TickState) -> int | None:
         """The first joint whose speed or position the limits don't let change like this in a tick or two."""
         h = self._tick
         for j, (q0, v0, q1, v1, change) in enumerate(
@@ -336,7 +336,7 @@ class TickLoop:
                 return j
         return None
 
-    def _misplaced(self, step: _Step) -> int | None:
+    def _misplaced(self, step: _TickState) -> int | None:
         """The first joint that moves, or is placed away from where it was measured."""
         for j, (q, v, x, w) in enumerate(zip(step.q, step.qd, *self._measured[:2], strict=True)):
             if v != 0.0 or abs(q - x) > _PLACED * (1.0 + abs(w)):
@@ -362,19 +362,19 @@ class TickLoop:
             rows[-1, 0], rows[-1, 1:] = stop.rest, 0.0
         self._brake.clear()
         self._brake.extend(self._prepared(rows) if ticks else ())
-        self._doing = Doing.BRAKING if ticks else Doing.HOLDING
+        self._doing = PhysicsActivity.BRAKING if ticks else PhysicsActivity.HOLDING
         return self._brake[-1].q if self._brake else self._at.q
 
     def _settle(self) -> None:
         """The references rest."""
         again = self._acknowledged == self._faults and not self._alone
-        self._doing = Doing.FOLLOWING if again else Doing.HOLDING
+        self._doing = PhysicsActivity.FOLLOWING if again else PhysicsActivity.HOLDING
 
-    def _prepared(self, rows: Array) -> list[_Step]:
+    def _prepared(self, rows: Array) -> list[_TickState]:
         q, qd, qdd = rows.transpose(1, 0, 2).tolist()
-        return list(map(_Step, q, qd, qdd, self._body.prepare(rows)))
+        return list(map(_TickState, q, qd, qdd, self._body.prepare(rows)))
 
-    def _held(self) -> _Step:
+    def _held(self) -> _TickState:
         """Stay at the last reference, at rest."""
         if self._at.prepared is None or any(self._at.qd) or any(self._at.qdd):
             rows = np.zeros((1, 3, len(self._at.q)))

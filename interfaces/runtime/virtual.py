@@ -11,14 +11,14 @@ from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
 from interfaces.runs.keeper import RunKeeper
 from interfaces.runs.offset import QUANTILE
 from interfaces.runs.twin_run import TwinRun
-from interfaces.runtime.plan import Plan, PlannedMotion
+from interfaces.runtime.plan import PlannedMotion, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from vrs import Receipt, Status
 from vrs.model import RobotModel
 
 
 def run_twins(
-    plan: Plan,
+    plan: RunPlan,
     model: RobotModel,
     profile: DelayProfile,
     arm: ArmFactory,

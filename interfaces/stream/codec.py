@@ -108,13 +108,13 @@ class Encoding(enum.StrEnum):
     """Text frames."""
 
 
-class _Head(msgspec.Struct, frozen=True):
+class _MessageHead(msgspec.Struct, frozen=True):
     type: str
 
 
-_HEADS: dict[Encoding, Callable[[bytes], _Head]] = {
-    Encoding.MSGPACK: msgspec.msgpack.Decoder(_Head).decode,
-    Encoding.JSON: msgspec.json.Decoder(_Head).decode,
+_HEADS: dict[Encoding, Callable[[bytes], _MessageHead]] = {
+    Encoding.MSGPACK: msgspec.msgpack.Decoder(_MessageHead).decode,
+    Encoding.JSON: msgspec.json.Decoder(_MessageHead).decode,
 }
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from interfaces.messages import Form
+from interfaces.messages import ViewForm
 from interfaces.stream.client import ClientCore
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Role, State, Welcome
-from interfaces.stream.joining import Joined
+from interfaces.stream.joining import RobotConnection
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
-from interfaces.viewer import Shown
+from interfaces.viewer import ShownFrame
 
 
-class Connection(Joined[ClientCore]):
+class Connection(RobotConnection[ClientCore]):
     """An arm that a server serves."""
 
     def __init__(
@@ -39,7 +39,11 @@ class Connection(Joined[ClientCore]):
         self._add(self._session, self.observer)
 
     def viewer(
-        self, *, rate: float = 50.0, form: Form = Form.SEGMENTS, show: Callable[[Shown], None] | None = None
+        self,
+        *,
+        rate: float = 50.0,
+        form: ViewForm = ViewForm.SEGMENTS,
+        show: Callable[[ShownFrame], None] | None = None,
     ) -> RemoteViewer:
         """A viewer, on a connection of its own.
 
@@ -53,7 +57,7 @@ class Connection(Joined[ClientCore]):
             InvalidValueError: If rate is out of range.
         """
         session = self._open(Role.VIEWER)
-        viewer = RemoteViewer(session, rate=rate, form=Form(form), show=show, end=partial(self._end, session))
+        viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), show=show, end=partial(self._end, session))
         self._add(session, viewer)
         return viewer
 

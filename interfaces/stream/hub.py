@@ -15,10 +15,20 @@ from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.control import PROTOCOL, Problem, ProblemCode, Role
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
-from interfaces.stream.leasing import Leasing, Robot
+from interfaces.stream.leasing import LeasedRobot, Leasing
 from interfaces.stream.limits import Allowances, Bucket, ClientLimits
 from interfaces.stream.network import Impair, Network
-from interfaces.stream.session import POLICY, RESTART, TRY_AGAIN, News, Seat, Session, State, Welcome, Wish
+from interfaces.stream.session import (
+    POLICY,
+    RESTART,
+    TRY_AGAIN,
+    HubSession,
+    News,
+    SessionState,
+    State,
+    Welcome,
+    Wish,
+)
 from interfaces.stream.tasks import TaskOrder, Tasks, Wanted
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
@@ -92,7 +102,7 @@ class Hub:
         site: Hosted,
         lease: Lease,
         access: Access,
-        robot: Robot,
+        robot: LeasedRobot,
         *,
         config: HubConfig | None = None,
         emulation: Emulation | None = None,
@@ -135,17 +145,17 @@ class Hub:
         """Counts the changes of the way to the robot."""
         self._emulation = emulation
         self._changes = Bucket(CHANGES, 2 * CHANGES, 0.0)
-        self._sessions: dict[Session, None] = {}
-        self._opened: dict[Session, str] = {}
+        self._sessions: dict[HubSession, None] = {}
+        self._opened: dict[HubSession, str] = {}
         self._allowances = Allowances(self.limits, 0.0)
         self._surveyed: tuple[float, int, Network | None] = (-math.inf, 0, None)
-        self._seats: dict[str, Seat] = {}
+        self._seats: dict[str, SessionState] = {}
         self._edit = site.journal.look()
         self._sweep = -math.inf
         self._now = self._t = -math.inf
 
     @property
-    def sessions(self) -> tuple[Session, ...]:
+    def sessions(self) -> tuple[HubSession, ...]:
         """Those with a connection."""
         return tuple(self._sessions)
 
@@ -164,11 +174,11 @@ class Hub:
         """Counts the changes of the lease."""
         return self._leasing.version
 
-    def lease_for(self, seat: Seat, answers: int | None = None) -> control.Lease:
+    def lease_for(self, seat: SessionState, answers: int | None = None) -> control.Lease:
         """The lease as a client sees it, perhaps as an answer to its request of that number."""
         return self._leasing.seen_by(seat, answers)
 
-    def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
+    def wish(self, seat: SessionState, wish: Wish, now: float) -> control.Lease | Problem | None:
         """Do what a client asks of the lease; the answer, None for a beat that counts."""
         return self._leasing.wish(seat, wish, now)
 
@@ -183,7 +193,7 @@ class Hub:
         seat = self._seats.get(key)
         return seat is not None and seat.role is not Role.VIEWER and self._leasing.admits(seat, epoch, now)
 
-    def commanding(self, seat: Seat) -> bool:
+    def commanding(self, seat: SessionState) -> bool:
         """Whether a session has the lease, or shares it."""
         return self._leasing.commanding(seat)
 
@@ -191,7 +201,7 @@ class Hub:
         """Say that the robot is at rest after a lease ended, and takes no command."""
         self._leasing.stopped(now=now)
 
-    def open(self, encoding: Encoding, *, now: float, address: str = "") -> Session:
+    def open(self, encoding: Encoding, *, now: float, address: str = "") -> HubSession:
         """Take a connection; with too many, one that's closed at once.
 
         Args:
@@ -199,7 +209,7 @@ class Hub:
             now: Session time [s].
             address: Where it comes from: what clients cost is counted by address, too.
         """
-        session = Session(self, encoding, self._allowances.join(address, now=now), now=now)
+        session = HubSession(self, encoding, self._allowances.join(address, now=now), now=now)
         self._opened[session] = address
         if len(self._sessions) >= _OPEN * self.limits.clients:
             session.close(TRY_AGAIN, ProblemCode.FULL, f"there are {len(self._sessions)} connections already")
@@ -207,7 +217,7 @@ class Hub:
             self._sessions[session] = None
         return session
 
-    def leave(self, session: Session, *, done: bool, now: float) -> None:
+    def leave(self, session: HubSession, *, done: bool, now: float) -> None:
         """Note that a connection is gone.
 
         Args:
@@ -236,7 +246,7 @@ class Hub:
             if place < surplus or now >= seat.left + self.limits.absence:
                 self._forget(seat)
 
-    def _forget(self, seat: Seat) -> None:
+    def _forget(self, seat: SessionState) -> None:
         seat.servlet.close()
         self._seats.pop(seat.key, None)
         self._leasing.forget(seat)
@@ -249,13 +259,13 @@ class Hub:
         """Let every client know what there is now, in place of what was told of that kind before."""
         self.news[type(news)] = news
 
-    def close(self, text: str = "the server stops") -> tuple[Session, ...]:
+    def close(self, text: str = "the server stops") -> tuple[HubSession, ...]:
         """End every session; those that have a last word to send."""
         for session in self._sessions:
             session.close(RESTART, ProblemCode.STOPPING, text)
         return self.sessions
 
-    def advance(self, *, now: float) -> tuple[Session, ...]:
+    def advance(self, *, now: float) -> tuple[HubSession, ...]:
         """Make the frames that are due at now [s]; the sessions whose `advance` is to be called."""
         self._now, self._sweep = now, now + SWEEP
         self._t = self.site.time(now)
@@ -283,8 +293,10 @@ class Hub:
             self._now, self._t = now, self.site.time(now)
         return self._t
 
-    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, Welcome] | Problem:
-        """Let a client in, or say why not; see `Session`."""
+    def greet(
+        self, session: HubSession, hello: control.Hello, now: float
+    ) -> tuple[SessionState, Welcome] | Problem:
+        """Let a client in, or say why not; see `HubSession`."""
         if hello.protocol != PROTOCOL:
             return Problem(ProblemCode.VERSION, f"this server speaks version {PROTOCOL} of the protocol")
         refusal = self.access.refusal(hello.role, hello.token)
@@ -312,13 +324,13 @@ class Hub:
             return ""
         return f"there are {most} clients already"
 
-    def _seat(self, hello: control.Hello) -> Seat:
+    def _seat(self, hello: control.Hello) -> SessionState:
         key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
-        seat = self._seats[key] = Seat(key, hello.name, hello.role)
+        seat = self._seats[key] = SessionState(key, hello.name, hello.role)
         seat.servlet = self.site.servlet(admit=lambda order: self._leasing.refusal(seat, order, self._now))
         return seat
 
-    def _welcome(self, seat: Seat, resumed: bool, now: float) -> Welcome:
+    def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcome:
         config, timeout = self.config, self._leasing.timeout
         facts = seat.key, seat.role, now, self.lease_for(seat), resumed, config.instance, config.server, timeout
         return self._greeting(Greeting(*facts))
@@ -333,7 +345,7 @@ class Hub:
             self._surveyed = now, self.network_version, found
         return found if found is None or answers is None else replace(found, answers=answers)
 
-    def impair(self, seat: Seat, wish: Impair, now: float) -> Problem | None:
+    def impair(self, seat: SessionState, wish: Impair, now: float) -> Problem | None:
         """Let the holder of the lease change the way to the robot; why not, None where it's done."""
         if self._emulation is None:
             return Problem(ProblemCode.NOT_ALLOWED, "no way to a robot is emulated here", wish.number)
@@ -352,7 +364,7 @@ class Hub:
         self.network_version += 1
         return None
 
-    def task(self, seat: Seat, order: TaskOrder, now: float) -> Tasks | Problem:
+    def task(self, seat: SessionState, order: TaskOrder, now: float) -> Tasks | Problem:
         """Let the holder of the lease have the robot do something by itself: how it is then, or why not."""
         if self._workers is None:
             return Problem(ProblemCode.NOT_ALLOWED, "this robot does nothing by itself", order.number)

@@ -13,8 +13,8 @@ from interfaces.stream import control
 from interfaces.stream.client import Ask, ClientCore, Replied
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Lease, Problem, ProblemCode, Role
-from interfaces.stream.line import Line, Part, UnreachableError, Worker
-from interfaces.stream.network import Impair, Network, Survey, Way
+from interfaces.stream.line import ClientPart, Line, UnreachableError, Worker
+from interfaces.stream.network import DirectionConditions, Impair, Network, Survey
 from vrs.clock import WallClock
 
 C = TypeVar("C", bound=ClientCore)
@@ -63,7 +63,7 @@ class ClientSession(Generic[C]):
             return self.changed.wait_for(ready, timeout) if timeout > 0 else ready()
 
 
-class Joined(Generic[C]):
+class RobotConnection(Generic[C]):
     """A robot that a server serves. A context manager: at its end everything is closed.
 
     Lost connections are taken up again by themselves. Calls may come from any thread.
@@ -109,7 +109,7 @@ class Joined(Generic[C]):
         return self._sessions[-1]
 
     @staticmethod
-    def _add(session: ClientSession[C], part: Part) -> None:
+    def _add(session: ClientSession[C], part: ClientPart) -> None:
         with session.changed:
             session.line.parts.append(part)
         session.line.wake()
@@ -200,7 +200,9 @@ class Joined(Generic[C]):
         """Ask how the emulated way to the robot is, and what was measured of it."""
         return _of_network(self._wish(lambda number, _: Survey(number), wait))
 
-    def impair(self, forward: Way | None, backward: Way | None, *, wait: float = 5.0) -> Network | Problem:
+    def impair(
+        self, forward: DirectionConditions | None, backward: DirectionConditions | None, *, wait: float = 5.0
+    ) -> Network | Problem:
         """Change the emulated way to the robot: for who has the lease.
 
         Args:

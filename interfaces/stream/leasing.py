@@ -8,11 +8,11 @@ from typing import Protocol
 from interfaces.messages import Order
 from interfaces.stream import control
 from interfaces.stream.control import OVERRULED, Problem, ProblemCode, Role
-from interfaces.stream.session import Seat, Wish
+from interfaces.stream.session import SessionState, Wish
 from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
 
 
-class Robot(Protocol):
+class LeasedRobot(Protocol):
     """What the lease does to the robot."""
 
     def began(self, grant: Grant, *, now: float) -> None:
@@ -38,7 +38,7 @@ _REASONS = {
 class Leasing:
     """The lease of one robot, and the sessions that have it or share it."""
 
-    def __init__(self, lease: Lease, robot: Robot, sharers: int) -> None:
+    def __init__(self, lease: Lease, robot: LeasedRobot, sharers: int) -> None:
         """Nobody has it yet.
 
         Args:
@@ -49,11 +49,11 @@ class Leasing:
         self._lease, self._robot, self._sharers = lease, robot, sharers
         self.version = 0
         """Counts the changes of the lease."""
-        self.holder: Seat | None = None
+        self.holder: SessionState | None = None
         """Who has it."""
         self._ended: LeaseEnd | None = None
-        self._taker: Seat | None = None
-        self._shares: dict[Seat, bool] = {}
+        self._taker: SessionState | None = None
+        self._shares: dict[SessionState, bool] = {}
         """Who shares the lease in force; False once another session of it has commanded since."""
 
     @property
@@ -70,7 +70,7 @@ class Leasing:
         """When it may end [s]."""
         return self._lease.next_deadline()
 
-    def forget(self, seat: Seat) -> None:
+    def forget(self, seat: SessionState) -> None:
         """Forget a session that's gone for good."""
         self._shares.pop(seat, None)
 
@@ -86,7 +86,7 @@ class Leasing:
             self.holder = taker
             self._robot.began(grant, now=now)
 
-    def refusal(self, seat: Seat, order: Order, now: float) -> str:
+    def refusal(self, seat: SessionState, order: Order, now: float) -> str:
         """Why an order isn't carried out now; empty if it is. One that is ends the shares of all others."""
         shares = self._shares.get(seat)
         if seat is not self.holder and not shares:
@@ -99,7 +99,7 @@ class Leasing:
             self.version += 1
         return ""
 
-    def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
+    def wish(self, seat: SessionState, wish: Wish, now: float) -> control.Lease | Problem | None:
         """Do what a client asks of the lease; the answer, None for a beat that counts."""
         number = None if isinstance(wish, control.Beat) else wish.number
         if seat.role is Role.VIEWER:
@@ -125,17 +125,17 @@ class Leasing:
             return Problem(code, _REASONS[refusal], number)
         return None if number is None else self.seen_by(seat, number)
 
-    def commanding(self, seat: Seat) -> bool:
+    def commanding(self, seat: SessionState) -> bool:
         """Whether a session has the lease, or shares it."""
         return seat is self.holder or self._shares.get(seat, False)
 
-    def admits(self, seat: Seat, epoch: int, now: float) -> bool:
+    def admits(self, seat: SessionState, epoch: int, now: float) -> bool:
         """Whether a session has the lease, and this is its epoch."""
         admitted = seat is self.holder and self._lease.heard(epoch, now=now) is None
         self.turn(now)
         return admitted
 
-    def _ask(self, seat: Seat, force: bool, now: float) -> LeaseRefusal | None:
+    def _ask(self, seat: SessionState, force: bool, now: float) -> LeaseRefusal | None:
         """Ask for the lease; who has it already keeps it."""
         self.turn(now)
         admin = seat.role is Role.ADMIN
@@ -155,7 +155,7 @@ class Leasing:
             self._taker = seat
         return None
 
-    def _share(self, seat: Seat, wish: control.Share, now: float) -> control.Lease | Problem:
+    def _share(self, seat: SessionState, wish: control.Share, now: float) -> control.Lease | Problem:
         """Let a session command under the lease of another one whose name it knows."""
         self.turn(now)
         holder = self.holder
@@ -170,7 +170,7 @@ class Leasing:
             self.version += 1
         return self.seen_by(seat, wish.number)
 
-    def _of_a_share(self, seat: Seat, wish: Wish, now: float) -> LeaseRefusal | None:
+    def _of_a_share(self, seat: SessionState, wish: Wish, now: float) -> LeaseRefusal | None:
         """Why what somebody wishes who doesn't hold the lease isn't done; who shares it may go on, and leave it."""
         assert isinstance(wish, control.Release | control.Resume | control.Beat)
         if not self._shares.get(seat) or isinstance(wish, control.Beat):
@@ -190,7 +190,7 @@ class Leasing:
             self.version += 1
             self._robot.ended(ended, now=now)
 
-    def seen_by(self, seat: Seat, answers: int | None = None) -> control.Lease:
+    def seen_by(self, seat: SessionState, answers: int | None = None) -> control.Lease:
         """The lease as a client sees it: its epoch is told to its holder only, and to who shares it."""
         lease, yours, shared = self._lease, seat is self.holder, self._shares.get(seat, False)
         epoch = lease.epoch if yours or shared else None

@@ -36,7 +36,7 @@ class UnreachableError(VrsError, ConnectionError):
         super().__init__(f"{url}: {reason}")
 
 
-class Part(Protocol):
+class ClientPart(Protocol):
     """What is moved on in session time while there's a connection."""
 
     def advance(self, *, now: float) -> object:
@@ -87,7 +87,7 @@ class Line:
             worker: Where it runs.
         """
         self.url, self.core, self.clock, self.changed = url, core, clock, changed
-        self.parts: list[Part] = []
+        self.parts: list[ClientPart] = []
         self.failure = ""
         """Why the last connection didn't come about or ended."""
         self._worker = worker
@@ -200,7 +200,7 @@ class Line:
             deadline = earliest(deadline, core.next_deadline())
             return out, 1.0 if deadline is None else min(max(deadline - self.clock.now(), 0.0), 1.0)
 
-    def _renewed(self) -> Iterator[Part]:
+    def _renewed(self) -> Iterator[ClientPart]:
         sessions = self.core.sessions
         if sessions != self._sessions:
             if self._sessions:

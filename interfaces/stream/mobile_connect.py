@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from interfaces.designer import Issued
-from interfaces.jobs import Command, Forecast, JobList, Load
+from interfaces.jobs import Forecast, JobList, ListCommand, Load
 from interfaces.stream.client import Replied
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem, ProblemCode, Role
-from interfaces.stream.joining import ELSE, Joined
+from interfaces.stream.joining import ELSE, RobotConnection
 from interfaces.stream.mobile import MobileWelcome, Postures
 from interfaces.stream.mobile_client import MobileCore
 from interfaces.stream.remote import RemoteDesigner
@@ -17,7 +17,7 @@ from robots.onboard.journey import Goal
 from vrs.commands import DriveCommand, Stop
 
 
-class MobileConnection(Joined[MobileCore]):
+class MobileConnection(RobotConnection[MobileCore]):
     """Drives a mobile robot, sends it to goals, and lets it do jobs."""
 
     def __init__(
@@ -68,7 +68,7 @@ class MobileConnection(Joined[MobileCore]):
         """Put a list of jobs in the place of the one that's there; see `go`."""
         return self._ask(Load(jobs), wait)
 
-    def do(self, command: Command, *, wait: float = 5.0) -> Tasks | Problem:
+    def do(self, command: ListCommand, *, wait: float = 5.0) -> Tasks | Problem:
         """Run, pause, resume or abort the list, or press the key; see `go`."""
         return self._ask(command, wait)
 

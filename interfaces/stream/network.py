@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from interfaces.link.gauge import Measured
+from interfaces.link.gauge import LinkFigures
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class DirectionConditions:
     """What is emulated in one direction, as the command line spells it."""
 
     delay: str
@@ -37,9 +37,9 @@ class Impair:
     version: ClassVar[int] = 1
     number: int
     epoch: int
-    forward: Way | None = None
+    forward: DirectionConditions | None = None
     """To the robot; None leaves them as they are."""
-    backward: Way | None = None
+    backward: DirectionConditions | None = None
     """Back."""
 
 
@@ -49,15 +49,15 @@ class Network:
 
     kind: ClassVar[str] = "network"
     version: ClassVar[int] = 1
-    forward: Way
+    forward: DirectionConditions
     """What is emulated to the robot."""
-    backward: Way
+    backward: DirectionConditions
     """What is emulated back."""
-    there: Measured
+    there: LinkFigures
     """What was measured of the emulation to the robot, since it changed last."""
-    back: Measured
+    back: LinkFigures
     """The same of the way back."""
-    round_trip: Measured
+    round_trip: LinkFigures
     """Of whole round trips between the sites, with the network beneath; nothing is known of losses."""
     seed: int = 0
     """Of what is random in the emulation."""

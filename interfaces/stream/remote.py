@@ -6,18 +6,18 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar
 
 from interfaces.designer import Designer, Issued
-from interfaces.messages import Form, Scene
+from interfaces.messages import Scene, ViewForm
 from interfaces.observer import Observation, Observer
 from interfaces.playhead import Mode
 from interfaces.ports import EnginePort
-from interfaces.viewer import Shown, Viewer
+from interfaces.viewer import ShownFrame, Viewer
 from vrs.commands import Command
 from vrs.timeline import Timeline
 
 T = TypeVar("T")
 
 
-class Session(Protocol):
+class RemoteSession(Protocol):
     """What the four need of their connection."""
 
     @property
@@ -34,7 +34,7 @@ class Session(Protocol):
 class RemoteDesigner:
     """A `Designer` under a lock. Commands that have no answer when a session is lost are refused as unknown."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RemoteSession) -> None:
         self._session = session
         self._designer = Designer(session.port)
 
@@ -97,7 +97,7 @@ class RemoteDesigner:
 class RemoteObserver:
     """An `Observer` under a lock."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RemoteSession) -> None:
         self._session = session
         self._observer = Observer(session.port)
 
@@ -160,12 +160,12 @@ class RemoteViewer:
 
     def __init__(
         self,
-        session: Session,
+        session: RemoteSession,
         *,
         rate: float,
-        form: Form,
+        form: ViewForm,
         end: Callable[[], None],
-        show: Callable[[Shown], None] | None = None,
+        show: Callable[[ShownFrame], None] | None = None,
     ) -> None:
         """Follow; see `Viewer`.
 
@@ -181,12 +181,12 @@ class RemoteViewer:
         self._viewer = Viewer(session.port, rate=rate, form=form)
 
     @property
-    def newest(self) -> Shown | None:
+    def newest(self) -> ShownFrame | None:
         """The frame that was shown last."""
         return self._session.do(lambda _: self._viewer.shown(self._viewer.number))
 
     @property
-    def history(self) -> tuple[Shown, ...]:
+    def history(self) -> tuple[ShownFrame, ...]:
         """The newest 4096 frames that were shown, oldest first."""
         return self._session.do(lambda _: self._viewer.history)
 
@@ -209,7 +209,7 @@ class RemoteViewer:
         """Wait until something is so of the viewer, or the time [s] is over; whether it is."""
         return self._session.wait(lambda: ready(self._viewer), timeout)
 
-    def next(self, timeout: float = 5.0) -> Shown | None:
+    def next(self, timeout: float = 5.0) -> ShownFrame | None:
         """The next frame that is shown; None where none is in time [s]."""
         number = self._session.do(lambda _: self._viewer.number)
         self._session.wait(lambda: self._viewer.number > number, timeout)

@@ -22,7 +22,7 @@ from interfaces.stream.access import check_host, check_origin
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Role
 from interfaces.stream.hub import Hub
-from interfaces.stream.session import Session
+from interfaces.stream.session import HubSession
 from interfaces.stream.sockets import BoundedWebSocket
 from interfaces.timer import Turning
 from vrs.clock import Clock
@@ -87,10 +87,10 @@ class Slices:
             self._arm()
 
 
-class _Client:
+class _ServedClient:
     __slots__ = ("blocked_since", "session", "socket", "wake")
 
-    def __init__(self, session: Session, socket: BoundedWebSocket) -> None:
+    def __init__(self, session: HubSession, socket: BoundedWebSocket) -> None:
         self.session, self.socket = session, socket
         self.wake = asyncio.Event()
         self.blocked_since: float | None = None
@@ -117,7 +117,7 @@ class HubServer:
         """
         self.hub, self.clock = hub, clock
         self._health, self._turned = health, turned
-        self._clients: dict[Session, _Client] = {}
+        self._clients: dict[HubSession, _ServedClient] = {}
         self._turning = Turning(clock, self._turn, longest=math.inf)
         self._now = clock.now()
         self._slices = Slices()
@@ -161,7 +161,7 @@ class HubServer:
         address = (scope.get("client") or ("", 0))[0]
         session = self.hub.open(encoding, now=self.clock.now(), address=address)
         socket: BoundedWebSocket = scope["state"]["socket"]
-        client = self._clients[session] = _Client(session, socket)
+        client = self._clients[session] = _ServedClient(session, socket)
         writer = asyncio.create_task(self._write(client, send))
         writer.add_done_callback(partial(self._written, client))
         client.wake.set()
@@ -193,7 +193,7 @@ class HubServer:
             self.hub.leave(session, done=done, now=self.clock.now())
             await asyncio.wait([writer])
 
-    async def _write(self, client: _Client, send: Send) -> None:
+    async def _write(self, client: _ServedClient, send: Send) -> None:
         session, socket = client.session, client.socket
         opcode = Opcode.BINARY if session.encoding is Encoding.MSGPACK else Opcode.TEXT
         with contextlib.suppress(OSError):
@@ -211,7 +211,7 @@ class HubServer:
             code, reason = session.closing
             await send({"type": "websocket.close", "code": code, "reason": reason[:100]})
 
-    def _written(self, client: _Client, writer: asyncio.Task[None]) -> None:
+    def _written(self, client: _ServedClient, writer: asyncio.Task[None]) -> None:
         """Cut a client off that can't be written to, for a reason that nobody expects."""
         if not writer.cancelled() and (error := writer.exception()) is not None:
             _LOG.error("a client is cut off", exc_info=error)

@@ -61,7 +61,7 @@ class Served(Protocol):
         """The client is gone for good."""
 
 
-class Seat:
+class SessionState:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
     __slots__ = ("key", "left", "name", "role", "servlet", "session")
@@ -69,12 +69,12 @@ class Seat:
     def __init__(self, key: str, name: str, role: Role) -> None:
         self.key, self.name, self.role = key, name, role
         self.servlet: Served
-        self.session: Session | None = None
+        self.session: HubSession | None = None
         self.left = 0.0
         """When its connection was lost [s]."""
 
 
-class Desk(Protocol):
+class HubApi(Protocol):
     """What a session needs of the hub."""
 
     limits: ClientLimits
@@ -87,35 +87,37 @@ class Desk(Protocol):
     def lease_version(self) -> int:
         """Counts the changes of the lease."""
 
-    def commanding(self, seat: Seat) -> bool:
+    def commanding(self, seat: SessionState) -> bool:
         """Whether a session has the lease, or shares it."""
 
     def engine_time(self, now: float) -> float:
         """The engine's time [s]."""
 
-    def greet(self, session: Session, hello: control.Hello, now: float) -> tuple[Seat, Welcome] | Problem:
+    def greet(
+        self, session: HubSession, hello: control.Hello, now: float
+    ) -> tuple[SessionState, Welcome] | Problem:
         """Let a client in, or say why not."""
 
-    def wish(self, seat: Seat, wish: Wish, now: float) -> control.Lease | Problem | None:
+    def wish(self, seat: SessionState, wish: Wish, now: float) -> control.Lease | Problem | None:
         """Do what a client asks of the lease."""
 
-    def lease_for(self, seat: Seat, answers: int | None = None) -> control.Lease:
+    def lease_for(self, seat: SessionState, answers: int | None = None) -> control.Lease:
         """The lease as a client sees it."""
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
         """How the way to the robot is; None where there's none."""
 
-    def impair(self, seat: Seat, wish: Impair, now: float) -> Problem | None:
+    def impair(self, seat: SessionState, wish: Impair, now: float) -> Problem | None:
         """Change the way to the robot; why not, None where it's done."""
 
-    def task(self, seat: Seat, order: TaskOrder, now: float) -> Tasks | Problem:
+    def task(self, seat: SessionState, order: TaskOrder, now: float) -> Tasks | Problem:
         """Let the robot do something by itself: how it is then, or why not."""
 
 
-class Session:
+class HubSession:
     """One connection. Whatever comes in, others aren't affected; what goes out is bounded."""
 
-    def __init__(self, desk: Desk, encoding: Encoding, spending: Spending, *, now: float) -> None:
+    def __init__(self, desk: HubApi, encoding: Encoding, spending: Spending, *, now: float) -> None:
         """Wait for `Hello`.
 
         Args:
@@ -129,7 +131,7 @@ class Session:
         """What was asked for and is on its way."""
         self._desk, self._limits = desk, desk.limits
         self.encoding = encoding
-        self.seat: Seat | None = None
+        self.seat: SessionState | None = None
         self.closing: Closing | None = None
         """Code and reason with which the connection is to be closed, when what waits is sent."""
         self._outbox = Outbox(desk.encoder.encode, encoding, self._limits.waiting)
@@ -226,7 +228,7 @@ class Session:
         else:
             self._take(self.seat, message, now)
 
-    def _take(self, seat: Seat, message: Value, now: float) -> None:
+    def _take(self, seat: SessionState, message: Value, now: float) -> None:
         if isinstance(message, Ping):
             self._put(Pong(message.number, message.t, now, now))
         elif isinstance(message, Order | Ask | Follow | Want):
@@ -242,7 +244,7 @@ class Session:
         elif isinstance(message, TaskOrder):
             self._put(self._desk.task(seat, message, now))
 
-    def _survey(self, seat: Seat, message: Survey | Impair, now: float) -> None:
+    def _survey(self, seat: SessionState, message: Survey | Impair, now: float) -> None:
         """Tell how the way to the robot is, after it was changed where that was asked for."""
         problem = self._desk.impair(seat, message, now) if isinstance(message, Impair) else None
         found = None if problem is not None else self._desk.network(now, message.number)
@@ -262,7 +264,7 @@ class Session:
         self._lease = self._desk.lease_version
         self._put(welcome)
 
-    def _serve(self, seat: Seat, message: Order | Ask | Follow | Want, now: float) -> None:
+    def _serve(self, seat: SessionState, message: Order | Ask | Follow | Want, now: float) -> None:
         if not isinstance(message, Order):
             if self._outbox.is_full:
                 return
@@ -287,7 +289,7 @@ class Session:
         except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
             self._fail(error)
 
-    def _look(self, seat: Seat, now: float) -> None:
+    def _look(self, seat: SessionState, now: float) -> None:
         for reply in seat.servlet.advance(now=self._desk.engine_time(now)):
             if isinstance(reply, Broadcast | Pulse):
                 self._outbox.put_newest(reply)
@@ -332,7 +334,7 @@ class Session:
             self._wanted.clear()
         return found
 
-    def _look_around(self, seat: Seat, now: float) -> None:
+    def _look_around(self, seat: SessionState, now: float) -> None:
         desk = self._desk
         if desk.lease_version != self._lease:
             self._lease = desk.lease_version

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
-from interfaces.jobs import Command, Forecast, JobList, Load, OperatorLoss, Progress
+from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
 from interfaces.teleop.tasks import Doing, Go, Point
 from robots.onboard.journey import Goal, JourneyState
 
@@ -18,7 +18,7 @@ class Trial(enum.StrEnum):
     """Say how long the list is likely to take."""
 
 
-Wanted: TypeAlias = Go | Load | Command | Trial
+Wanted: TypeAlias = Go | Load | ListCommand | Trial
 """What a client asks for: a goal; a list in the place of the one before; that something is done with it."""
 
 

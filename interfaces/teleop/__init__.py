@@ -2,15 +2,30 @@
 
 from interfaces.teleop.host import RobotHost, RobotHostConfig
 from interfaces.teleop.line import RobotLine
-from interfaces.teleop.listening import Correction, Deed, Listener
+from interfaces.teleop.listening import CommandRecord, Correction, SiteObserver
 from interfaces.teleop.measured import Sample
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.operator import OperatorSite, OperatorSiteConfig
-from interfaces.teleop.robot import Reference, RobotSite, RobotSiteConfig
+from interfaces.teleop.robot import JointReference, RobotSite, RobotSiteConfig
 
 __all__ = [
-    "AdaptiveOffset", "Correction", "Deed", "Entry", "Listener", "OffsetConfig", "OperatorSite",
-    "OperatorSiteConfig", "Orders", "PlanPart", "Reference", "Report", "RobotHost", "RobotHostConfig", "RobotLine",
-    "RobotSite", "RobotSiteConfig", "Sample",
+    "AdaptiveOffset",
+    "CommandRecord",
+    "Correction",
+    "JointReference",
+    "LogEntry",
+    "OffsetConfig",
+    "OperatorSite",
+    "OperatorSiteConfig",
+    "Orders",
+    "PlanPart",
+    "Report",
+    "RobotHost",
+    "RobotHostConfig",
+    "RobotLine",
+    "RobotSite",
+    "RobotSiteConfig",
+    "Sample",
+    "SiteObserver",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 
 from interfaces.teleop.hosting import Host, HostConfig
 from interfaces.teleop.messages import Orders, Report
-from interfaces.teleop.robot import Reference, RobotSite, RobotSiteConfig
+from interfaces.teleop.robot import JointReference, RobotSite, RobotSiteConfig
 from vrs.model import Array, RobotModel
 
 
@@ -61,11 +61,11 @@ class RobotHost(Host[RobotSite, Orders, Report]):
     def _left(self, site: RobotSite, now: float) -> None:  # noqa: ARG002 - it's this site's
         self._q = self.reference(np.array([now])).q[0]
 
-    def reference(self, t: Array) -> Reference:
+    def reference(self, t: Array) -> JointReference:
         """What the body is to do, (k, n) each, at ascending times of the robot's clock [s] if no more is heard."""
         if self.site is None:
             still = np.zeros((len(t), len(self._q)))
-            return Reference(still + self._q, still, still)
+            return JointReference(still + self._q, still, still)
         play = self.site.foreseen(np.asarray(t, float) + self.offset)
         return self.site.reference(play)
 

@@ -42,7 +42,7 @@ O_contra = TypeVar("O_contra", contravariant=True)
 R_co = TypeVar("R_co", covariant=True)
 
 
-class Follower(Protocol[O_contra, R_co]):
+class OrderExecutor(Protocol[O_contra, R_co]):
     """A robot's site: what carries out the orders of one operator. Times are the operator's [s]."""
 
     def join(self, orders: O_contra, reason: str, *, now: float) -> None:
@@ -64,7 +64,7 @@ class Follower(Protocol[O_contra, R_co]):
         """Stop, and wait for a new epoch."""
 
 
-S = TypeVar("S", bound=Follower)  # type: ignore[type-arg]
+S = TypeVar("S", bound=OrderExecutor)  # type: ignore[type-arg]
 
 
 @dataclass(frozen=True, slots=True)

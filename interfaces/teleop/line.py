@@ -21,7 +21,7 @@ O_co = TypeVar("O_co", covariant=True)
 R_contra = TypeVar("R_contra", contravariant=True)
 
 
-class Speaker(Protocol[O_co, R_contra]):
+class OrderSource(Protocol[O_co, R_contra]):
     """An operator's site: what gives orders, and hears reports. Times are the operator's [s]."""
 
     def advance(self, *, now: float) -> tuple[O_co, ...]:
@@ -37,7 +37,7 @@ class Speaker(Protocol[O_co, R_contra]):
         """Forget what was measured of the way: it's another one."""
 
 
-S = TypeVar("S", bound=Speaker)  # type: ignore[type-arg]
+S = TypeVar("S", bound=OrderSource)  # type: ignore[type-arg]
 
 LOGGED = 500
 """Records of packets that each way keeps until somebody takes them."""

@@ -25,7 +25,7 @@ class Correction(NamedTuple):
     reason: str
 
 
-class Deed(NamedTuple):
+class CommandRecord(NamedTuple):
     """A command that the operator's engine was given, and what became of it."""
 
     at: float
@@ -38,10 +38,10 @@ class Deed(NamedTuple):
     """Whether the site refused it, so that it was never tried."""
 
 
-class Listener(Protocol):
+class SiteObserver(Protocol):
     """Who is told of all that happens, at once: it must not take long, and changes nothing."""
 
-    def commanded(self, deed: Deed) -> None:
+    def commanded(self, deed: CommandRecord) -> None:
         """The engine was given a command. What raised isn't told: it changed nothing, and took no id."""
 
     def corrected(self, correction: Correction, truth: Timeline) -> None:

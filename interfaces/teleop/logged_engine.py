@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from interfaces.teleop.listening import Deed
+from interfaces.teleop.listening import CommandRecord
 from vrs.clock import ManualClock
 from vrs.commands import (
     Cancel,
@@ -34,7 +34,7 @@ class LoggedEngine(Engine):
     def __init__(
         self,
         refusal: Callable[[], str],
-        told: Callable[[Deed, int], None],
+        told: Callable[[CommandRecord, int], None],
         model: RobotModel,
         *,
         q: Array,
@@ -61,7 +61,7 @@ class LoggedEngine(Engine):
         with self.atomic():
             reason, newest = self._refusal(), self.newest
             answer: Receipt | None = self.refuse(command, reason) if reason else super().execute(command)  # type: ignore[arg-type]
-            self._tell(Deed(self.now(), command, answer, bool(reason)), newest)
+            self._tell(CommandRecord(self.now(), command, answer, bool(reason)), newest)
             return answer
 
     def undo(self) -> Receipt | None:
@@ -72,7 +72,7 @@ class LoggedEngine(Engine):
             newest = self.newest
             answer = super().undo()
             if answer is not None:
-                self._tell(Deed(self.now(), None, answer, False), newest)
+                self._tell(CommandRecord(self.now(), None, answer, False), newest)
             return answer
 
     def undo_refusal(self) -> str:

@@ -12,7 +12,7 @@ from vrs.segment import PolynomialSegment
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Entry:
+class LogEntry:
     """One command of the operator's log."""
 
     number: int
@@ -43,7 +43,7 @@ class Orders:
     """When the epoch began [s]: no entry of it changes anything before."""
     heard: int = 0
     """Number of the newest report that came."""
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[LogEntry, ...] = ()
     """New ones, and older ones that may have been lost."""
     wanted: Ranges = ()
     """Samples that are missing; see `interfaces.teleop.measured`."""

@@ -10,10 +10,10 @@ from functools import partial
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
-from interfaces.teleop.listening import Correction, Deed, Listener
+from interfaces.teleop.listening import CommandRecord, Correction, SiteObserver
 from interfaces.teleop.logged_engine import LoggedEngine, resolved
 from interfaces.teleop.measured import Gathering, Sample
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.wire.commands import check_crosses
 from vrs.checks import number_in
 from vrs.clock import ManualClock
@@ -30,7 +30,7 @@ _SAME = 1e-9
 """Joints nearer than this [rad] are one."""
 STUCK = 2.0
 """After so long at least [s] a robot counts as halted that hears what it's sent and doesn't carry it out."""
-TAKES_UP = 10.0
+EPOCH_TIMEOUT = 10.0
 """The same of one that doesn't follow a new epoch [s]."""
 RESENDS = 8
 """So often at least a command is sent again before that."""
@@ -85,7 +85,7 @@ class OperatorSite:
         self.config = OperatorSiteConfig() if config is None else config
         self._model, self._lateness = model, lateness
         self._clock = ManualClock(now)
-        self.listener: Listener | None = None
+        self.listener: SiteObserver | None = None
         """Who is told of all that happens here."""
         self.engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self._clock, lateness=lateness)
         """The virtual robot; what it's told goes to the real one, whoever tells it."""
@@ -102,7 +102,7 @@ class OperatorSite:
         self.receipts: dict[int, Receipt] = {}
         """What the robot's engine answered, by command id."""
         self._entries = 0
-        self._under_way: OrderedDict[int, tuple[Entry, float]] = OrderedDict()
+        self._under_way: OrderedDict[int, tuple[LogEntry, float]] = OrderedDict()
         """Entries that aren't acknowledged, and when they were sent last [s], in that order."""
         self._acknowledged = 0
         self._new: list[int] = []
@@ -153,7 +153,7 @@ class OperatorSite:
             return f"{_UNDER_WAY_MOST} commands wait to be acknowledged"
         return ""
 
-    def _told(self, deed: Deed, newest: int) -> None:
+    def _told(self, deed: CommandRecord, newest: int) -> None:
         """Write what the engine carried out into the log, to be sent.
 
         Raises:
@@ -166,7 +166,7 @@ class OperatorSite:
                 command = resolved(command, answer, now)
             if command is not None:
                 check_crosses(command)
-            entry = Entry(number, now, command, newest)
+            entry = LogEntry(number, now, command, newest)
             # From here on nothing may raise.
             if command is not None and answer is not None:
                 self._ids[number] = answer.command_id
@@ -175,7 +175,7 @@ class OperatorSite:
             self._entries = number
         self._inform(lambda listener: listener.commanded(deed))
 
-    def _inform(self, tell: Callable[[Listener], None]) -> None:
+    def _inform(self, tell: Callable[[SiteObserver], None]) -> None:
         """Tell who listens, if anybody does; one that fails hears no more, and what it was told of stands."""
         listener = self.listener
         if listener is None:
@@ -299,7 +299,7 @@ class OperatorSite:
             # Nothing came meanwhile: the link was down, and it may not have heard anything either.
             since = now
         self._of_earlier = since, now
-        if now > since + self._stuck_after(TAKES_UP) + 2.0 * longest:
+        if now > since + self._stuck_after(EPOCH_TIMEOUT) + 2.0 * longest:
             self._give_up("it hears nothing of being resumed, or can't take it up")
 
     def _stuck_after(self, least: float) -> float:
@@ -375,7 +375,7 @@ class OperatorSite:
         return ""
 
 
-def _tell_answer(listener: Listener, *, command_id: int, receipt: Receipt, now: float) -> None:
+def _tell_answer(listener: SiteObserver, *, command_id: int, receipt: Receipt, now: float) -> None:
     listener.answered(command_id, receipt, now=now)
 
 

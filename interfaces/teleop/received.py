@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from interfaces.teleop.messages import Entry
+from interfaces.teleop.messages import LogEntry
 
 WAITING_MOST = 4096
 """Most entries that wait for earlier ones."""
@@ -16,11 +16,11 @@ class ReceivedLog:
     def __init__(self, complete_until: float) -> None:
         self.executed = 0
         self.complete_until = complete_until
-        self._waiting: dict[int, Entry] = {}
+        self._waiting: dict[int, LogEntry] = {}
         self._early: set[int] = set()
         self._claims: deque[tuple[int, float]] = deque(maxlen=WAITING_MOST)
 
-    def due(self, entries: tuple[Entry, ...], *, as_they_come: bool) -> list[Entry]:
+    def due(self, entries: tuple[LogEntry, ...], *, as_they_come: bool) -> list[LogEntry]:
         """Entries to be carried out now, each once."""
         new = [e for e in entries if e.number > self.executed and e.number not in self._early]
         if as_they_come:

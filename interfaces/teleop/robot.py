@@ -20,7 +20,7 @@ import numpy as np
 from interfaces.site import engine_time
 from interfaces.teleop.hosting import lost
 from interfaces.teleop.measured import SampleLog
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from interfaces.teleop.received import ReceivedLog
 from robots.onboard.following import SensorMonitor, Violation, too_far
@@ -84,7 +84,7 @@ class RobotSiteConfig:
             number_in(name, getattr(self, name), low, high)
 
 
-class Reference(NamedTuple):
+class JointReference(NamedTuple):
     """What the body is to follow, (k, n) each."""
 
     q: Array
@@ -245,7 +245,7 @@ class RobotSite:
         )
         self._plays.append((now, self._play))
 
-    def _carry_out(self, entry: Entry, now: float) -> None:
+    def _carry_out(self, entry: LogEntry, now: float) -> None:
         at = entry.at if isinstance(self._play, Playout) else engine_time(self._play_at(now), 0.0)
         self._clock.set(max(at, self._clock.now()))
         newest = self.engine.newest
@@ -305,11 +305,11 @@ class RobotSite:
         earlier = ((began, play.at) for began, play in islice(reversed(self._plays), 1, None))
         return play_of(chain([(since, newest)], earlier), t)
 
-    def reference(self, play: PlayState) -> Reference:
+    def reference(self, play: PlayState) -> JointReference:
         """What the body follows where play is, (k, n) each."""
         p, pace, rate = play.p, play.pace[:, None], play.rate[:, None]
         q, qd, qdd = (self.engine.timeline.sample(p, derivative=k) for k in range(3))
-        return Reference(q, qd * pace, qdd * pace * pace + qd * rate)
+        return JointReference(q, qd * pace, qdd * pace * pace + qd * rate)
 
     def measured(self, q: Array, *, now: float, at: float | None = None) -> bool:
         """Take in measured joints; where one is too far from its reference, the robot stops.

@@ -9,7 +9,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.jobs.messages import Command, Load
+from interfaces.jobs.messages import ListCommand, Load
 from interfaces.jobs.progress import OperatorLoss, Progress
 from robots.onboard.journey import Goal, JourneyState
 
@@ -33,13 +33,13 @@ class Halt:
     reason: str = "somebody stopped the robot"
 
 
-Task: TypeAlias = Go | Halt | Command | Load
+Task: TypeAlias = Go | Halt | ListCommand | Load
 """What is asked of it."""
 
 
 def stops(task: Task) -> bool:
     """Whether a task only stops something: it counts however late it comes."""
-    return isinstance(task, Halt) or task in (Command.PAUSE, Command.ABORT)
+    return isinstance(task, Halt) or task in (ListCommand.PAUSE, ListCommand.ABORT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class TaskReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class SensedPoints:
     """What a robot sees of its surroundings."""
 
     time: float

@@ -11,7 +11,7 @@ from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
 from interfaces.runs.keeper import RunKeeper
 from interfaces.runs.offset import QUANTILE
 from interfaces.runs.twin_run import TwinRun
-from interfaces.runtime.plan import Plan, PlannedMotion, PlannedPayload
+from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
@@ -33,7 +33,7 @@ class Played:
 
     run: TwinRun
     """The record of both twins."""
-    plan: Plan
+    plan: RunPlan
     """What the program made the operator do, for runs under other conditions."""
     error: ValError | None
     """What stopped it; None if nothing did."""
@@ -130,5 +130,5 @@ def play(
         session.lab.schedule(0.0, operator.advance)
         end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or unheard)
     run = session.record(end)
-    plan = Plan(source.name, start, tuple(operator.motions), tuple(operator.payloads))
+    plan = RunPlan(source.name, start, tuple(operator.motions), tuple(operator.payloads))
     return Played(run, plan, player.errors[-1] if player.errors else None)

@@ -12,7 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from interfaces.jobs.values import Arm
+from interfaces.jobs.values import ArmJob
 from vrs.model import Array
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def rehearsed(
     return f"{program}: {found.findings[0].error}" if found.findings else found
 
 
-def lasts(job: Arm, programs: Mapping[str, str] | None = None) -> float | str:
+def lasts(job: ArmJob, programs: Mapping[str, str] | None = None) -> float | str:
     """How long a program takes [s], or why it'd fail: for `dry_run`."""
     found = rehearsed(job.program, job.source, programs)
     return found if isinstance(found, str) else found.end

@@ -28,7 +28,7 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.control import Role
 from interfaces.stream.server import application
-from interfaces.teleop import Reference, RobotHostConfig, RobotSiteConfig
+from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
 from robots import puma560
 from robots.onboard import WatchdogConfig
 
@@ -48,7 +48,7 @@ class Rows:
         assert physics is not None
         feed = physics.feed
 
-        def noted(rows: Reference, first: int, *, placed: bool = False) -> bool:
+        def noted(rows: JointReference, first: int, *, placed: bool = False) -> bool:
             for tick in [tick for tick in self.q if tick >= first]:
                 del self.q[tick]
             for k in range(len(rows.q)):

@@ -20,7 +20,7 @@ from interfaces.messages import Order, Outcome
 from interfaces.ordering import FAILED
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.site import Site
-from interfaces.teleop import Correction, Deed, OperatorSite, Report, RobotSite, Sample
+from interfaces.teleop import CommandRecord, Correction, OperatorSite, Report, RobotSite, Sample
 from robots import puma560
 from vrs import (
     Cancel,
@@ -63,10 +63,10 @@ class Notes:
     """Listens, as a recording does."""
 
     def __init__(self) -> None:
-        self.deeds: list[Deed] = []
+        self.deeds: list[CommandRecord] = []
         self.failure: Exception | None = None
 
-    def commanded(self, deed: Deed) -> None:
+    def commanded(self, deed: CommandRecord) -> None:
         self.deeds.append(deed)
 
     def corrected(self, correction: Correction, truth: Timeline) -> None:

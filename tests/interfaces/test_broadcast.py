@@ -7,7 +7,7 @@ import pytest
 
 from interfaces import Designer, Viewer
 from interfaces.broadcast import RANGES, Broadcaster, ranges, status_of
-from interfaces.messages import Form, FrameStatus, Verdict
+from interfaces.messages import FrameStatus, FrameVerdict, ViewForm
 from tests.interfaces.joined import HOME, MODEL, Joined, constant, to
 from vrs import Engine, ManualClock
 from vrs.errors import InvalidValueError
@@ -15,13 +15,13 @@ from vrs.errors import InvalidValueError
 D_F, D_B = 0.3, 0.2
 
 
-def run(D: float, lead: float, form: Form, ahead: float = 0.0):
+def run(D: float, lead: float, form: ViewForm, ahead: float = 0.0):
     """Ten commands, a half second apart, over constant delays."""
     joined = Joined(D=D)
     joined.site.broadcast(50, lead=lead)
     port = joined.remote(constant(D_F), constant(D_B))
     designer = joined.add(Designer(port))
-    viewer = joined.add(Viewer(port, rate=50, form=form, lead=lead if form is Form.SEGMENTS else 0.0))
+    viewer = joined.add(Viewer(port, rate=50, form=form, lead=lead if form is ViewForm.SEGMENTS else 0.0))
     joined.run(2.0)
     for k in range(10):
         designer.issue(to(k, speed=0.4), now=joined.now, execute_in=ahead)
@@ -33,7 +33,7 @@ def run(D: float, lead: float, form: Form, ahead: float = 0.0):
     return ages, late, viewer, joined
 
 
-@pytest.mark.parametrize("form", list(Form))
+@pytest.mark.parametrize("form", list(ViewForm))
 class TestDelays:
     def test_fig_4_unshifted_clocks(self, form):
         ages, late, _, _ = run(0.0, 0.0, form)
@@ -138,7 +138,7 @@ class TestBroadcaster:
         messages += tick(clock, broadcaster, 2.0)
         newest = messages[-1].verdicts
         falsified = [
-            m for m in messages if status_of(m.frame.number, newest) == Verdict(m.frame.number, "falsified", 1)
+            m for m in messages if status_of(m.frame.number, newest) == FrameVerdict(m.frame.number, "falsified", 1)
         ]
         assert [m.frame.t for m in falsified] == [m.frame.t for m in messages[:51] if m.frame.t > 1.2 + 1e-4]
         assert r.command_id == 1
@@ -164,7 +164,7 @@ class TestBroadcaster:
 
     def test_ranges(self):
         def by(*pairs):
-            return [Verdict(number, FrameStatus.FALSIFIED, command) for number, command in pairs]
+            return [FrameVerdict(number, FrameStatus.FALSIFIED, command) for number, command in pairs]
 
         assert ranges(by((4, 1), (3, 1), (5, 2), (9, 2))) == (((3, 4, 1), (5, 5, 2), (9, 9, 2)), 0)
         many, left_out = ranges(by(*((2 * k, k) for k in range(1, 101))))
@@ -186,7 +186,7 @@ class TestBroadcaster:
         joined = Joined()
         for rate in (10, 30, 60):
             joined.site.broadcast(rate)
-        viewers = [joined.add(Viewer(joined.local(), rate=rate, form=Form.FRAMES)) for rate in (5, 26, 1000)]
+        viewers = [joined.add(Viewer(joined.local(), rate=rate, form=ViewForm.FRAMES)) for rate in (5, 26, 1000)]
         joined.run(1.0)
         assert [viewer.scene.rate for viewer in viewers] == [10, 30, 60]
         assert np.abs(viewers[2].history[-1].q - joined.engine.joints()).max() == 0

@@ -13,7 +13,7 @@ from interfaces.runtime.physics_messages import FaultKind, Measurement
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.teleop import Reference, RobotSiteConfig
+from interfaces.teleop import JointReference, RobotSiteConfig
 from interfaces.teleop.messages import Report
 from robots.onboard import FollowingAbort, SensorFault, StopReason, WatchdogConfig, WatchdogState
 from tests.interfaces.test_host import READY, STEP, Ends, to
@@ -113,7 +113,7 @@ def test_a_sensor_that_sees_again_lets_the_arm_go_on() -> None:
     q = np.array(fault.rest)
     away = q + 0.1 * (1 - np.cos(np.linspace(0, np.pi, 500)))[:, None]
     qd = np.gradient(away, TICK, axis=0)
-    way = Reference(away, qd, np.gradient(qd, TICK, axis=0))
+    way = JointReference(away, qd, np.gradient(qd, TICK, axis=0))
     bench.loop.receive(rows(way, timeline_start, run=1))
     bench.run(TICK * (timeline_start + 400))
     assert len(bench.faults) == 1

@@ -11,7 +11,7 @@ from interfaces.runtime.feeder import Feeder
 from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import TickLoop
-from interfaces.teleop import OperatorSite, Orders, Reference, RobotHost, RobotHostConfig, RobotLine
+from interfaces.teleop import JointReference, OperatorSite, Orders, RobotHost, RobotHostConfig, RobotLine
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
 from vrs import JointTarget, MotionCommand
 
@@ -35,7 +35,7 @@ class Site:
         self.told: list[Rows] = []
         self.news: list[News] = []
 
-    def feed(self, reference: Reference, start: int, *, placed: bool = False) -> bool:
+    def feed(self, reference: JointReference, start: int, *, placed: bool = False) -> bool:
         self.told.append(Rows(0, start, placed, np.stack(reference, axis=1).tobytes()))
         return True
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from interfaces.runtime.merging import ASTRAY, BEGIN, Merging
+from interfaces.runtime.merging import ASTRAY, BEGIN, ReferenceBlending
 from vrs.model import Array, Limits
 
 TICK = 0.001
@@ -23,7 +23,7 @@ def row(q: float, qd: float = 0.0, qdd: float = 0.0) -> Array:
 
 def went(q: float, qd: float, references: Sequence[Array]) -> Array:
     """Positions and speeds tick by tick, (k, 2)."""
-    merging, found = Merging(LIMITS, TICK), []
+    merging, found = ReferenceBlending(LIMITS, TICK), []
     for reference in references:
         ((q,), (qd,)) = merging.step((q,), (qd,), reference)
         found.append((q, qd))
@@ -32,7 +32,7 @@ def went(q: float, qd: float, references: Sequence[Array]) -> Array:
 
 @pytest.mark.parametrize(("begun", "span"), [(False, BEGIN), (True, ASTRAY)])
 def test_what_has_been_one_motion_until_lately_is_near(begun: bool, span: float) -> None:
-    merging, far = Merging(LIMITS, TICK), ACCELERATION * span**2
+    merging, far = ReferenceBlending(LIMITS, TICK), ACCELERATION * span**2
     for sign in (1.0, -1.0):
         assert merging.near((0.0,), (0.0,), row(sign * 0.99 * far), begun=begun)
         assert not merging.near((0.0,), (0.0,), row(sign * 1.01 * far), begun=begun)
@@ -53,7 +53,7 @@ def test_a_joint_comes_to_rest_before_its_end_whatever_it_is_to_follow(sign: flo
 
 
 def test_where_the_references_need_all_of_the_acceleration_it_waits() -> None:
-    merging = Merging(LIMITS, TICK)
+    merging = ReferenceBlending(LIMITS, TICK)
     for ahead in (0.01, -0.01):
         for taken, waits in ((0.0, False), (1.0, True), (-1.0, False)):
             turning = np.sign(ahead) * taken * ACCELERATION
@@ -67,5 +67,5 @@ def test_it_comes_onto_references_that_stand_and_onto_those_that_move() -> None:
         references = [row(speed * TICK * k, speed) for k in range(1, 2000)]
         path = went(0.02, speed, references)
         assert path[-1] == pytest.approx([speed * TICK * 1999, speed], abs=1e-9)
-        assert Merging(LIMITS, TICK).there(path[-2, :1], path[-2, 1:], references[-1])
-        assert not Merging(LIMITS, TICK).there((0.02,), (speed,), references[0])
+        assert ReferenceBlending(LIMITS, TICK).there(path[-2, :1], path[-2, 1:], references[-1])
+        assert not ReferenceBlending(LIMITS, TICK).there((0.02,), (speed,), references[0])

@@ -10,7 +10,18 @@ from pathlib import Path
 import pytest
 
 from interfaces import connect_mobile
-from interfaces.jobs import Arm, Command, Forecast, JobFile, JobList, Move, OperatorLoss, RunnerConfig, Stage, Wait
+from interfaces.jobs import (
+    ArmJob,
+    Forecast,
+    JobFile,
+    JobList,
+    JobStage,
+    ListCommand,
+    MoveJob,
+    OperatorLoss,
+    RunnerConfig,
+    WaitJob,
+)
 from interfaces.link import LinkConditions
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
@@ -100,17 +111,17 @@ def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss)
                     assert robot.tasks is not None
                     assert robot.tasks.journey is JourneyState.ENDED
                     assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
-                assert isinstance(robot.load(JobList.of(Move(THERE), Wait())), Tasks)
+                assert isinstance(robot.load(JobList.of(MoveJob(THERE), WaitJob())), Tasks)
                 assert isinstance(robot.dry_run(), Forecast)
-                assert isinstance(robot.do(Command.KEY), Problem)
-                assert isinstance(robot.do(Command.RUN), Tasks)
+                assert isinstance(robot.do(ListCommand.KEY), Problem)
+                assert isinstance(robot.do(ListCommand.RUN), Tasks)
                 assert watcher.wait(lambda it: it.tasks is not None and it.tasks.left > 0, 20.0)
                 assert watcher.tasks is not None
                 assert watcher.tasks.loss is loss
             # The driver has gone, in the middle of the move.
             if loss is OperatorLoss.STOP:
                 assert watcher.wait(
-                    lambda it: it.tasks is not None and it.tasks.progress.stage is Stage.PAUSED, 20.0
+                    lambda it: it.tasks is not None and it.tasks.progress.stage is JobStage.PAUSED, 20.0
                 )
             else:
                 assert watcher.wait(
@@ -120,15 +131,15 @@ def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss)
                 assert watcher.plan is not None
                 # Whoever has control next takes it up.
                 controlled(watcher)
-                assert isinstance(watcher.do(Command.KEY), Tasks)
+                assert isinstance(watcher.do(ListCommand.KEY), Tasks)
             assert watcher.finished(20.0)
             assert watcher.postures is not None
             assert watcher.postures.real is not None
             off = abs(watcher.postures.real.x - THERE.x)
             assert off < 0.05 if loss is OperatorLoss.CARRY_ON else off > 0.1
         jobs, progress = JobFile(tmp_path / "jobs.json").load()
-        assert jobs.entries == JobList.of(Move(THERE), Wait()).entries
-        assert progress.stage is (Stage.PAUSED if loss is OperatorLoss.STOP else Stage.DONE)
+        assert jobs.entries == JobList.of(MoveJob(THERE), WaitJob()).entries
+        assert progress.stage is (JobStage.PAUSED if loss is OperatorLoss.STOP else JobStage.DONE)
 
 
 def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> None:
@@ -138,9 +149,9 @@ def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> Non
         met(f"http://{serving.address}", "driver") as robot,
     ):
         controlled(robot)
-        assert isinstance(robot.load(JobList.of(Arm("wave", wave))), Tasks)
-        assert isinstance(robot.do(Command.RUN), Tasks)
-        assert robot.wait(lambda it: it.tasks is not None and it.tasks.progress.stage is Stage.DONE, 30.0)
+        assert isinstance(robot.load(JobList.of(ArmJob("wave", wave))), Tasks)
+        assert isinstance(robot.do(ListCommand.RUN), Tasks)
+        assert robot.wait(lambda it: it.tasks is not None and it.tasks.progress.stage is JobStage.DONE, 30.0)
 
 
 def test_an_arm_is_no_mobile_robot() -> None:

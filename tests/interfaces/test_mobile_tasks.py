@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.jobs import Command, JobFile, JobList, Load, Message, Move, Stage, Voice, Wait
+from interfaces.jobs import JobFile, JobList, JobStage, ListCommand, Load, MessageJob, MoveJob, VoiceJob, WaitJob
 from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
 from interfaces.stream.session import News
@@ -20,7 +20,9 @@ from robots.onboard.journey import Goal
 from tests.interfaces.teleop.driving.rig import MODEL, Rig
 
 ROOM = Room("Test", 8.0, 6.0, places=(Place("A", 1.0, 2.0, 0.5), Place("B", 2.5, 3.0)), via=((2.0, 2.0),))
-JOBS = JobList.of(Voice("Hello!"), Move("B"), Wait(), places={"B": Goal(2.5, 3.0), "A": Goal(1.0, 2.0, 0.5)})
+JOBS = JobList.of(
+    VoiceJob("Hello!"), MoveJob("B"), WaitJob(), places={"B": Goal(2.5, 3.0), "A": Goal(1.0, 2.0, 0.5)}
+)
 
 
 class Office:
@@ -35,7 +37,7 @@ class Office:
     def run(self, seconds: float) -> None:
         self.rig.run(seconds, lambda _: self.desk.turn())
 
-    def order(self, wanted: Go | Load | Command | Trial) -> str:
+    def order(self, wanted: Go | Load | ListCommand | Trial) -> str:
         return self.desk.order(wanted, now=self.rig.now)
 
     @property
@@ -56,21 +58,21 @@ def test_a_list_is_done_and_saved_at_each_step(tmp_path: Path) -> None:
     path = tmp_path / "jobs.json"
     office = Office(path)
     office.rig.begin()
-    assert "no job" in office.order(Command.RUN)
+    assert "no job" in office.order(ListCommand.RUN)
     assert office.order(Load(JOBS)) == ""
     assert JobFile(path).load()[0] == JOBS
-    assert office.order(Command.RUN) == ""
+    assert office.order(ListCommand.RUN) == ""
     office.run(1.5)
-    assert office.desk.progress.jobs[1].stage is Stage.RUNNING
+    assert office.desk.progress.jobs[1].stage is JobStage.RUNNING
     assert JobFile(path).load()[1] == office.desk.progress
     assert "pause or abort" in office.order(Load(JOBS.removed(3)))
-    assert "being done" in office.order(Command.RUN)
+    assert "being done" in office.order(ListCommand.RUN)
     office.run(20.0)
     assert office.tasks.doing is Doing.JOBS
-    assert "isn't being done" not in office.order(Command.KEY)
+    assert "isn't being done" not in office.order(ListCommand.KEY)
     office.run(1.0)
-    assert office.tasks.progress.stage is Stage.DONE
-    assert JobFile(path).load()[1].stage is Stage.DONE
+    assert office.tasks.progress.stage is JobStage.DONE
+    assert JobFile(path).load()[1].stage is JobStage.DONE
     count = len(office.told)
     office.run(3.0)
     assert len(office.told) == count, "nothing new is told"
@@ -81,19 +83,19 @@ def test_a_station_that_is_started_anew_has_the_list_and_goes_on_with_it(tmp_pat
     office = Office(path)
     office.rig.begin()
     office.order(Load(JOBS))
-    office.order(Command.RUN)
+    office.order(ListCommand.RUN)
     office.run(2.5)
-    assert office.desk.progress.jobs[1].stage is Stage.RUNNING
+    assert office.desk.progress.jobs[1].stage is JobStage.RUNNING
     again = Office(path)
     assert again.desk.jobs == JOBS
-    assert again.desk.progress.stage is Stage.PAUSED
+    assert again.desk.progress.stage is JobStage.PAUSED
     assert "anew" in again.desk.progress.reason
     again.rig.begin()
     again.run(1.0)
     assert again.tasks.doing is Doing.NOTHING
-    assert again.order(Command.RESUME) == ""
+    assert again.order(ListCommand.RESUME) == ""
     again.run(1.0)
-    assert [job.stage for job in again.desk.progress.jobs] == [Stage.DONE, Stage.RUNNING, Stage.PLANNED]
+    assert [job.stage for job in again.desk.progress.jobs] == [JobStage.DONE, JobStage.RUNNING, JobStage.PLANNED]
 
 
 def test_a_damaged_file_is_told_of_and_kept(tmp_path: Path) -> None:
@@ -108,7 +110,7 @@ def test_a_damaged_file_is_told_of_and_kept(tmp_path: Path) -> None:
 
 
 def test_a_list_that_is_too_long_for_the_link_is_refused() -> None:
-    assert Office().order(Load(JobList.of(*[Message("x" * 400)] * 64))) == TOO_LONG
+    assert Office().order(Load(JobList.of(*[MessageJob("x" * 400)] * 64))) == TOO_LONG
 
 
 def test_an_aborted_list_can_be_aborted_after_a_restart_too(tmp_path: Path) -> None:
@@ -116,13 +118,13 @@ def test_an_aborted_list_can_be_aborted_after_a_restart_too(tmp_path: Path) -> N
     office = Office(path)
     office.rig.begin()
     office.order(Load(JOBS))
-    office.order(Command.RUN)
+    office.order(ListCommand.RUN)
     office.run(2.5)
     again = Office(path)
     again.rig.begin()
-    assert again.order(Command.ABORT) == ""
+    assert again.order(ListCommand.ABORT) == ""
     again.run(1.0)
-    assert again.desk.progress.stage is Stage.ABORTED
+    assert again.desk.progress.stage is JobStage.ABORTED
     assert again.desk.jobs == JOBS
 
 
@@ -146,7 +148,7 @@ def test_a_dry_run_says_how_long_it_takes_and_what_would_fail() -> None:
     assert 3.6 < move.lasts < 12.0
     assert move.begins == voice.lasts
     assert wait.lasts is None
-    failing = asyncio.run(tried(JobList.of(Move(Goal(-3.0, 0.0)), Wait(1.0)))).forecast
+    failing = asyncio.run(tried(JobList.of(MoveJob(Goal(-3.0, 0.0)), WaitJob(1.0)))).forecast
     assert failing is not None
     assert "can't turn" in failing.problem
     assert len(failing.jobs) == 1

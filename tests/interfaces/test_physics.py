@@ -17,21 +17,21 @@ import numpy as np
 import pytest
 
 from interfaces.runtime.bodies import simulated_puma
-from interfaces.runtime.physics import Ended, Event, PhysicsConfig, PhysicsProcess, References, Silent
+from interfaces.runtime.physics import Event, PhysicsConfig, PhysicsProcess, ProcessEnded, References, Silent
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     BodyKind,
-    Doing,
     Fault,
     FaultKind,
     Measurement,
-    Ready,
-    Setup,
+    PhysicsActivity,
+    PhysicsReady,
+    PhysicsSetup,
     TickCounts,
     decode_news,
 )
 from interfaces.runtime.physics_process import _Parent, tick_body
-from interfaces.teleop import Reference, RobotSite
+from interfaces.teleop import JointReference, RobotSite
 from tests.interfaces.test_teleop import laboratory
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing
 from vrs import Engine, JointTarget, MotionCommand, Timeline, WallClock
@@ -46,7 +46,7 @@ def motion_from(q: Array, target: Array | None = None) -> Timeline:
     return engine.timeline
 
 
-def foreseen(site: RobotSite) -> Callable[[Array], Reference]:
+def foreseen(site: RobotSite) -> Callable[[Array], JointReference]:
     return lambda t: site.reference(site.foreseen(t))
 
 
@@ -112,7 +112,11 @@ def test_a_process_follows_is_paused_and_follows_again(clock: WallClock) -> None
     timeline = motion()
     with PhysicsProcess(configured(every=1), clock) as physics:
         assert not physics.feed(standing(NOMINAL), 1)
-        ready = next(e for e in wait(physics, clock, lambda e: isinstance(e, Ready), 30.0) if isinstance(e, Ready))
+        ready = next(
+            e
+            for e in wait(physics, clock, lambda e: isinstance(e, PhysicsReady), 30.0)
+            if isinstance(e, PhysicsReady)
+        )
         first = ready.tick + 300
         for low in range(0, 4000, 1000):
             assert physics.feed(sampled(timeline, low, 1000), first + low)
@@ -128,7 +132,9 @@ def test_a_process_follows_is_paused_and_follows_again(clock: WallClock) -> None
             select.select([], [], [], 0.8)
         finally:
             os.kill(physics.pid, signal.SIGCONT)
-        events += wait(physics, clock, lambda e: isinstance(e, Measurement) and e.doing is Doing.HOLDING, 5.0)
+        events += wait(
+            physics, clock, lambda e: isinstance(e, Measurement) and e.doing is PhysicsActivity.HOLDING, 5.0
+        )
         (fault,) = (e for e in events if isinstance(e, Fault))
         assert fault.kind is FaultKind.PAUSED
         stopped = [e for e in events if isinstance(e, Measurement)]
@@ -150,7 +156,9 @@ def test_a_process_follows_is_paused_and_follows_again(clock: WallClock) -> None
 
         # Rows that end in mid-motion, as if this process stood still.
         assert physics.feed(sampled(motion_from(np.array(last.q)), 0, 150), last.tick + 200)
-        events = wait(physics, clock, lambda e: isinstance(e, Measurement) and e.doing is Doing.HOLDING, 5.0)
+        events = wait(
+            physics, clock, lambda e: isinstance(e, Measurement) and e.doing is PhysicsActivity.HOLDING, 5.0
+        )
         (fault,) = (e for e in events if isinstance(e, Fault))
         assert (fault.kind, fault.number, fault.tick) == (FaultKind.STARVED, 2, last.tick + 350)
         pid = physics.pid
@@ -161,8 +169,8 @@ def test_the_end_of_a_process_is_told_and_the_next_can_begin(clock: WallClock) -
     with PhysicsProcess(configured(), clock) as physics:
         wait(physics, clock, lambda e: isinstance(e, Measurement), 30.0)
         os.kill(physics.pid, signal.SIGKILL)
-        events = wait(physics, clock, lambda e: isinstance(e, Ended), 0.2)
-        assert events[-1] == Ended(-signal.SIGKILL)
+        events = wait(physics, clock, lambda e: isinstance(e, ProcessEnded), 0.2)
+        assert events[-1] == ProcessEnded(-signal.SIGKILL)
         assert not physics.feed(standing(NOMINAL), 1)
         assert physics.poll(now=clock.now()) == ()
         assert physics.next_deadline() == np.inf
@@ -214,7 +222,11 @@ def test_the_death_of_the_parent_ends_it() -> None:
 def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) -> None:
     timeline = motion(1)
     with PhysicsProcess(configured(body=BodyKind.PUMA560), clock) as physics:
-        ready = next(e for e in wait(physics, clock, lambda e: isinstance(e, Ready), 60.0) if isinstance(e, Ready))
+        ready = next(
+            e
+            for e in wait(physics, clock, lambda e: isinstance(e, PhysicsReady), 60.0)
+            if isinstance(e, PhysicsReady)
+        )
         with pytest.raises(InvalidValueError, match="mass"):
             physics.attach(-1.0)
         first = ready.tick + 300
@@ -232,7 +244,7 @@ def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) ->
 @pytest.mark.parametrize("friction", [True, False])
 def test_a_puma_has_friction_if_that_is_asked_for(friction: bool) -> None:
     bounds: Any = (tuple(map(tuple, (LIMITS.q_min, LIMITS.q_max, LIMITS.qd_max, LIMITS.qdd_max, LIMITS.qddd_max))),)
-    setup = Setup(BodyKind.PUMA560, friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
+    setup = PhysicsSetup(BodyKind.PUMA560, friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
     with tick_body(setup) as body, simulated_puma(friction=friction)(NOMINAL) as arm:
         for made in (body, arm):
             reality = made._arm.reality  # type: ignore[attr-defined]
@@ -249,9 +261,9 @@ def test_a_fault_waits_until_the_parent_reads_and_measurements_do_not() -> None:
         told, fault = _Parent(theirs, os.getppid()), Fault(1, FaultKind.STARVED, "", 5, (0.0,), 6)
         number = 0
         while not told._unsent and number < 100_000:
-            told.tell([Ready(number, False)])
+            told.tell([PhysicsReady(number, False)])
             number += 1
-        told.tell([fault, Measurement(7, Doing.HOLDING, (0.0,), (0.0,), (), (0.0,), 7, counts)])
+        told.tell([fault, Measurement(7, PhysicsActivity.HOLDING, (0.0,), (0.0,), (), (0.0,), 7, counts)])
         for _ in range(number):
             ours.recv(MESSAGE_MOST)
             told.tell([])
@@ -266,11 +278,11 @@ def test_it_refuses_what_can_not_be_sent(clock: WallClock) -> None:
     with pytest.raises(InvalidValueError, match="every"):
         configured(every=0)
     with PhysicsProcess(configured(), clock) as physics:
-        for bad in (Reference(*(np.zeros((3, 5)),) * 3), standing(NOMINAL, 1001), standing(NOMINAL, 0)):
+        for bad in (JointReference(*(np.zeros((3, 5)),) * 3), standing(NOMINAL, 1001), standing(NOMINAL, 0)):
             with pytest.raises(InvalidValueError, match="reference"):
                 physics.feed(bad, 1)
         with pytest.raises(InvalidValueError, match="reference"):
-            physics.feed(Reference(np.zeros((3, 6)), np.zeros((2, 6)), np.zeros((3, 6))), 1)
+            physics.feed(JointReference(np.zeros((3, 6)), np.zeros((2, 6)), np.zeros((3, 6))), 1)
 
 
 def test_a_site_at_rest_asks_for_one_row() -> None:

@@ -11,7 +11,7 @@ from interfaces.cli.main import app
 from interfaces.lab.driving.operators import operator
 from interfaces.lab.driving.run import run
 from interfaces.plugin import is_own
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Constants, controller
 from robots.onboard.driving import STAND, Posture
 from vrs.errors import FormatError, InvalidValueError
@@ -56,7 +56,7 @@ def test_all_else_isnt(text: str) -> None:
 
 
 def test_parts_of_ones_own_are_run_and_kept_apart_by_their_names(module: str) -> None:
-    drive = run(Case(f"{module}:Still", "datagrams", "none", "bare", f"{module}:Ahead", 3, 5.0))  # type: ignore[arg-type]
+    drive = run(DriveCase(f"{module}:Still", "datagrams", "none", "bare", f"{module}:Ahead", 3, 5.0))  # type: ignore[arg-type]
     assert drive.virtual[-1, 0] > 0.2
     assert abs(drive.real).max() < 1e-9
     assert drive.case.group[0] == f"{module}:Still"

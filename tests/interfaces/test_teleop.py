@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from interfaces import Supervisor
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import Entry, OperatorSite, Orders, RobotSite, RobotSiteConfig
+from interfaces.teleop import LogEntry, OperatorSite, Orders, RobotSite, RobotSiteConfig
 from interfaces.teleop.received import ReceivedLog
 from robots import puma560
 from robots.onboard import WatchdogConfig
@@ -266,7 +266,7 @@ def test_what_is_of_an_old_epoch_is_ignored() -> None:
 
 
 def test_what_waits_for_a_lost_entry_isnt_complete() -> None:
-    first, second, third = (Entry(k, float(k), None, k) for k in (1, 2, 3))
+    first, second, third = (LogEntry(k, float(k), None, k) for k in (1, 2, 3))
     log = ReceivedLog(0.0)
     assert log.due((third,), as_they_come=False) == []
     log.claim(3, 9.0)

@@ -14,21 +14,21 @@ from interfaces.runtime.physics_messages import (
     Attach,
     BodyKind,
     Close,
-    Doing,
     Fault,
     FaultKind,
     Measurement,
     News,
-    Ready,
+    PhysicsActivity,
+    PhysicsReady,
+    PhysicsSetup,
     Rows,
-    Setup,
     decode_news,
     decode_order,
     encode,
 )
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import AHEAD_MOST, PAUSE, TickLoop
-from interfaces.teleop import Reference
+from interfaces.teleop import JointReference
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Status
 from vrs.errors import FormatError, InvalidValueError, VrsError
@@ -36,7 +36,7 @@ from vrs.errors import FormatError, InvalidValueError, VrsError
 QUICK = (Phase.explicit, Phase.reuse, Phase.generate)
 
 
-def rows(reference: Reference, start: int, *, run: int = 0, placed: bool = False) -> Rows:
+def rows(reference: JointReference, start: int, *, run: int = 0, placed: bool = False) -> Rows:
     return Rows(run, start, placed, np.stack(reference, axis=1).tobytes())
 
 
@@ -87,7 +87,7 @@ def test_it_follows_to_the_bit_and_holds_after_a_rest() -> None:
     count = int(timeline.end / TICK) + 2
     reference = sampled(timeline, 1, count)
     for low in range(0, count, 150):
-        bench.loop.receive(rows(Reference(*(part[low : low + 400] for part in reference)), 1 + low))
+        bench.loop.receive(rows(JointReference(*(part[low : low + 400] for part in reference)), 1 + low))
     bench.run(timeline.end + 1.0)
     assert np.array_equal([m.q for m in bench.measured[:count]], reference.q)
     assert np.array_equal([m.q for m in bench.measured[count:]], np.tile(timeline.final(), (998, 1)))
@@ -113,7 +113,7 @@ def test_starved_it_brakes_within_the_limits_and_waits_for_an_acknowledgement(se
         return
     (fault,) = bench.faults
     assert (fault.kind, fault.tick, fault.number) == (FaultKind.STARVED, count + 1, 1)
-    at_rest = next(m for m in bench.measured if m.doing is Doing.HOLDING)
+    at_rest = next(m for m in bench.measured if m.doing is PhysicsActivity.HOLDING)
     assert at_rest.tick == fault.rest_tick
     assert at_rest.q_ref == fault.rest == bench.measured[-1].q_ref
     speed = np.abs(timeline.sample(TICK * count, derivative=1))
@@ -127,7 +127,7 @@ def test_starved_it_brakes_within_the_limits_and_waits_for_an_acknowledgement(se
     again = engine.timeline
     bench.loop.receive(rows(sampled(again, 0, 900), now + 50, run=1))
     bench.run(TICK * (now + 500))
-    assert bench.measured[-1].doing is Doing.FOLLOWING
+    assert bench.measured[-1].doing is PhysicsActivity.FOLLOWING
     assert (
         np.abs(bench.measured[-1].q_ref - again.sample((bench.measured[-1].tick - now - 50) * TICK)).max() < 1e-12
     )
@@ -140,10 +140,10 @@ def test_an_acknowledgement_during_the_stop_counts_when_it_rests() -> None:
     bench.loop.receive(rows(sampled(motion(), 1, 400), 1))
     bench.run(0.41)
     (fault,) = bench.faults
-    assert bench.measured[-1].doing is Doing.BRAKING
+    assert bench.measured[-1].doing is PhysicsActivity.BRAKING
     bench.loop.receive(rows(standing(np.array(fault.rest)), 420, run=1))
     bench.run(2.0)
-    assert bench.measured[-1].doing is Doing.FOLLOWING
+    assert bench.measured[-1].doing is PhysicsActivity.FOLLOWING
     assert bench.measured[-1].q_ref == fault.rest
     assert len(bench.faults) == 1
 
@@ -160,7 +160,7 @@ def test_a_jump_is_not_followed(what: str) -> None:
         q = q + 3.2 * TICK**2 * LIMITS.qdd_max * np.array([0, 1, 0, 0, 0, 0])
     if what == "speed":
         qd = qd + 3.2 * TICK * LIMITS.qdd_max * np.array([0, 0, 0, 1, 0, 0])
-    bench.loop.receive(rows(Reference(q, qd, qdd), 420))
+    bench.loop.receive(rows(JointReference(q, qd, qdd), 420))
     bench.run(3.0)
     (fault,) = bench.faults
     assert (fault.kind, fault.tick) == (FaultKind.JUMPED, 420)
@@ -276,14 +276,14 @@ def test_what_makes_no_sense_brings_it_to_rest() -> None:
     fast = np.array(good.qd)
     fast[99, 1] = 1.1 * LIMITS.qd_max[1]
     for message in (
-        rows(Reference(wrong, good.qd, good.qdd), 420),
-        rows(Reference(good.q, fast, good.qdd), 420),
+        rows(JointReference(wrong, good.qd, good.qdd), 420),
+        rows(JointReference(good.q, fast, good.qdd), 420),
         rows(good, 400 + AHEAD_MOST + 1),
         Rows(0, 420, False, b""),
         Rows(0, 420, False, bytes(143)),
         Rows(0, 420, False, bytes(145)),
         Rows(0, 420, False, bytes(144 * (ROWS_MOST + 1))),
-        Setup(BodyKind.EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
+        PhysicsSetup(BodyKind.EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
         Attach(-1.0),
     ):
         bench = Bench(Picky())
@@ -343,7 +343,7 @@ def test_it_isn_t_placed_where_the_reference_moves() -> None:
     bench = Bench()
     bench.run(0.1)
     q, qd, qdd = standing(NOMINAL + 0.01)
-    bench.loop.receive(rows(Reference(q, qd + 1e-3, qdd), 120, placed=True))
+    bench.loop.receive(rows(JointReference(q, qd + 1e-3, qdd), 120, placed=True))
     bench.run(0.2)
     assert [fault.kind for fault in bench.faults] == [FaultKind.JUMPED]
 
@@ -395,7 +395,7 @@ def test_rows_that_tell_late_of_a_rest_and_of_the_motion_after_it_are_followed_l
     engine.execute(MotionCommand(JointTarget(NOMINAL), None, TICK * begins, 1.0))
     whole = sampled(engine.timeline, 1, begins + 800)
     bench.run(TICK * (begins + late - 1))
-    bench.loop.receive(rows(Reference(*(part[begins - 151 :] for part in whole)), begins - 150))
+    bench.loop.receive(rows(JointReference(*(part[begins - 151 :] for part in whole)), begins - 150))
     bench.run(TICK * (begins + 1000))
     assert bench.faults == []
     bench.check()
@@ -416,4 +416,4 @@ def test_news_that_nobody_takes_stay_few_and_the_fault_is_among_them() -> None:
         bench.loop.advance(now=TICK * k + 1e-5)
     news = bench.loop.take()
     assert len(news) <= 64
-    assert [type(n) for n in news if not isinstance(n, Measurement)] == [Ready, Fault]
+    assert [type(n) for n in news if not isinstance(n, Measurement)] == [PhysicsReady, Fault]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from interfaces import Supervisor, Viewer
 from interfaces.changes import changed, difference
 from interfaces.link import Channel
-from interfaces.messages import Form, FrameStatus
+from interfaces.messages import FrameStatus, ViewForm
 from interfaces.playhead import Mode
 from interfaces.ports import LocalPort, MemoryTransport
 from tests.interfaces.joined import HOME, MODEL, Joined, bad, constant, to
@@ -35,10 +35,10 @@ from vrs import (
 )
 from vrs.errors import InvalidValueError
 
-FORMS = list(Form)
+FORMS = list(ViewForm)
 
 
-def watched(form: Form, delay: float = 0.1, moves: int = 8, **options):
+def watched(form: ViewForm, delay: float = 0.1, moves: int = 8, **options):
     """An arm that moves for a long time, and a viewer across a link."""
     joined = Joined()
     joined.site.broadcast(25)
@@ -171,7 +171,7 @@ class TestPlayBack:
         joined.run(1.0)
         since = joined.now
         done = viewer.go_live(now=joined.now)
-        wait = 0.22 if form is Form.FRAMES else 0.0
+        wait = 0.22 if form is ViewForm.FRAMES else 0.0
         assert done - since == pytest.approx(wait + max(0.5, 1.5 * (back + 1 + wait) / 8), abs=0.01)
         joined.run(done - since + 0.1)
         assert viewer.mode is Mode.LIVE
@@ -185,10 +185,10 @@ class TestPlayBack:
 
     def test_statuses_come_to_be_known_and_are_true(self, form):
         joined = Joined()
-        joined.site.broadcast(25, lead=0.3 if form is Form.FRAMES else 0.0)
+        joined.site.broadcast(25, lead=0.3 if form is ViewForm.FRAMES else 0.0)
         port = joined.remote(constant(0.1), constant(0.1))
         supervisor = joined.add(Supervisor(port))
-        viewer = joined.add(Viewer(port, form=form, lead=0.3 if form is Form.SEGMENTS else 0.0))
+        viewer = joined.add(Viewer(port, form=form, lead=0.3 if form is ViewForm.SEGMENTS else 0.0))
         for k in range(20):
             supervisor.issue(to(k), now=joined.now, execute_in=0.15)
             joined.run(0.4)
@@ -220,7 +220,7 @@ class TestPlayBack:
         for shown in seen:
             assert np.abs(shown.q - joined.engine.joints(shown.t)).max() < 1e-9
             assert shown.status is FrameStatus.CONFIRMED
-        if form is Form.SEGMENTS:
+        if form is ViewForm.SEGMENTS:
             t = np.linspace(-1, joined.engine.timeline.end + 1, 3000)
             assert np.abs(late.timeline.sample(t) - joined.engine.joints(t)).max() < 1e-9
             assert early.timeline == late.timeline
@@ -370,7 +370,7 @@ def test_on_a_slow_way_back_no_queue_grows():
     back = Channel(constant(1.0), rng)
     transport = MemoryTransport(joined.site, Channel(constant(0.1), rng), back, most=5)
     joined.parts.append(transport)
-    viewer = joined.add(Viewer(transport.port, form=Form.FRAMES))
+    viewer = joined.add(Viewer(transport.port, form=ViewForm.FRAMES))
     for _ in range(100):
         joined.run(0.1)
         assert back.in_flight() <= 7
@@ -403,6 +403,6 @@ def test_memory_of_clients_is_bounded():
 
 def test_misuse():
     engine = Engine(MODEL, clock=ManualClock(0.0))
-    for options in ({"rate": 0}, {"lead": 1.0, "form": Form.FRAMES}, {"lead": np.nan}, {"resend": 0.0}):
+    for options in ({"rate": 0}, {"lead": 1.0, "form": ViewForm.FRAMES}, {"lead": np.nan}, {"resend": 0.0}):
         with pytest.raises(InvalidValueError):
             Viewer(engine, **options)

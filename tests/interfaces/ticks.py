@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from interfaces.teleop import Reference
+from interfaces.teleop import JointReference
 from robots import puma560
 from vrs import Engine, Insertion, JointTarget, MotionCommand, Timeline
 from vrs.model import Array
@@ -27,11 +27,11 @@ def motion(seed: int = 0) -> Timeline:
     return engine.timeline
 
 
-def sampled(timeline: Timeline, first: int, count: int, late: float = 0.0) -> Reference:
+def sampled(timeline: Timeline, first: int, count: int, late: float = 0.0) -> JointReference:
     """References for ticks from the first on."""
     t = TICK * np.arange(first, first + count) - late
-    return Reference(*(timeline.sample(t, derivative=k) for k in range(3)))
+    return JointReference(*(timeline.sample(t, derivative=k) for k in range(3)))
 
 
-def standing(q: Array, count: int = 1) -> Reference:
-    return Reference(np.tile(q, (count, 1)), np.zeros((count, 6)), np.zeros((count, 6)))
+def standing(q: Array, count: int = 1) -> JointReference:
+    return JointReference(np.tile(q, (count, 1)), np.zeros((count, 6)), np.zeros((count, 6)))

@@ -12,7 +12,7 @@ from interfaces.broadcast import Broadcaster
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, target
 from interfaces.lab.drawing import REAL, VIRTUAL, draw
-from interfaces.messages import Broadcast, Form, Reply
+from interfaces.messages import Broadcast, Reply, ViewForm
 from interfaces.ports import RemotePort
 from vrs import Engine, ManualClock, MotionCommand, WallClock
 
@@ -54,7 +54,7 @@ def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one cas
     for rate in RATES:
         for _ in range(VIEWERS):
             port = joined.connect(DELAY, DELAY)
-            joined.add(Viewer(port, rate=rate, form=Form.FRAMES))
+            joined.add(Viewer(port, rate=rate, form=ViewForm.FRAMES))
             taps[rate].append(Arrivals(port))
     designer = Designer(joined.connect(DELAY, DELAY))
     joined.add(designer)

@@ -11,7 +11,7 @@ from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import ScriptedSite, arrivals, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
-from interfaces.messages import Broadcast, Form, FrameStatus, Outcome, Reply
+from interfaces.messages import Broadcast, FrameStatus, Outcome, Reply, ViewForm
 from interfaces.ports import RemotePort
 from vrs import MotionCommand
 from vrs.checks import one_of
@@ -112,7 +112,7 @@ def run(setting: OffsetSetting, seed: int, length: float) -> tuple[DelayResult, 
     joined = ScriptedSite(setting.D)
     broadcaster = joined.site.broadcast(RATE, lead=setting.lead)
     port = joined.connect(D_F, D_B)
-    designer, viewer = Designer(port), Viewer(port, rate=RATE, form=Form.FRAMES)
+    designer, viewer = Designer(port), Viewer(port, rate=RATE, form=ViewForm.FRAMES)
     tap = Tap(port)
     joined.add(designer)
     joined.add(viewer)

@@ -11,9 +11,9 @@ from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.messages import Form
+from interfaces.messages import ViewForm
 from interfaces.playhead import FASTEST, QUICKEST, Mode
-from interfaces.site import Part
+from interfaces.site import SitePart
 from vrs import JointTarget, MotionCommand, Timeline
 from vrs.commands import Cancel, Command, InsertVia, Resume, Retime, ScaleTime, Stop
 
@@ -42,11 +42,11 @@ class InteractiveSession:
         port = self.joined.connect(D_F, D_B)
         self.designer = Designer(port)
         self.viewers = {
-            Form.SEGMENTS: Viewer(port, rate=RATE, lead=D_F + D_B),
-            Form.FRAMES: Viewer(self.joined.connect(D_F, D_B), rate=RATE, form=Form.FRAMES),
+            ViewForm.SEGMENTS: Viewer(port, rate=RATE, lead=D_F + D_B),
+            ViewForm.FRAMES: Viewer(self.joined.connect(D_F, D_B), rate=RATE, form=ViewForm.FRAMES),
         }
         self.other = Viewer(self.joined.connect(D_F, D_B), rate=RATE)
-        clients: tuple[Part, ...] = (self.designer, *self.viewers.values(), self.other)
+        clients: tuple[SitePart, ...] = (self.designer, *self.viewers.values(), self.other)
         for client in clients:
             self.joined.add(client)
         self.joined.run(1.0)
@@ -59,7 +59,7 @@ class InteractiveSession:
     @property
     def known(self) -> Timeline:
         """The committed path, as the viewer of segments has it."""
-        timeline = self.viewers[Form.SEGMENTS].timeline
+        timeline = self.viewers[ViewForm.SEGMENTS].timeline
         assert timeline is not None
         return timeline
 
@@ -108,7 +108,7 @@ def edits(rng: np.random.Generator) -> dict[str, float]:
 class Scrubbed(NamedTuple):
     """One who goes through time while the robot moves."""
 
-    seek: dict[Form, float]
+    seek: dict[ViewForm, float]
     """From a jump to the first frame of that time [s]."""
     dragged: float
     """How far the place of one who paused in the past moved while commands came [s]."""
@@ -139,7 +139,7 @@ def scrub(rng: np.random.Generator) -> Scrubbed:
             if viewer.history and abs(viewer.history[-1].t - back) <= 0.5 / RATE:
                 seek[form] = viewer.history[-1].shown_at - asked
                 break
-    viewer = session.viewers[Form.SEGMENTS]
+    viewer = session.viewers[ViewForm.SEGMENTS]
     for _ in range(3):
         session.move(rng, 0.0)
         session.joined.run(session.now + 0.5)
@@ -211,15 +211,15 @@ def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one cas
             "a jump to another time, segments: first frame of it after [s]",
             SOURCE,
             f"≤ {period:g}, a frame",
-            seen.seek[Form.SEGMENTS],
-            seen.seek[Form.SEGMENTS] <= period + OVER,
+            seen.seek[ViewForm.SEGMENTS],
+            seen.seek[ViewForm.SEGMENTS] <= period + OVER,
         ),
         Claim(
             "a jump to another time, frames: first frame of it after [s]",
             SOURCE,
             f"≤ {path + 2 * period:g}, a round trip and two frames",
-            seen.seek[Form.FRAMES],
-            seen.seek[Form.FRAMES] <= path + 2 * period + OVER,
+            seen.seek[ViewForm.FRAMES],
+            seen.seek[ViewForm.FRAMES] <= path + 2 * period + OVER,
         ),
         Claim(
             "who paused in the past isn't dragged to live by commands: moved by [s]",

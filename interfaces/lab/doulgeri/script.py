@@ -9,8 +9,8 @@ import numpy as np
 from interfaces.link import Channel, ConstantDelay
 from interfaces.ports import MemoryTransport, RemotePort
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.site import Part, Site, drive
-from interfaces.teleop import Reference
+from interfaces.site import Site, SitePart, drive
+from interfaces.teleop import JointReference
 from robots import puma560
 from robots.onboard.playout import PlayState
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
@@ -94,7 +94,7 @@ class ScriptedSite:
         self.site = Site(Engine(MODEL, q=q, clock=ManualClock(D)), D=D)
         self.engine = self.site.engine
         self.now = 0.0
-        self._parts: list[Part] = [self.site]
+        self._parts: list[SitePart] = [self.site]
 
     def connect(self, there: float, back: float) -> RemotePort:
         """A port to the site over a link with constant delays [s]."""
@@ -104,7 +104,7 @@ class ScriptedSite:
         self._parts.append(transport)
         return transport.port
 
-    def add(self, client: Part) -> None:
+    def add(self, client: SitePart) -> None:
         """Drive a client too."""
         self._parts.append(client)
 
@@ -113,7 +113,7 @@ class ScriptedSite:
         self.now = drive(self._parts, now=self.now, until=until)
 
 
-def played(lab: Laboratory) -> tuple[PlayState, Reference]:
+def played(lab: Laboratory) -> tuple[PlayState, JointReference]:
     """Where the robot's play was at each tick of a run, and what a body was asked to do, (k, ...)."""
     _, p, pace, rate = lab.play.T
     return PlayState(p, pace, rate), lab.reference

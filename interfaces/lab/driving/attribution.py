@@ -13,7 +13,7 @@ from typing import Final
 
 from interfaces.lab.driving.operators import operator
 from interfaces.lab.driving.run import run
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures.equipment import SENSING
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import place
@@ -38,7 +38,7 @@ class DriveAttribution:
     """With all causes off."""
 
 
-def attributed(case: Case, whole: PathComparison | None = None) -> tuple[DriveAttribution, ...]:
+def attributed(case: DriveCase, whole: PathComparison | None = None) -> tuple[DriveAttribution, ...]:
     """Run a case with ever fewer causes of error.
 
     Args:
@@ -60,7 +60,7 @@ def attributed(case: Case, whole: PathComparison | None = None) -> tuple[DriveAt
     return tuple(made)
 
 
-def _variants(case: Case) -> list[Case]:
+def _variants(case: DriveCase) -> list[DriveCase]:
     prompt = replace(case, delay="none")
     step = 1 / 60 if case.robot == "bare" else 1 / 240
     alike = replace(prompt, reality=MobileReality.ideal(dt=step))

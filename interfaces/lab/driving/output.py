@@ -16,7 +16,7 @@ from interfaces.lab.driving.sweep import Group, grouped, paired
 from interfaces.lab.output import write_files
 from interfaces.lab.statistics import LEVEL, RANGE, Estimate
 from interfaces.runs.drive_row import COLUMNS, KEYS, METRICS, Row, cell, values_of
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -40,7 +40,9 @@ def _estimate(found: Estimate | None) -> dict[str, Any] | None:
     return value if found.level == LEVEL else value | {"level": found.level}
 
 
-def attributions(chosen: Sequence[Case], found: Sequence[tuple[DriveAttribution, ...]]) -> list[dict[str, Any]]:
+def attributions(
+    chosen: Sequence[DriveCase], found: Sequence[tuple[DriveAttribution, ...]]
+) -> list[dict[str, Any]]:
     """What each cause does, means over seeds, an entry a combination and figure, as JSON takes them."""
     groups: dict[tuple[tuple[str, ...], str], list[DriveAttribution]] = {}
     for case, parts in zip(chosen, found, strict=True):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.drawing import BAD, REAL, VIRTUAL, draw, legend
-from interfaces.runs.drive_run import Case, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveRun
 from vrs.comparison import PathMatch
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ MOST = 8
 ACROSS = 3
 
 
-def drawn(chosen: Sequence[Case]) -> list[bool]:
+def drawn(chosen: Sequence[DriveCase]) -> list[bool]:
     """Which cases are drawn: the first run of each composition under the first network.
 
     Args:

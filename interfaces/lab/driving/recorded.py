@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from interfaces.lab.driving.run import run
 from interfaces.runs.drive_row import Row, row_of
-from interfaces.runs.drive_run import Case, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveRun
 
 FOLDER: Final = "runs"
 """Where recordings are, below the results."""
@@ -31,7 +31,7 @@ class Kept(NamedTuple):
     """Why its recording isn't there; empty where it is, or wasn't asked for."""
 
 
-def measure_recorded(case: Case, keep: bool, path: Path | None) -> Kept:
+def measure_recorded(case: DriveCase, keep: bool, path: Path | None) -> Kept:
     """Run a case and keep its figures, all of it if that's to be drawn, and its recording if that has a path."""
     if path is None:
         drive, problem = run(case), ""
@@ -45,7 +45,7 @@ def measure_recorded(case: Case, keep: bool, path: Path | None) -> Kept:
     return Kept(row_of(drive), drive if keep else None, problem)
 
 
-def paths(chosen: Sequence[Case], out: Path) -> list[Path | None]:
+def paths(chosen: Sequence[DriveCase], out: Path) -> list[Path | None]:
     """Where recordings of cases go; of equal cases the first one's is kept."""
     found: list[Path | None] = []
     for case in chosen:
@@ -54,7 +54,7 @@ def paths(chosen: Sequence[Case], out: Path) -> list[Path | None]:
     return found
 
 
-def name_of(case: Case) -> str:
+def name_of(case: DriveCase) -> str:
     """What a case's recording is called: its architecture, transport, delay, robot, operator and seed.
 
     What no file name should have becomes `_`; of what is a file, or too long, its end stays and some digits that

@@ -11,11 +11,11 @@ from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.link import Link
 from interfaces.link.profiles import delay_profile
-from interfaces.runs.drive_run import Case, DriveLink, DriveRun, Witness
+from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.teleop.architectures import (
-    OperatorSite,
-    Player,
-    RobotSite,
+    ArchitectureOperatorSite,
+    ArchitectureRobotSite,
+    TimelineController,
     Transport,
     controller,
 )
@@ -45,7 +45,7 @@ LONGEST_WAIT = 600.0
 """But never longer than this [s]."""
 
 
-def make_robot(case: Case, start: Posture, room: str | Room) -> MobileRobot:
+def make_robot(case: DriveCase, start: Posture, room: str | Room) -> MobileRobot:
     """The real robot of a case."""
     senses = Senses() if case.architecture in SENSING else Senses(sonar=None)
     if case.position == "laser":
@@ -63,7 +63,7 @@ def make_robot(case: Case, start: Posture, room: str | Room) -> MobileRobot:
     return MobileBody(case.robot, start, room=where, reality=case.reality, rng=rng, senses=senses)
 
 
-def run(case: Case, driver: Operator | None = None, witness: Witness | None = None) -> DriveRun:
+def run(case: DriveCase, driver: Operator | None = None, witness: Witness | None = None) -> DriveRun:
     """Run a case; the same case gives the same to the last bit.
 
     Args:
@@ -89,7 +89,7 @@ class _DrivingRun:
     """A run while it goes on."""
 
     def __init__(
-        self, case: Case, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
+        self, case: DriveCase, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
     ) -> None:
         self._case, self._driver, self._link, self._body = case, driver, link, body
         model = ipr.model("micro" if case.robot == "micro" else "ipr", period=case.constants.period)
@@ -97,10 +97,10 @@ class _DrivingRun:
         senses = case.architecture in SENSING
         there = operator_surroundings(body.room, body.chassis, driver.start, model) if senses else None
         here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
-        self._site = OperatorSite(model, driver.start, case.transport, surroundings=there)
+        self._site = ArchitectureOperatorSite(model, driver.start, case.transport, surroundings=there)
         position = POSITIONS[case.position](body)
-        self._robot = RobotSite(made, position, IPR_LIMITS, period=CONTROL, surroundings=here)
-        self._offset = made if isinstance(made, Player) else None
+        self._robot = ArchitectureRobotSite(made, position, IPR_LIMITS, period=CONTROL, surroundings=here)
+        self._offset = made if isinstance(made, TimelineController) else None
         self._waiting = 0
         """Packets on their way that were sent while the operator drove."""
         self._delays: list[tuple[float, float]] = []

@@ -12,7 +12,7 @@ from interfaces.lab.driving.run import run
 from interfaces.lab.pool import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.runs.drive_row import Row, row_of
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 
@@ -22,7 +22,7 @@ EQUAL = 0.10
 """Figures nearer than this share are called equal."""
 
 
-def measure(case: Case) -> Row:
+def measure(case: DriveCase) -> Row:
     """Run a case and keep its figures."""
     return row_of(run(case))
 
@@ -35,10 +35,10 @@ def cases(
     operators: Sequence[str],
     seeds: Iterable[int],
     length: float,
-) -> list[Case]:
+) -> list[DriveCase]:
     """All combinations, the seeds of one group side by side."""
     return [
-        Case(architecture, transport, delay, robot, who, seed, length)
+        DriveCase(architecture, transport, delay, robot, who, seed, length)
         for delay, robot, who, architecture, transport, seed in product(
             delays, robots, operators, architectures, transports, seeds
         )
@@ -46,8 +46,8 @@ def cases(
 
 
 def sweep(
-    chosen: Sequence[Case],
-    work: Callable[[Case], Made],
+    chosen: Sequence[DriveCase],
+    work: Callable[[DriveCase], Made],
     *,
     workers: int = 1,
 ) -> list[Made]:

@@ -20,7 +20,7 @@ from interfaces.lab.driving.pictures import of_drives
 from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
 from interfaces.lab.statistics import Estimate, bootstrap, clustered, median
-from interfaces.runs.drive_run import Case, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import Transport
 from robots.ipr.reality import MobileReality
 from vrs.comparison import PathComparison, summed_up
@@ -85,12 +85,16 @@ def name(architecture: str, transport: Transport) -> str:
     )
 
 
-def case_of(robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float) -> Case:
+def case_of(
+    robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float
+) -> DriveCase:
     """A run of the table."""
     if robot == IDEAL:
         reality = MobileReality.ideal(dt=1 / 60)
-        return Case(architecture, transport, f"{profile}@{TAU}", "bare", seed=seed, length=length, reality=reality)
-    return Case(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
+        return DriveCase(
+            architecture, transport, f"{profile}@{TAU}", "bare", seed=seed, length=length, reality=reality
+        )
+    return DriveCase(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
 
 
 def seen(drive: DriveRun) -> ArchitectureResult:

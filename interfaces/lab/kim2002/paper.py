@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import Stage
+from interfaces.jobs import JobStage
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Paper, PaperPart, Study, Table
 from interfaces.lab.drawing import BAD, INK, MUTED, REAL, draw
 from interfaces.lab.goals.pictures import draw_room
@@ -48,7 +48,7 @@ def conclude(study: Study, measured: tuple[tuple[ScenarioResult, ...], ...]) -> 
     count = partial(_count, total)
     touches = sum(len(one.touched) for one in found)
     claims = (
-        count("runs of {} in which the list was done to its end", [one.stage is Stage.DONE for one in found]),
+        count("runs of {} in which the list was done to its end", [one.stage is JobStage.DONE for one in found]),
         count("runs of {} that asked for move, voice, message, move", [one.asked == ORDER for one in found]),
         count("runs of {} with the message on the screen until the key", [one.shown == PLEASE for one in found]),
         count("runs of {} in which the book arrived on top at A", [one.on_top and _at_a(one) for one in found]),

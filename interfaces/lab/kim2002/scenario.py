@@ -14,24 +14,24 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.jobs import (
-    Command,
     Done,
-    End,
-    Failed,
+    EndJob,
+    JobFailed,
     JobList,
     JobRunner,
+    JobStage,
+    ListCommand,
     Load,
-    Message,
-    Move,
+    MessageJob,
+    MoveJob,
     MoveTo,
     Request,
     RunArm,
     Show,
     SilentSpeaker,
     Speak,
-    Stage,
-    Voice,
-    Wait,
+    VoiceJob,
+    WaitJob,
 )
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
 from robots.bullet.rooms import Person, Room
@@ -50,7 +50,7 @@ HELLO: Final = "Hello!"
 """What is said at B."""
 PLEASE: Final = "Please put the book on my top side!"
 """And shown there."""
-JOBS: Final = (Move("B"), Voice(HELLO), Message(PLEASE), Wait(), Move("A"))
+JOBS: Final = (MoveJob("B"), VoiceJob(HELLO), MessageJob(PLEASE), WaitJob(), MoveJob("A"))
 """The paper's list."""
 OPENS, BROUGHT, KEY = 18.0, 36.0, 40.0
 """When the front door opens, the book is put on top, and the key is pressed [s]."""
@@ -86,7 +86,7 @@ class ScenarioStop:
 class ScenarioResult:
     """What happened."""
 
-    stage: Stage
+    stage: JobStage
     """Of the list at the end."""
     reason: str
     asked: tuple[str, ...]
@@ -167,13 +167,13 @@ class _ScenarioRun:
         while body.time < LONGEST:
             now = body.time
             if not begun and now >= FIRST_LOOK - 1e-9:
-                begun = not runner.receive(Command.RUN, now=now)
+                begun = not runner.receive(ListCommand.RUN, now=now)
             if not brought and now >= BROUGHT and runner.waits_for_key:
                 body.load(self._scenario.book)
                 brought = True
             if not pressed and brought and now >= KEY:
                 self._put, self._shown_at_key = body.cargo[0], self._shown
-                pressed = not runner.receive(Command.KEY, now=now)
+                pressed = not runner.receive(ListCommand.KEY, now=now)
             self._answer(now)
             for request in runner.advance(now=now):
                 self._carry_out(request, now)
@@ -191,7 +191,7 @@ class _ScenarioRun:
             attempt, self._moving = self._moving, 0
             arrived = journey.state is JourneyState.ARRIVED
             self._stops.append(self._stop(journey.goal))
-            self._runner.receive(Done(attempt) if arrived else Failed(attempt, journey.reason), now=now)
+            self._runner.receive(Done(attempt) if arrived else JobFailed(attempt, journey.reason), now=now)
         if self._speaking and not self._speaker.is_speaking(now=now):
             attempt, self._speaking = self._speaking, 0
             self._runner.receive(Done(attempt), now=now)
@@ -210,11 +210,11 @@ class _ScenarioRun:
             case Show(text):
                 self._asked.append(f"MESSAGE {text}")
                 self._shown = text
-            case End():
+            case EndJob():
                 self._pilot.journey.end()
                 self._moving = self._speaking = 0
             case RunArm(attempt):
-                self._runner.receive(Failed(attempt, "there's no arm"), now=now)
+                self._runner.receive(JobFailed(attempt, "there's no arm"), now=now)
 
     def _stop(self, goal: Goal | None) -> ScenarioStop:
         assert goal is not None

@@ -21,7 +21,7 @@ from interfaces.link.losses import loss_model
 from interfaces.link.profiles import delay_profile
 from interfaces.rsp.model import RobotModel, read_model
 from interfaces.rsp.schemes import scheme
-from interfaces.rsp.schemes.ends import LocalEnd, Rims, RobotEnd, Seen
+from interfaces.rsp.schemes.ends import LocalEnd, ReportedPosition, Rims, RobotEnd
 from interfaces.rsp.schemes.scheme import SchemeConfig
 from robots.cubo import parameters as p
 from robots.ipr.bare import BareBody
@@ -145,7 +145,7 @@ class PathLeader:
         self._at = 0
         self._reach = round(3 * RECOVERY / (SPEED * TICK))
 
-    def rims(self, seen: Seen) -> Rims:
+    def rims(self, seen: ReportedPosition) -> Rims:
         """What the wheels are to do [mm/s], from where the robot was seen."""
         near = self._path[self._at : self._at + self._reach] - (seen.x, seen.y)
         self._at += int(np.einsum("ij,ij->i", near, near).argmin())
@@ -248,7 +248,7 @@ class _FollowingRun:
         if robot.stamp is not None:
             self._ages.append(now - robot.stamp)
         posture = self._position.posture()
-        robot.measure(Seen(*posture))
+        robot.measure(ReportedPosition(*posture))
         for data in robot.to_send(now=now):
             self._up += len(data)
             link.backward.send(data, now, len(data) + self._header)

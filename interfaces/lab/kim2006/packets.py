@@ -11,8 +11,8 @@ from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
 from interfaces.lab.drawing import GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.kim2006.following import cubo_model
 from interfaces.rsp import header
-from interfaces.rsp.header import Type
-from interfaces.rsp.local import LocalConfig, LocalCore, State
+from interfaces.rsp.header import PacketType
+from interfaces.rsp.local import LocalConfig, LocalCore, LocalState
 from interfaces.rsp.period import PeriodConfig
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.security import OVERHEAD, Keyring, Rank
@@ -64,7 +64,7 @@ def perform(length: float, duty: float, *, sealed: bool = False) -> SentPackets:
     lip, speaker = model.index("lip"), model.index("speaker")
     arms = model.index("left_arm"), model.index("right_arm")
     local.open(now=0.0)
-    while local.state is not State.OPEN:
+    while local.state is not LocalState.OPEN:
         _exchange(local, robot, 0.0)
     local.request(model.index("position"), True)
     for index in (lip, *arms):
@@ -89,7 +89,7 @@ def _exchange(local: LocalCore, robot: RobotCore, now: float) -> list[int]:
     """Pass packets both ways at once; returns the sizes of those with devices for the robot."""
     sizes = []
     for data in local.to_send(now=now):
-        if header.decode(data).type is Type.DOWN:
+        if header.decode(data).type is PacketType.DOWN:
             sizes.append(len(data))
         robot.receive(data, b"local", now=now)
     for data, _ in robot.to_send(now=now):

@@ -13,7 +13,7 @@ from interfaces.middleware import (
     Formulation,
     GainNetwork,
     GainScheduler,
-    Middleware,
+    GainSchedulingMiddleware,
     TrainingConfig,
     default_network,
     drive_measure,
@@ -108,9 +108,9 @@ def _constant(drive: Drive) -> Controller:
     return lambda _: drive
 
 
-def behind_a_network(controller: Controller, network: GainNetwork) -> Middleware:
+def behind_a_network(controller: Controller, network: GainNetwork) -> GainSchedulingMiddleware:
     """Return a middleware that has measured ten round trips of 0.21 s or so."""
-    middleware = Middleware(controller, network=network)
+    middleware = GainSchedulingMiddleware(controller, network=network)
     for k in range(10):
         probe = middleware.to_send(now=0.3 * k)
         if probe is not None:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from interfaces.link import Echo, Probe, ProbeConfig, RoundTripEstimator
-from interfaces.middleware import Command, Feedback
+from interfaces.middleware import DriveFeedback, DriveSetpoint
 from robots.onboard.curve import Curve, CurvePoint
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import number_in
@@ -92,7 +92,7 @@ class PredictiveController:
         """Give it if it's due."""
         return self._traffic.to_send(now=now)
 
-    def receive(self, message: Echo | Feedback, *, now: float) -> Command | None:
+    def receive(self, message: Echo | DriveFeedback, *, now: float) -> DriveSetpoint | None:
         """Take what the robot sent; once a period a plan's first drive goes back."""
         if isinstance(message, Echo):
             self._traffic.receive(message, now=now)
@@ -107,7 +107,7 @@ class PredictiveController:
         drive = self._planned(self._carried_on(message.posture, now, tau))
         self._on_the_way.append((now, drive))
         self._sent += 1
-        return Command(self._sent - 1, drive)
+        return DriveSetpoint(self._sent - 1, drive)
 
     def _carried_on(self, posture: Posture, now: float, tau: float) -> Posture:
         """Where the robot will be when what is sent now takes effect: what was sent since then moves it."""

@@ -16,10 +16,10 @@ from interfaces.link.delay import CORRELATION_TIME
 from interfaces.middleware import (
     ActionAgent,
     ActionAgentConfig,
-    Command,
     Controller,
-    Feedback,
-    Middleware,
+    DriveFeedback,
+    DriveSetpoint,
+    GainSchedulingMiddleware,
     MiddlewareConfig,
     default_network,
 )
@@ -86,7 +86,7 @@ class Agent(Protocol):
     def to_send(self, *, now: float) -> Probe | None:
         """A probe that is due."""
 
-    def receive(self, message: Echo | Feedback, *, now: float) -> Command | None:
+    def receive(self, message: Echo | DriveFeedback, *, now: float) -> DriveSetpoint | None:
         """Take what the robot sent."""
 
 
@@ -154,13 +154,15 @@ def agent(control: NetworkControl, curve: Curve, setting: NetworkRunSetting, rob
     return behind(control, QuadraticCurveTracker(curve, setting.tracker).control, setting.middleware)
 
 
-def behind(control: NetworkControl, controller: Controller, config: MiddlewareConfig) -> Middleware:
+def behind(control: NetworkControl, controller: Controller, config: MiddlewareConfig) -> GainSchedulingMiddleware:
     """Put a controller behind the middleware; or, directly on the network, before one that does nothing."""
     if control is NetworkControl.DIRECT:
-        return Middleware(
+        return GainSchedulingMiddleware(
             controller, MiddlewareConfig(config.epsilon, config.probing, predicts=False, schedules=False)
         )
-    return Middleware(controller, config, network=default_network() if control is NetworkControl.NETWORK else None)
+    return GainSchedulingMiddleware(
+        controller, config, network=default_network() if control is NetworkControl.NETWORK else None
+    )
 
 
 def make_robot(kind: str, start: tuple[float, float, float], period: float, seed: int) -> tuple[MobileRobot, int]:
@@ -226,8 +228,8 @@ class _NetworkRun:
     ) -> None:
         self._curve, self._driver = curve, driver
         there, back = rng.spawn(2)
-        self._there: Channel[Command | Probe] = Channel(Conditions(delay=delay), there)
-        self._back: Channel[Feedback | Echo] = Channel(Conditions(delay=delay), back)
+        self._there: Channel[DriveSetpoint | Probe] = Channel(Conditions(delay=delay), there)
+        self._back: Channel[DriveFeedback | Echo] = Channel(Conditions(delay=delay), back)
         self._body, self._steps = body, steps
         self._limits = body.limits
         self._setting = setting

@@ -13,11 +13,11 @@ import numpy as np
 from interfaces.link.channel import Channel
 from interfaces.link.conditions import LinkConditions, Service
 from interfaces.link.packets import Totals
-from interfaces.link.path import Path
+from interfaces.link.path import LinkPath
 from interfaces.link.proxy.address import Address
-from interfaces.link.proxy.tcp import TcpProxy, Way
+from interfaces.link.proxy.tcp import ProxyDirection, TcpProxy
 from interfaces.link.proxy.udp import Parcel, UdpProxy
-from interfaces.timer import Lateness
+from interfaces.timer import TimerLateness
 from vrs.checks import integer_in, number_in
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError
@@ -68,12 +68,12 @@ class Proxy:
         there, back, spare = rng.spawn(3)
         self._settings, self._clock, self._spare = settings, clock, spare
         conditions = settings.conditions
-        self._paths = (Path(conditions.forward, there), Path(conditions.backward, back))
+        self._paths = (LinkPath(conditions.forward, there), LinkPath(conditions.backward, back))
         self._began = clock.now()
-        self._lateness = Lateness()
+        self._lateness = TimerLateness()
         self._tcp: TcpProxy | None = None
         self._udp: UdpProxy | None = None
-        self._ways: tuple[Way, Way] | None = None
+        self._ways: tuple[ProxyDirection, ProxyDirection] | None = None
         self._channels: tuple[Channel[Parcel], Channel[Parcel]] | None = None
         self.listening = settings.listen
         """Where it really listens, once it has been started."""
@@ -106,7 +106,8 @@ class Proxy:
             self._udp.start()
         if tcp is not None:
             forward, backward = (
-                Way(conditions, path, self._spare) for conditions, path in zip(both, self._paths, strict=True)
+                ProxyDirection(conditions, path, self._spare)
+                for conditions, path in zip(both, self._paths, strict=True)
             )
             self._ways = (forward, backward)
             self._tcp = TcpProxy(target[:2], self._ways, self._clock, self._lateness, settings.most_clients)

@@ -12,9 +12,9 @@ import numpy as np
 
 from interfaces.link.conditions import Conditions, Service
 from interfaces.link.packets import PacketLog
-from interfaces.link.path import Path
+from interfaces.link.path import LinkPath
 from interfaces.link.stream import Stream
-from interfaces.timer import Lateness, Timer
+from interfaces.timer import Timer, TimerLateness
 from vrs.clock import Clock
 
 SEGMENT = 1460
@@ -50,10 +50,10 @@ class TcpCounts:
     most_at_once: int = 0
 
 
-class Way:
+class ProxyDirection:
     """What all connections share in one direction."""
 
-    def __init__(self, conditions: Conditions, path: Path, rng: np.random.Generator) -> None:
+    def __init__(self, conditions: Conditions, path: LinkPath, rng: np.random.Generator) -> None:
         capacity = 2 * (WINDOW_PACKETS + WINDOW_BYTES // SEGMENT)
         self._conditions = replace(conditions, service=Service.IN_ORDER, capacity=capacity)
         self._path, self._rng = path, rng
@@ -76,13 +76,18 @@ class TcpProxy:
     """
 
     def __init__(
-        self, target: tuple[str, int], ways: tuple[Way, Way], clock: Clock, lateness: Lateness, most: int
+        self,
+        target: tuple[str, int],
+        ways: tuple[ProxyDirection, ProxyDirection],
+        clock: Clock,
+        lateness: TimerLateness,
+        most: int,
     ) -> None:
         self.target, self.ways, self.clock, self.lateness = target, ways, clock, lateness
         self.counts = TcpCounts()
         self._most = most
         self._server: asyncio.Server | None = None
-        self.connections: set[_Connection] = set()
+        self.connections: set[_ProxiedConnection] = set()
 
     async def start(self, listener: socket.socket) -> None:
         """Accept connections on a bound socket."""
@@ -97,7 +102,7 @@ class TcpProxy:
             connection.abort()
 
     def _accept(self) -> asyncio.Protocol:
-        connection = _Connection(self)
+        connection = _ProxiedConnection(self)
         if len(self.connections) >= self._most:
             self.counts.refused += 1
             connection.client.unwanted = True
@@ -108,7 +113,7 @@ class TcpProxy:
         return connection.client
 
 
-class _Connection:
+class _ProxiedConnection:
     """Two sockets and the two flows between them."""
 
     def __init__(self, proxy: TcpProxy) -> None:
@@ -225,7 +230,7 @@ class _End(asyncio.Protocol):
     into: _Flow
     """What comes from here it writes."""
 
-    def __init__(self, connection: _Connection) -> None:
+    def __init__(self, connection: _ProxiedConnection) -> None:
         self.connection = connection
         self.unwanted = self.open = self.gone = self.blocked = False
         self._heard_end = self._said_end = False

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from interfaces.link.channel import Channel
-from interfaces.timer import Lateness, Timer
+from interfaces.timer import Timer, TimerLateness
 from vrs.clock import Clock
 
 MAX_DATAGRAM = 65_535
@@ -37,7 +37,7 @@ class UdpCounts:
 
 
 @dataclass(slots=True, eq=False)
-class _Client:
+class _ProxyClient:
     """One client and its socket to the server."""
 
     address: SocketAddress
@@ -52,7 +52,7 @@ class _Client:
 class Parcel:
     """A datagram on its way."""
 
-    client: _Client
+    client: _ProxyClient
     data: bytes
 
 
@@ -75,7 +75,7 @@ class UdpProxy:
         target: tuple[socket.AddressFamily, SocketAddress],
         channels: tuple[Channel[Parcel], Channel[Parcel]],
         clock: Clock,
-        lateness: Lateness,
+        lateness: TimerLateness,
         *,
         most: int,
         idle: float,
@@ -83,10 +83,10 @@ class UdpProxy:
         self._listener, self._target, self._clock = listener, target, clock
         self._there, self._back = channels
         self._most, self._idle = most, idle
-        self._clients: dict[SocketAddress, _Client] = {}
+        self._clients: dict[SocketAddress, _ProxyClient] = {}
         self._held = {id(channel): 0 for channel in channels}
         self._pump_timer = Timer(clock, self._pump, lateness)
-        self._idle_timer = Timer(clock, self._expire, Lateness())
+        self._idle_timer = Timer(clock, self._expire, TimerLateness())
         self.counts = UdpCounts()
 
     def start(self) -> None:
@@ -118,7 +118,7 @@ class UdpProxy:
                 self._send(self._there, client, data)
         self._pump()
 
-    def _from_server(self, client: _Client) -> None:
+    def _from_server(self, client: _ProxyClient) -> None:
         for _ in range(BATCH):
             try:
                 data = client.sock.recv(MAX_DATAGRAM)
@@ -130,14 +130,14 @@ class UdpProxy:
             self._send(self._back, client, data)
         self._pump()
 
-    def _welcome(self, address: SocketAddress) -> _Client | None:
+    def _welcome(self, address: SocketAddress) -> _ProxyClient | None:
         if len(self._clients) >= self._most:
             return None
         try:
             sock = _connected(*self._target)
         except OSError:
             return None
-        client = self._clients[address] = _Client(address, sock, self._clock.now())
+        client = self._clients[address] = _ProxyClient(address, sock, self._clock.now())
         asyncio.get_running_loop().add_reader(sock, self._from_server, client)
         self.counts.clients += 1
         self.counts.most_at_once = max(self.counts.most_at_once, len(self._clients))
@@ -145,7 +145,7 @@ class UdpProxy:
             self._idle_timer.set(client.last + self._idle)
         return client
 
-    def _send(self, channel: Channel[Parcel], client: _Client, data: bytes) -> None:
+    def _send(self, channel: Channel[Parcel], client: _ProxyClient, data: bytes) -> None:
         client.last = self._clock.now()
         if self._held[id(channel)] + len(data) > HELD_BYTES:
             self.counts.overflowed += 1
@@ -186,7 +186,7 @@ class UdpProxy:
             due = (client.last + self._idle for client in self._clients.values())
             self._idle_timer.set(min((t for t in due if t > now), default=now + self._idle))
 
-    def _drop(self, client: _Client) -> None:
+    def _drop(self, client: _ProxyClient) -> None:
         asyncio.get_running_loop().remove_reader(client.sock)
         client.sock.close()
         self._clients.pop(client.address, None)

@@ -19,7 +19,7 @@ from interfaces.recording.track import (
     not_measured,
 )
 from interfaces.runs.drive_row import facts_of, row_of
-from interfaces.runs.drive_run import Case, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import Transport
 from robots.ipr.robot import Collision
 from vrs.comparison import resample
@@ -107,12 +107,12 @@ def driven(recording: Recording) -> Driven:
     return Driven(drive, tuple(missing), float(gap_lengths(track, t).sum()))
 
 
-def _case(recording: Recording) -> Case:
+def _case(recording: Recording) -> DriveCase:
     begin, facts = recording.session, recording.session.drive
     if facts is None:
         raise FormatError(str(recording.path), "of no mobile robot")
     try:
-        return Case(
+        return DriveCase(
             architecture=facts.architecture,
             transport=Transport(facts.transport),
             delay=begin.delay,

@@ -23,10 +23,10 @@ from interfaces.recording.messages import Begin, CommandEntry, End, EventEntry, 
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, placed_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
-from interfaces.runs.drive_run import Case, DriveLink, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun
 from interfaces.software import software
-from interfaces.teleop import Deed
-from interfaces.teleop.architectures import OperatorSite
+from interfaces.teleop import CommandRecord
+from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.equipment import CONTROL, grid_of
 from interfaces.wire.fields import text
 from robots.bullet.rooms import EMPTY
@@ -50,11 +50,13 @@ class DriveRecorder:
         self.path = path
         self.problem = ""
         """Why it wasn't written; empty where it was."""
-        self._deeds: list[tuple[Deed, ArcTimeline]] = []
+        self._deeds: list[tuple[CommandRecord, ArcTimeline]] = []
         self._sent: dict[str, list[tuple[float, int]]] = {"forward": [], "backward": []}
         self._settled: dict[str, list[PacketRecord]] = {"forward": [], "backward": []}
 
-    def begun(self, case: Case, start: Posture, body: MobileRobot, site: OperatorSite, link: DriveLink) -> None:
+    def begun(
+        self, case: DriveCase, start: Posture, body: MobileRobot, site: ArchitectureOperatorSite, link: DriveLink
+    ) -> None:
         """See `Witness`."""
         self._case, self._start, self._site = case, start, site
         self._place = () if body.room is EMPTY else (room_entry(body.room),)
@@ -88,7 +90,7 @@ class DriveRecorder:
             self.problem = str(error)
             writer.give_up()
 
-    def _commanded(self, deed: Deed) -> None:
+    def _commanded(self, deed: CommandRecord) -> None:
         self._deeds.append((deed, self._site.engine.timeline))
 
     def _settle(self, direction: str, record: PacketRecord) -> None:

@@ -11,7 +11,7 @@ from typing import Final, Self
 from interfaces.link.proxy.address import parse_address
 from interfaces.rsp.errors import DeadlineError, NoSessionError
 from interfaces.rsp.header import LONGEST
-from interfaces.rsp.local import State
+from interfaces.rsp.local import LocalState
 from interfaces.rsp.middleware import Middleware
 from vrs.clock import WallClock
 from vrs.errors import FormatError
@@ -57,10 +57,10 @@ class UdpLink:
             self.middleware.core.open(now=self._clock.now(), takeover=takeover)
         self._thread.start()
         self._wake.send(b"\0")
-        if not self.middleware.wait_for(lambda: self.middleware.core.state is not State.OPENING, timeout):
+        if not self.middleware.wait_for(lambda: self.middleware.core.state is not LocalState.OPENING, timeout):
             self.close()
             raise DeadlineError("a session", timeout)
-        if self.middleware.core.state is not State.OPEN:
+        if self.middleware.core.state is not LocalState.OPEN:
             refused = self.middleware.refused
             self.close()
             raise DeadlineError("a session", timeout) if refused is None else NoSessionError(refused.name.lower())
@@ -72,7 +72,7 @@ class UdpLink:
             with self.middleware.changed:
                 self.middleware.core.end(now=self._clock.now())
             self._wake.send(b"\0")
-            self.middleware.wait_for(lambda: self.middleware.core.state is State.CLOSED, 1.0)
+            self.middleware.wait_for(lambda: self.middleware.core.state is LocalState.CLOSED, 1.0)
             self._over = True
             self._wake.send(b"\0")
             self._thread.join(2.0)

@@ -1,4 +1,4 @@
-"""A robot's side on a UDP socket: a thin shell around `RobotHost`."""
+"""A robot's side on a UDP socket: a thin shell around `RspHost`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 from typing import Any, Final
 
 from interfaces.rsp.header import LONGEST
-from interfaces.rsp.host import RobotHost
+from interfaces.rsp.host import RspHost
 from interfaces.timer import Turning
 from vrs.clock import Clock
 from vrs.errors import FormatError
@@ -38,10 +38,10 @@ def bind(host: str, port: int) -> socket.socket:
     return made
 
 
-class RobotServer:
+class RspServer:
     """Lets a host live and passes its datagrams."""
 
-    def __init__(self, host: RobotHost, sock: socket.socket, clock: Clock) -> None:
+    def __init__(self, host: RspHost, sock: socket.socket, clock: Clock) -> None:
         """Take a host, a bound socket, which is closed in the end, and the clock that the host's times are of."""
         self._host, self._socket = host, sock
         self._turning = Turning(clock, self._turn)

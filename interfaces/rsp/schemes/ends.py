@@ -8,7 +8,7 @@ Rims = tuple[int, int]
 """Speeds of the left and the right wheel at the rim [mm/s]."""
 
 
-class Seen(NamedTuple):
+class ReportedPosition(NamedTuple):
     """The newest position that the local system has."""
 
     x: float
@@ -22,7 +22,7 @@ class Seen(NamedTuple):
 class LocalEnd(Protocol):
     """The local system's end."""
 
-    seen: Seen | None
+    seen: ReportedPosition | None
     """Newest position that came."""
 
     def write(self, rims: Rims, *, now: float) -> None:
@@ -50,7 +50,7 @@ class RobotEnd(Protocol):
     def fired(self) -> list[int]:
         """Numbers of the commands that came since the last call, from 0."""
 
-    def measure(self, position: Seen) -> None:
+    def measure(self, position: ReportedPosition) -> None:
         """Set where the robot is."""
 
     def to_send(self, *, now: float) -> list[bytes]:

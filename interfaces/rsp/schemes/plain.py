@@ -13,7 +13,7 @@ from typing import Final
 from interfaces.rsp.model.elements import Effector
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig
-from interfaces.rsp.schemes.ends import Rims, Seen
+from interfaces.rsp.schemes.ends import ReportedPosition, Rims
 from interfaces.rsp.session import SLACK
 
 _HEAD: Final = struct.Struct("!IIB")
@@ -39,7 +39,7 @@ class PlainLocal:
             repeat: Inputs in a packet, 1 to 255: each is sent as often.
             size: Of every packet [byte]; 0 for as small as it can be.
         """
-        self.seen: Seen | None = None
+        self.seen: ReportedPosition | None = None
         self._T, self._size = period, size
         self._recent: deque[bytes] = deque(maxlen=repeat)
         self._rims: Rims = (0, 0)
@@ -61,7 +61,7 @@ class PlainLocal:
         """See `LocalEnd`; what is older than the newest is of no use."""
         number, x, y, theta = _UP.unpack_from(data)
         if number > self._newest:
-            self._newest, self.seen = number, Seen(x, y, theta)
+            self._newest, self.seen = number, ReportedPosition(x, y, theta)
 
     def to_send(self, *, now: float) -> list[bytes]:
         """See `LocalEnd`."""
@@ -96,7 +96,7 @@ class PlainRobot:
         self._heard: float | None = None
         self._newest = self._told = 0
         self._commands: list[int] = []
-        self._position = Seen(0.0, 0.0, 0.0)
+        self._position = ReportedPosition(0.0, 0.0, 0.0)
         self._number = 0
         self._next = 0.0
 
@@ -127,7 +127,7 @@ class PlainRobot:
         found, self._commands = self._commands, []
         return found
 
-    def measure(self, position: Seen) -> None:
+    def measure(self, position: ReportedPosition) -> None:
         """See `RobotEnd`."""
         self._position = position
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from interfaces.rsp.local import LocalConfig, LocalCore, State
+from interfaces.rsp.local import LocalConfig, LocalCore, LocalState
 from interfaces.rsp.model.elements import Sensor
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.outputs import Commanded, Told
 from interfaces.rsp.robot import RobotConfig, RobotCore
-from interfaces.rsp.schemes.ends import Rims, Seen
+from interfaces.rsp.schemes.ends import ReportedPosition, Rims
 
 _ADDRESS: Final = b"local"
 
@@ -22,7 +22,7 @@ class RspLocal:
         """Open a session at time 0, and ask for the position."""
         self.core = LocalCore(model, random_bytes, config)
         self.core.open(now=0.0)
-        self.seen: Seen | None = None
+        self.seen: ReportedPosition | None = None
         self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
         self._fire, self._position = model.index("ir_fire"), model.index("position")
         self.core.request(self._position, True)
@@ -49,11 +49,11 @@ class RspLocal:
             if isinstance(output, Told) and output.index == self._position:
                 scale = self._sensor.scale
                 x, y, theta = self._sensor.format.unpack(output.payload)
-                self.seen = Seen(scale * x, scale * y, scale * theta)
+                self.seen = ReportedPosition(scale * x, scale * y, scale * theta)
 
     def to_send(self, *, now: float) -> list[bytes]:
         """See `LocalEnd`."""
-        if self.core.state is State.OPEN:
+        if self.core.state is LocalState.OPEN:
             for values in self._waiting:
                 self.core.command(self._fire, values)
             self._waiting.clear()
@@ -89,7 +89,7 @@ class RspRobot:
         found, self._commands = self._commands, []
         return found
 
-    def measure(self, position: Seen) -> None:
+    def measure(self, position: ReportedPosition) -> None:
         """See `RobotEnd`."""
         raw = (round(value / self._sensor.scale) for value in position)
         self.core.measure(self._position, self._sensor.format.pack(*raw))

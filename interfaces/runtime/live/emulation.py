@@ -8,11 +8,11 @@ from typing import Any
 
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile, loss_model, spelled_loss
 from interfaces.link.delay import DelayProfile
-from interfaces.link.gauge import Measured
+from interfaces.link.gauge import LinkFigures
 from interfaces.link.profiles import ALLOWED
 from interfaces.runtime.ages import late_often
 from interfaces.runtime.live.robot_client import RobotClient
-from interfaces.stream.network import Impair, Network, Way
+from interfaces.stream.network import DirectionConditions, Impair, Network
 from interfaces.teleop.line import SiteLine
 from vrs.errors import InvalidValueError
 
@@ -45,7 +45,7 @@ class LiveEmulation:
             _way(conditions.backward),
             line.there.measured(now=now),
             line.back.measured(now=now),
-            Measured(len(trips), None, _positive(trips.quantile(0.5)), _positive(trips.quantile(0.95))),
+            LinkFigures(len(trips), None, _positive(trips.quantile(0.5)), _positive(trips.quantile(0.95))),
             seed=self._seed,
             changed_at=self._at,
             changed_by=self._by,
@@ -71,7 +71,7 @@ class LiveEmulation:
         self._at, self._by = now, who
         self._changed(now, f"{who} changed the way to the robot: {described(conditions)}")
 
-    def _conditions(self, before: Conditions, wish: Way | None) -> Conditions:
+    def _conditions(self, before: Conditions, wish: DirectionConditions | None) -> Conditions:
         """What a direction does from now on, if it can be as is wished."""
         if wish is None:
             return before
@@ -96,8 +96,8 @@ def _positive(seconds: float | None) -> float | None:
     return None if seconds is None else max(0.0, seconds)
 
 
-def _way(conditions: Conditions) -> Way:
-    return Way(conditions.delay.name, spelled_loss(conditions.loss), str(conditions.service))
+def _way(conditions: Conditions) -> DirectionConditions:
+    return DirectionConditions(conditions.delay.name, spelled_loss(conditions.loss), str(conditions.service))
 
 
 def described(conditions: LinkConditions) -> str:
@@ -106,5 +106,5 @@ def described(conditions: LinkConditions) -> str:
     return f"{there}, both ways" if there == back else f"{there}; back {back}"
 
 
-def _words(way: Way) -> str:
+def _words(way: DirectionConditions) -> str:
     return f"delay {way.delay}, loss {way.loss}, {way.service}"

@@ -50,7 +50,7 @@ def route_timeline(route: Sequence[Point]) -> ArcTimeline:
     return ArcTimeline((*route[0], first)).edited(0.0, drives)
 
 
-class _Way:
+class _DrivenTrace:
     """Where a robot drove in this drive."""
 
     def __init__(self) -> None:
@@ -97,7 +97,7 @@ class MobileDrawing:
         self._model = model
         self.scene = MobileScene(model, start, room=None if room is EMPTY else room, grid=grid)
         """What all viewers see."""
-        self._ways: dict[str, _Way] = {}
+        self._ways: dict[str, _DrivenTrace] = {}
         self._drive = -1
         self._route: tuple[tuple[Point, ...], ArcTimeline] | None = None
         self._committed: tuple[int, ArcTimeline] | None = None
@@ -106,7 +106,7 @@ class MobileDrawing:
     def follow(self, operator: DrivingOperator) -> None:
         """Note where both robots are; to be called also while nobody looks."""
         if operator.epochs != self._drive:
-            self._drive, self._ways = operator.epochs, {"virtual": _Way(), "real": _Way()}
+            self._drive, self._ways = operator.epochs, {"virtual": _DrivenTrace(), "real": _DrivenTrace()}
         if not operator.halted:
             self._ways["virtual"].go(operator.site.posture)
             if operator.deviation is not None and operator.report is not None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from starlette.routing import BaseRoute
 
-from interfaces.jobs import Arm, JobFile, OperatorLoss
+from interfaces.jobs import ArmJob, JobFile, OperatorLoss
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
 from interfaces.runtime.live.emulation import LiveEmulation
@@ -70,7 +70,7 @@ class LiveMobileOperatorConfig:
     """The robot's camera; None for none, nor voice and screen."""
     link_loss: LossPolicy | None = None
     """What the robot is to do when the link is lost; None leaves it to the robot."""
-    arm: Callable[[Arm], float | str | None] = lambda _: None
+    arm: Callable[[ArmJob], float | str | None] = lambda _: None
     """Says of a program of the list how long it takes [s], why it'd fail, or None where nobody knows."""
 
 

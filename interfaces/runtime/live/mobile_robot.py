@@ -23,7 +23,7 @@ from interfaces.runtime.live.mobile_senses import LaserSight, NavigatorPilot
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached
-from interfaces.teleop.architectures import Constants, DriveOrders, RobotSite, architecture, controller
+from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, DriveOrders, architecture, controller
 from interfaces.teleop.architectures.equipment import CONTROL, POSITIONS, SENSING, robot_surroundings
 from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands
 from interfaces.teleop.hosting import HostConfig
@@ -203,14 +203,14 @@ class LiveMobileRobot:
             sight=self._sight.newest,
         )
 
-    def _architecture(self, start: Posture, since: float) -> RobotSite:
+    def _architecture(self, start: Posture, since: float) -> ArchitectureRobotSite:
         """The architecture's parts for a drive that began at a posture, so long ago [s]."""
         config, body = self.config, self.body
         made = controller(config.architecture, start, config.constants)
         around = None
         if config.architecture in SENSING:
             around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
-        return RobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
+        return ArchitectureRobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
 
     def _turn(self, now: float) -> float:
         self._server.send(self.host.advance(now=now))

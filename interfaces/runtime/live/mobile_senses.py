@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.teleop.architectures import Position
+from interfaces.teleop.architectures import PositionSource
 from interfaces.teleop.driving import JourneyPilot
-from interfaces.teleop.tasks import Sight
+from interfaces.teleop.tasks import SensedPoints
 from robots.ipr.navigation import BodyNavigator
 from robots.ipr.position import LaserPosition
 from robots.ipr.robot import MobileRobot
@@ -49,11 +49,11 @@ class NavigatorPilot(JourneyPilot):
 class LaserSight:
     """Where the beams of a robot's newest scan ended, and how sure it is of its place."""
 
-    def __init__(self, body: MobileRobot, position: Position) -> None:
+    def __init__(self, body: MobileRobot, position: PositionSource) -> None:
         """Take a robot, and what tells it where it is."""
         self._body, self._position = body, position
         self._scan: LaserScan | None = None
-        self._sight: Sight | None = None
+        self._sight: SensedPoints | None = None
         self._told = -math.inf
 
     def look(self) -> None:
@@ -69,9 +69,9 @@ class LaserSight:
             place = reckoned if localizer.posture is None else localizer.posture
             (xx, xy, _), (_, yy, _), _ = localizer.covariance.tolist()
             doubt = xx, xy, yy
-        self._sight = Sight(scan.time, seen_from(scan, place), doubt)
+        self._sight = SensedPoints(scan.time, seen_from(scan, place), doubt)
 
-    def newest(self) -> Sight | None:
+    def newest(self) -> SensedPoints | None:
         """What was seen since the last call; None if that's nothing."""
         sight, self._sight = self._sight, None
         return sight

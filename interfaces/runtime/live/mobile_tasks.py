@@ -10,12 +10,12 @@ from dataclasses import replace
 from typing import Final
 
 from interfaces.jobs import (
-    Arm,
-    Command,
+    ArmJob,
     Forecast,
     JobFile,
     JobList,
     JobRunner,
+    ListCommand,
     Load,
     Progress,
     carried_over,
@@ -29,7 +29,7 @@ from interfaces.stream.session import News
 from interfaces.stream.tasks import Plan, Seen, Tasks, Trial, Wanted
 from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.driving.operator import NOT_MET
-from interfaces.teleop.tasks import Doing, Go, Sight, TaskReport
+from interfaces.teleop.tasks import Doing, Go, SensedPoints, TaskReport
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.navigation import outline_of, route_map
@@ -59,7 +59,7 @@ class TaskDesk:
         body: tuple[Chassis, DriveLimits],
         tell: Callable[[News], None],
         file: JobFile | None = None,
-        arm: Callable[[Arm], float | str | None] = lambda _: None,
+        arm: Callable[[ArmJob], float | str | None] = lambda _: None,
     ) -> None:
         """Take up the list as it was saved.
 
@@ -87,7 +87,7 @@ class TaskDesk:
         self._roads: RouteMap | None = None
         self._trying: asyncio.Task[None] | None = None
         self._report: TaskReport | None = None
-        self._sight: Sight | None = None
+        self._sight: SensedPoints | None = None
         self._told = Tasks()
         self._tell(self.plan())
         self.turn()
@@ -118,7 +118,7 @@ class TaskDesk:
                 return self._edit(jobs)
             case Trial():
                 return self._try()
-            case Command():
+            case ListCommand():
                 return self._command(wanted)
 
     def _edit(self, jobs: JobList) -> str:
@@ -134,7 +134,7 @@ class TaskDesk:
         self.turn()
         return ""
 
-    def _command(self, command: Command) -> str:
+    def _command(self, command: ListCommand) -> str:
         """Let the robot do something with the list, which it's given if it hasn't it."""
         refusal = JobRunner.at(self.jobs, self.progress).receive(command, now=0.0)
         if refusal:

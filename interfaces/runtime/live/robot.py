@@ -20,12 +20,12 @@ from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.runtime.live.warm import warm
 from interfaces.runtime.physics import (
     TICK,
-    Ended,
     PhysicsConfig,
     PhysicsProcess,
+    ProcessEnded,
     Silent,
 )
-from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, Ready
+from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, PhysicsReady
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Attached, Role
 from interfaces.teleop import RobotHost, RobotHostConfig
@@ -140,7 +140,9 @@ class LiveRobot:
         self._server.send(feeder.advance(now=now))
         return min(feeder.next_deadline(), physics.next_deadline())
 
-    def _take(self, event: Ready | Measurement | Fault | Silent | Ended, feeder: Feeder, now: float) -> None:
+    def _take(
+        self, event: PhysicsReady | Measurement | Fault | Silent | ProcessEnded, feeder: Feeder, now: float
+    ) -> None:
         """Take in what the body's process said."""
         if isinstance(event, Measurement):
             self._measured = event
@@ -153,7 +155,7 @@ class LiveRobot:
             self.host.fault(f"the body: {event.text}", np.array(event.rest), now=now)
         elif isinstance(event, Silent):
             self.host.halt("the body's process stands still", now=now)
-        elif isinstance(event, Ended):
+        elif isinstance(event, ProcessEnded):
             self.host.halt("the body's process has ended", now=now)
             self.problem = f"the body's process ended with status {event.status}"
             self.ended.set()

@@ -41,7 +41,7 @@ _FAILED = 1011
 _LOG = logging.getLogger(__name__)
 
 
-class _Connection:
+class _OperatorConnection:
     """An operator's site on a socket."""
 
     def __init__(self, encoding: Encoding) -> None:
@@ -88,7 +88,7 @@ class RobotServer:
         self._host, self._clock, self._access = host, clock, access
         self._attached, self._met, self._heard = attached, met, heard
         self._coming: Any = orders | Pong
-        self._connection: _Connection | None = None
+        self._connection: _OperatorConnection | None = None
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -113,7 +113,7 @@ class RobotServer:
 
     async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a connection that was accepted, until it ends."""
-        connection = _Connection(encoding)
+        connection = _OperatorConnection(encoding)
         writer = asyncio.create_task(self._write(connection, send))
         try:
             try:
@@ -134,7 +134,7 @@ class RobotServer:
             if self._connection is connection:
                 self._connection = None
 
-    def _greet(self, connection: _Connection, message: Any) -> Problem | None:
+    def _greet(self, connection: _OperatorConnection, message: Any) -> Problem | None:
         """Take the first message; why it can't be, or None if the operator is followed from now on."""
         try:
             hello = decode(_data(message), connection.encoding, allowed=Hello)
@@ -161,7 +161,7 @@ class RobotServer:
         self._met(attached)
         return None
 
-    def _hear(self, connection: _Connection, data: bytes) -> None:
+    def _hear(self, connection: _OperatorConnection, data: bytes) -> None:
         if self._connection is not connection:
             return
         try:
@@ -181,7 +181,7 @@ class RobotServer:
             self._host.halt(reason, now=self._clock.now())
             connection.end(_FAILED, reason)
 
-    async def _write(self, connection: _Connection, send: Send) -> None:
+    async def _write(self, connection: _OperatorConnection, send: Send) -> None:
         kind = "bytes" if connection.encoding is Encoding.MSGPACK else "text"
         with contextlib.suppress(OSError):
             while True:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from interfaces.stream.meshcat.committed import Committed
 from interfaces.stream.meshcat.driving import MobileScene
-from interfaces.stream.meshcat.newest import Slot
+from interfaces.stream.meshcat.newest import ReaderPosition
 from interfaces.stream.meshcat.scene import MeshcatScene
 
-__all__ = ["Committed", "MeshcatScene", "MobileScene", "Slot"]
+__all__ = ["Committed", "MeshcatScene", "MobileScene", "ReaderPosition"]

@@ -49,7 +49,7 @@ class Committed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Piece:
+class CommittedPiece:
     """The path's part in [index * PIECE, (index + 1) * PIECE)."""
 
     index: int
@@ -66,7 +66,7 @@ class Piece:
         """Whether there's anything to see."""
         return bool(len(self.points) or self.marks)
 
-    def equals(self, other: Piece) -> bool:
+    def equals(self, other: CommittedPiece) -> bool:
         """Whether both look the same."""
         return self is other or (
             (self.index, self.t, self.ends) == (other.index, other.t, other.ends)
@@ -78,7 +78,7 @@ class Piece:
         )
 
 
-class Path:
+class CommittedPath:
     """The path of one plan, sampled once; pieces of equal motion are equal, whatever else the plan holds."""
 
     def __init__(self, model: Kinematics, timeline: Timeline | ArcTimeline, play: float, tool: Array) -> None:
@@ -104,13 +104,13 @@ class Path:
         """Whether the plan goes on after what is drawn."""
         self.end = end if self._bounded else min(end, rest)
         """Where the path ends [s]."""
-        self._whole: dict[int, Piece] = {}
+        self._whole: dict[int, CommittedPiece] = {}
 
     def reaches(self, play: float) -> bool:
         """Whether it still does for a robot at that time [s]: begun before it, and cut not too near after it."""
         return play >= self.first * PIECE and (not self._bounded or self.end >= play + HORIZON - 2.0)
 
-    def pieces(self, play: float) -> tuple[Piece, ...]:
+    def pieces(self, play: float) -> tuple[CommittedPiece, ...]:
         """The pieces from the real robot's time on [s]; none where it's at the end."""
         if play >= self.end:
             return ()
@@ -118,7 +118,7 @@ class Path:
         first = max(self.first, math.floor(play / PIECE))
         return tuple(self._piece(index, play) for index in range(first, last + 1))
 
-    def _piece(self, index: int, play: float) -> Piece:
+    def _piece(self, index: int, play: float) -> CommittedPiece:
         """A piece from play on; those that lie wholly ahead are made once."""
         if play > index * PIECE:
             return self._make(index, play)
@@ -126,7 +126,7 @@ class Path:
             self._whole[index] = self._make(index, index * PIECE)
         return self._whole[index]
 
-    def _make(self, index: int, play: float) -> Piece:
+    def _make(self, index: int, play: float) -> CommittedPiece:
         per = round(PIECE / STEP)
         low = (index - self.first) * per
         t, points = self._t[low : low + per + 1], self._points[low : low + per + 1]
@@ -146,7 +146,7 @@ class Path:
             X[:3, 3] = points[-1]
             marks.append((X, -BALL))
             label = self.end
-        return Piece(index, line, tuple(marks), label, ends)
+        return CommittedPiece(index, line, tuple(marks), label, ends)
 
     def _across(self, k: int) -> Array:
         """Pose of a tick at point k, its z along the path there."""

@@ -26,7 +26,7 @@ class Newest:
         self.version = 0
         """Counts up with each change of any value."""
         self._values: dict[str, tuple[int, bytes]] = {}
-        self._slots: set[Slot] = set()
+        self._slots: set[ReaderPosition] = set()
         self._later: dict[int, tuple[bytes, ...]] = {}
 
     @property
@@ -49,7 +49,7 @@ class Newest:
         for slot in self._slots:
             slot.changed()
 
-    def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
+    def join(self, changed: Callable[[], None] = lambda: None) -> ReaderPosition:
         """Give a reader a place.
 
         Args:
@@ -60,11 +60,11 @@ class Newest:
         """
         if len(self._slots) >= MOST_READERS:
             raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_READERS} a scene")
-        slot = Slot(self, changed)
+        slot = ReaderPosition(self, changed)
         self._slots.add(slot)
         return slot
 
-    def leave(self, slot: Slot) -> None:
+    def leave(self, slot: ReaderPosition) -> None:
         """Give a place back; one that was given back already is none."""
         self._slots.discard(slot)
 
@@ -89,7 +89,7 @@ class Newest:
         return versions[len(versions) - newer + count - 1]
 
 
-class Slot:
+class ReaderPosition:
     """A reader's place: how far it has read."""
 
     def __init__(self, newest: Newest, changed: Callable[[], None]) -> None:

@@ -29,7 +29,7 @@ _STANDING = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0
 """three.js's planes lie: x to the right, y up, z to who looks."""
 
 
-class Part(NamedTuple):
+class ObjectPart(NamedTuple):
     """A child of an object: a geometry in a material."""
 
     geometry: Any
@@ -41,7 +41,7 @@ class Part(NamedTuple):
     """Order of drawing."""
 
 
-def group(path: str, parts: Sequence[Part], data: Json | None = None) -> Json:
+def group(path: str, parts: Sequence[ObjectPart], data: Json | None = None) -> Json:
     """Lower several parts as one object.
 
     Args:
@@ -106,12 +106,12 @@ class Sheet:
 def solid(path: str, mesh: ShadedMesh) -> Json:
     """Lower a link of the real robot, in its own colours."""
     material = g.MeshPhongMaterial(vertexColors=True, side=FRONT, shininess=25, specular=0x222222, reflectivity=1.0)
-    return group(path, [Part(Shaded(mesh, coloured=True), material)])
+    return group(path, [ObjectPart(Shaded(mesh, coloured=True), material)])
 
 
 def plain(path: str, mesh: ShadedMesh, colour: int) -> Json:
     """Lower what has one colour, whatever light falls on it."""
-    return group(path, [Part(Shaded(mesh, coloured=False), g.MeshBasicMaterial(color=colour, side=FRONT))])
+    return group(path, [ObjectPart(Shaded(mesh, coloured=False), g.MeshBasicMaterial(color=colour, side=FRONT))])
 
 
 def ghost(path: str, mesh: ShadedMesh) -> Json:
@@ -124,7 +124,7 @@ def ghost(path: str, mesh: ShadedMesh) -> Json:
     back = {"polygonOffset": True, "polygonOffsetFactor": 1.5, "polygonOffsetUnits": 6}
     depth = g.MeshBasicMaterial(side=FRONT, transparent=True, colorWrite=False, **back)
     skin = g.MeshPhongMaterial(color=GHOST, opacity=0.46, side=FRONT, depthWrite=False, **back)
-    return group(path, [Part(shape, depth, order=1), Part(shape, skin, order=2)])
+    return group(path, [ObjectPart(shape, depth, order=1), ObjectPart(shape, skin, order=2)])
 
 
 def frame(path: str, previous: Array | None, colour: int, opacity: float) -> Json:
@@ -137,17 +137,17 @@ def frame(path: str, previous: Array | None, colour: int, opacity: float) -> Jso
         opacity: Of the rod.
     """
     triad = g.triad(0.08)
-    parts = [Part(triad.geometry, triad.material, "LineSegments")]
+    parts = [ObjectPart(triad.geometry, triad.material, "LineSegments")]
     if previous is not None and np.linalg.norm(previous) > 1e-6:
         rod = g.MeshBasicMaterial(color=colour, opacity=opacity)
-        parts.append(Part(_tube(np.array([previous, np.zeros(3)]), 0.012), rod))
+        parts.append(ObjectPart(_tube(np.array([previous, np.zeros(3)]), 0.012), rod))
     return group(path, parts)
 
 
 def trace(path: str, points: Array, colour: int) -> Json:
     """Lower where a tool has been: a thin line through points [m], (k, 3)."""
     line = g.PointsGeometry(points.T.astype(np.float32))
-    return group(path, [Part(line, g.LineBasicMaterial(color=colour), "Line")])
+    return group(path, [ObjectPart(line, g.LineBasicMaterial(color=colour), "Line")])
 
 
 def committed_piece(
@@ -171,8 +171,8 @@ def committed_piece(
     for X, size in marks:
         shape = g.Cylinder(scale * 0.008, scale * size) if size > 0 else g.Sphere(-scale * size)
         shapes.append((shape, (X @ _CYLINDER).T.ravel().tolist()))
-    parts = [Part(shape, clear, matrix=matrix) for shape, matrix in shapes]
-    parts += [Part(shape, hidden, matrix=matrix, order=3) for shape, matrix in shapes]
+    parts = [ObjectPart(shape, clear, matrix=matrix) for shape, matrix in shapes]
+    parts += [ObjectPart(shape, hidden, matrix=matrix, order=3) for shape, matrix in shapes]
     return group(path, parts, data)
 
 
@@ -184,7 +184,7 @@ def band(path: str, points: Array, width: float, colour: int) -> Json:
     vertices = np.stack([points + aside, points - aside], axis=1).reshape(-1, 3)
     k = 2 * np.arange(len(points) - 1)[:, None, None]
     faces = (k + np.array([[0, 1, 2], [2, 1, 3]])).reshape(-1, 3)
-    return group(path, [Part(g.TriangularMeshGeometry(vertices, faces), g.MeshBasicMaterial(color=colour))])
+    return group(path, [ObjectPart(g.TriangularMeshGeometry(vertices, faces), g.MeshBasicMaterial(color=colour))])
 
 
 def sign(path: str, png: bytes, size: tuple[float, float], X: Array) -> Json:
@@ -200,7 +200,7 @@ def sign(path: str, png: bytes, size: tuple[float, float], X: Array) -> Json:
     texture = g.ImageTexture(image)
     image.uuid, texture.uuid = f"{path}:image", f"{path}:texture"
     turned = X @ _STANDING
-    part = Part(Sheet(*size), g.MeshBasicMaterial(map=texture, side=FRONT), matrix=turned.T.ravel().tolist())
+    part = ObjectPart(Sheet(*size), g.MeshBasicMaterial(map=texture, side=FRONT), matrix=turned.T.ravel().tolist())
     return group(path, [part])
 
 
@@ -211,7 +211,7 @@ def tiles(path: str, places: Array, side: float, colour: int) -> Json:
     vertices = (places[:, None] + corners).reshape(-1, 3)
     faces = (4 * np.arange(len(places))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     material = g.MeshBasicMaterial(color=colour, opacity=0.6, transparent=True)
-    return group(path, [Part(g.TriangularMeshGeometry(vertices, faces), material)])
+    return group(path, [ObjectPart(g.TriangularMeshGeometry(vertices, faces), material)])
 
 
 def _tube(points: Array, radius: float) -> Any:

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from interfaces.stream.meshcat.commands import delete, set_object, set_property, set_transform
-from interfaces.stream.meshcat.committed import Committed, Kinematics, Path, Piece
-from interfaces.stream.meshcat.newest import Newest, Slot
+from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece, Kinematics
+from interfaces.stream.meshcat.newest import Newest, ReaderPosition
 from vrs.mobile import ArcTimeline
 from vrs.model import Array
 from vrs.timeline import Timeline
@@ -43,8 +43,8 @@ class TwinScene:
         self._kinematics, self._tool, self._scale = kinematics, tool, scale
         self._newest = Newest(delete(ROOT))
         self._poses: dict[str, Array] = {}
-        self._path: tuple[Timeline | ArcTimeline, Path] | None = None
-        self._drawn: dict[int, Piece] = {}
+        self._path: tuple[Timeline | ArcTimeline, CommittedPath] | None = None
+        self._drawn: dict[int, CommittedPiece] = {}
         self._due = float("-inf")
         self._objects: ModuleType
 
@@ -53,7 +53,7 @@ class TwinScene:
         """How many viewers there are."""
         return self._newest.readers
 
-    def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
+    def join(self, changed: Callable[[], None] = lambda: None) -> ReaderPosition:
         """Give a viewer a place: it gets the scene, and from then on what changes.
 
         Args:
@@ -64,7 +64,7 @@ class TwinScene:
         """
         return self._newest.join(changed)
 
-    def leave(self, slot: Slot) -> None:
+    def leave(self, slot: ReaderPosition) -> None:
         """Give a place back; one that was given back already is none."""
         self._newest.leave(slot)
 
@@ -81,13 +81,13 @@ class TwinScene:
 
     def _draw(self, committed: Committed | None) -> None:
         """Renew the committed path."""
-        pieces: tuple[Piece, ...] = ()
+        pieces: tuple[CommittedPiece, ...] = ()
         if committed is not None:
             timeline, play = committed.timeline, committed.play
             known = self._path
             # A path reaches only so far ahead: it's sampled again as the robot comes nearer to where it was cut.
             if known is None or known[0] is not timeline or not known[1].reaches(play):
-                known = self._path = timeline, Path(self._kinematics, timeline, play, self._tool)
+                known = self._path = timeline, CommittedPath(self._kinematics, timeline, play, self._tool)
             pieces = known[1].pieces(play)
             if pieces:
                 self._set(f"{ROOT}/committed", "play", round(play, 2))

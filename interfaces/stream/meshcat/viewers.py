@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from interfaces.stream.meshcat.newest import Slot
+from interfaces.stream.meshcat.newest import ReaderPosition
 from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError
 
@@ -34,13 +34,13 @@ HEARD_PERIOD: Final = 10.0
 POLICY_VIOLATION, TRY_AGAIN_LATER, UNAUTHORISED = 1008, 1013, 4401
 
 
-class Source(Protocol):
+class SceneSource(Protocol):
     """What viewers look at: a `MeshcatScene`, a `Newest`."""
 
-    def join(self, changed: Callable[[], None] = lambda: None) -> Slot:
+    def join(self, changed: Callable[[], None] = lambda: None) -> ReaderPosition:
         """Give a viewer a place; see `Newest.join`."""
 
-    def leave(self, slot: Slot) -> None:
+    def leave(self, slot: ReaderPosition) -> None:
         """Give a place back."""
 
 
@@ -55,7 +55,7 @@ class Viewers:
 
     def __init__(
         self,
-        source: Source,
+        source: SceneSource,
         admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         *,
@@ -131,7 +131,7 @@ class _Viewer:
     def __init__(
         self,
         websocket: WebSocket,
-        source: Source,
+        source: SceneSource,
         batches: bool,
         hear: Callable[[str], str] | None,
         most_heard: int,

@@ -10,7 +10,7 @@ from interfaces.stream import mobile
 from interfaces.stream.control import Role
 from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
 from interfaces.stream.wire.tasks import ErrandForm, SightForm, TaskReportForm
-from interfaces.teleop.architectures import CellChanges, Packet, Report
+from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.architectures.segments import MOST_REPEATED
 from interfaces.teleop.tasks import Doing
@@ -174,14 +174,14 @@ class DriveOrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
     def read(self) -> DriveOrders:
         """The orders."""
         runs = tuple((first, _arcs(rows)) for first, rows in self.runs)
-        packet = Packet(runs, self.complete_until, _arcs(self.tail))
+        packet = ArcPacket(runs, self.complete_until, _arcs(self.tail))
         start = None if self.start is None else Posture(*self.start)
         errands = tuple(form.read() for form in self.errands)
         return DriveOrders(epoch(self.epoch), self.number, self.sent_at, self.began, start, packet, errands)
 
 
 class FollowedWire(Wire, frozen=True, omit_defaults=True, gc=False):
-    """`Report` of an architecture."""
+    """`ArchitectureReport` of an architecture."""
 
     number: Number
     executed: Count
@@ -191,18 +191,18 @@ class FollowedWire(Wire, frozen=True, omit_defaults=True, gc=False):
     cells: Annotated[tuple[tuple[tuple[Count, Count], Time, bool], ...], Meta(max_length=MOST_CELLS)] = ()
 
     @classmethod
-    def of(cls, value: Report) -> FollowedWire:
+    def of(cls, value: ArchitectureReport) -> FollowedWire:
         """The wire form."""
         changes = value.changes
         cells = () if changes is None else tuple((c.cell, c.seen, c.occupied) for c in changes.cells)
         seen_at = None if changes is None else changes.time
         return cls(value.number, value.executed, value.posture, value.received, seen_at, cells)
 
-    def read(self) -> Report:
+    def read(self) -> ArchitectureReport:
         """The report."""
         cells = tuple(CellChange(*row) for row in self.cells)
         changes = None if self.seen_at is None else CellChanges(self.seen_at, cells)
-        return Report(self.number, self.executed, Posture(*self.posture), self.received, changes)
+        return ArchitectureReport(self.number, self.executed, Posture(*self.posture), self.received, changes)
 
 
 class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="drive-report"):

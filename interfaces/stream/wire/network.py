@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from interfaces.link.gauge import Measured
+from interfaces.link.gauge import LinkFigures
 from interfaces.stream import network
 from interfaces.wire.fields import Count, Epoch, Message, Number, Text, Time, Wire, Word, epoch, text
 
@@ -15,20 +15,20 @@ Span = Annotated[float, Meta(ge=0, le=1e9)]
 
 
 class WayWire(Wire, frozen=True, omit_defaults=True, gc=False):
-    """`Way`."""
+    """`DirectionConditions`."""
 
     delay: Word
     loss: Word = "0"
     service: Word = "datagram"
 
     @classmethod
-    def of(cls, value: network.Way) -> WayWire:
+    def of(cls, value: network.DirectionConditions) -> WayWire:
         """The wire form."""
         return cls(value.delay, value.loss, value.service)
 
-    def read(self) -> network.Way:
+    def read(self) -> network.DirectionConditions:
         """The conditions."""
-        return network.Way(self.delay, self.loss, self.service)
+        return network.DirectionConditions(self.delay, self.loss, self.service)
 
 
 class SurveyWire(Message, frozen=True, omit_defaults=True, gc=False, tag="survey"):
@@ -62,7 +62,7 @@ class ImpairWire(Message, frozen=True, omit_defaults=True, gc=False, tag="impair
 
 
 class MeasuredWire(Wire, frozen=True, omit_defaults=True, gc=False):
-    """`Measured`."""
+    """`LinkFigures`."""
 
     packets: Count = 0
     lost: Share | None = None
@@ -71,13 +71,13 @@ class MeasuredWire(Wire, frozen=True, omit_defaults=True, gc=False):
     span: Span | None = None
 
     @classmethod
-    def of(cls, value: Measured) -> MeasuredWire:
+    def of(cls, value: LinkFigures) -> MeasuredWire:
         """The wire form."""
         return cls(value.packets, value.lost, value.median, value.p95, value.span)
 
-    def read(self) -> Measured:
+    def read(self) -> LinkFigures:
         """What was measured."""
-        return Measured(self.packets, self.lost, self.median, self.p95, self.span)
+        return LinkFigures(self.packets, self.lost, self.median, self.p95, self.span)
 
 
 class NetworkWire(Message, frozen=True, omit_defaults=True, gc=False, tag="network"):

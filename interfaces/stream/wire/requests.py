@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from interfaces.messages import Ask, Follow, Form, Order, Want
+from interfaces.messages import Ask, Follow, Order, ViewForm, Want
 from interfaces.wire.commands import CommandWire, command_wire
 from interfaces.wire.fields import Count, Epoch, Message, Number, Time, digits, epoch
 
@@ -46,7 +46,7 @@ class FollowWire(Message, frozen=True, omit_defaults=True, gc=False, tag="follow
     """`Follow`."""
 
     number: Number
-    form: Form
+    form: ViewForm
     rate: Rate | None = None
 
     def read(self) -> Follow:

@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
 from interfaces.teleop.measured import AGAIN, NEW, RANGES, Sample
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
+from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.wire.fields import (
     Count,
@@ -32,7 +32,7 @@ MOST_ENTRIES = 4096
 
 
 class EntryWire(Wire, frozen=True, omit_defaults=True, gc=False):
-    """`Entry`."""
+    """`LogEntry`."""
 
     number: Number
     at: Time
@@ -40,13 +40,15 @@ class EntryWire(Wire, frozen=True, omit_defaults=True, gc=False):
     command: CommandWire | None = None
 
     @classmethod
-    def of(cls, entry: Entry, packed: bool) -> EntryWire:
+    def of(cls, entry: LogEntry, packed: bool) -> EntryWire:
         """The wire form."""
         return cls(entry.number, entry.at, entry.command_id, command_wire(entry.command, packed))
 
-    def read(self) -> Entry:
+    def read(self) -> LogEntry:
         """The entry."""
-        return Entry(self.number, self.at, None if self.command is None else self.command.read(), self.command_id)
+        return LogEntry(
+            self.number, self.at, None if self.command is None else self.command.read(), self.command_id
+        )
 
 
 class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders"):

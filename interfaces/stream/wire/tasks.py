@@ -6,11 +6,11 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from interfaces.jobs import Command, Forecast, JobForecast, Load, OperatorLoss
+from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.forms import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
 from interfaces.stream import tasks
-from interfaces.teleop.tasks import MOST_POINTS, Doing, Errand, Go, Halt, Sight, Task, TaskReport
+from interfaces.teleop.tasks import MOST_POINTS, Doing, Errand, Go, Halt, SensedPoints, Task, TaskReport
 from interfaces.wire.fields import Count, Epoch, Message, Number, Stamp, Text, Wire, Word, digits, epoch, text
 from robots.onboard.journey import JourneyState
 from vrs.checks import one_of
@@ -70,13 +70,13 @@ class TaskForm(Wire, frozen=True, omit_defaults=True, gc=False):
         return Halt(self.halt)
 
 
-def _word(do: str) -> Command | tasks.Trial:
+def _word(do: str) -> ListCommand | tasks.Trial:
     """What is asked for in a word.
 
     Raises:
         InvalidValueError: If nothing has that word.
     """
-    words: dict[str, Command | tasks.Trial] = {word.value: word for word in (*Command, *tasks.Trial)}
+    words: dict[str, ListCommand | tasks.Trial] = {word.value: word for word in (*ListCommand, *tasks.Trial)}
     return words[one_of("do", do, words)]
 
 
@@ -132,20 +132,20 @@ class TaskReportForm(Wire, frozen=True, omit_defaults=True, gc=False):
 
 
 class SightForm(Wire, frozen=True, omit_defaults=True, gc=False):
-    """`Sight`."""
+    """`SensedPoints`."""
 
     time: Stamp
     points: Points = ()
     doubt: Doubt | None = None
 
     @classmethod
-    def of(cls, sight: Sight) -> SightForm:
+    def of(cls, sight: SensedPoints) -> SightForm:
         """The wire form."""
         return cls(sight.time, sight.points[:MOST_POINTS], sight.doubt)
 
-    def read(self) -> Sight:
+    def read(self) -> SensedPoints:
         """What is seen."""
-        return Sight(self.time, self.points, self.doubt)
+        return SensedPoints(self.time, self.points, self.doubt)
 
 
 class TaskOrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="task"):

@@ -12,16 +12,21 @@ from interfaces.teleop.architectures.compositions import (
     controller,
 )
 from interfaces.teleop.architectures.controllers import (
-    Controller,
+    DriveController,
     Filtered,
-    Following,
+    FollowingController,
     Immediate,
-    Player,
     PlayerConfig,
+    TimelineController,
 )
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
-from interfaces.teleop.architectures.segments import Packet, Receiver, Sender, Transport
-from interfaces.teleop.architectures.sites import OperatorSite, Position, Report, RobotSite
+from interfaces.teleop.architectures.segments import ArcPacket, Receiver, Sender, Transport
+from interfaces.teleop.architectures.sites import (
+    ArchitectureOperatorSite,
+    ArchitectureReport,
+    ArchitectureRobotSite,
+    PositionSource,
+)
 from interfaces.teleop.architectures.surroundings import (
     Aim,
     CellChanges,
@@ -33,27 +38,27 @@ from interfaces.teleop.architectures.surroundings import (
 __all__ = [
     "ARCHITECTURES",
     "Aim",
+    "ArcPacket",
     "Architecture",
+    "ArchitectureOperatorSite",
+    "ArchitectureReport",
+    "ArchitectureRobotSite",
     "CellChanges",
     "Constants",
-    "Controller",
+    "DriveController",
     "DriveOrders",
     "DriveReport",
     "Filtered",
-    "Following",
+    "FollowingController",
     "Immediate",
-    "OperatorSite",
     "OperatorSurroundings",
-    "Packet",
-    "Player",
     "PlayerConfig",
-    "Position",
+    "PositionSource",
     "Receiver",
-    "Report",
-    "RobotSite",
     "RobotSurroundings",
     "Sender",
     "Sonar",
+    "TimelineController",
     "Transport",
     "architecture",
     "controller",

@@ -8,12 +8,12 @@ from typing import Final, TypeAlias
 
 from interfaces.plugin import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
-    Controller,
+    DriveController,
     Filtered,
-    Following,
+    FollowingController,
     Immediate,
-    Player,
     PlayerConfig,
+    TimelineController,
 )
 from robots.onboard.driving import Posture
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
@@ -38,12 +38,14 @@ class Constants:
         number_in("processing", self.processing, 1e-4, self.period, unit=" s")
 
 
-Architecture: TypeAlias = Callable[[Constants, Posture], Controller]
+Architecture: TypeAlias = Callable[[Constants, Posture], DriveController]
 """Makes a controller for a robot that begins at a posture at time 0."""
 
 
 def _following(law: FieldLaw) -> Architecture:
-    return lambda c, posture: Following(posture, law, c.following, period=c.period, processing=c.processing)
+    return lambda c, posture: FollowingController(
+        posture, law, c.following, period=c.period, processing=c.processing
+    )
 
 
 ARCHITECTURES: Final[dict[str, Architecture]] = {
@@ -52,7 +54,7 @@ ARCHITECTURES: Final[dict[str, Architecture]] = {
     "III": _following(FieldLaw.LITERAL),
     "III-capped": _following(FieldLaw.CAPPED),
     "extended": _following(FieldLaw.CAPPED),
-    "timeline": lambda c, posture: Player(posture, now=0.0, config=c.player),
+    "timeline": lambda c, posture: TimelineController(posture, now=0.0, config=c.player),
 }
 """What makes each architecture's controller."""
 
@@ -72,7 +74,7 @@ def architecture(name: str) -> Architecture:
     return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES, "or MODULE:NAME of your own")]
 
 
-def controller(name: str, posture: Posture, constants: Constants) -> Controller:
+def controller(name: str, posture: Posture, constants: Constants) -> DriveController:
     """Make an architecture's controller.
 
     Args:

@@ -1,6 +1,6 @@
 """What each architecture does with the operator's commands on board: five controllers with one interface.
 
-Source: Han, Kim, Kim, Kim, 2001, section 3.1, for I, II and III; `Player` is ours.
+Source: Han, Kim, Kim, Kim, 2001, section 3.1, for I, II and III; `TimelineController` is ours.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from interfaces.teleop.architectures.segments import Packet
+from interfaces.teleop.architectures.segments import ArcPacket
 from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
@@ -26,10 +26,10 @@ _ROUNDING = 1e-9
 """Times nearer than this [s] are one."""
 
 
-class Controller(Protocol):
+class DriveController(Protocol):
     """Drives the robot by what comes from the operator; it knows no clock and is called once a control period."""
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
         """Take in a packet.
 
         Args:
@@ -60,7 +60,7 @@ class Immediate:
         self._drive, self._until = STAND, -math.inf
         self.executed = 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:  # noqa: ARG002
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:  # noqa: ARG002
         """Take the newest command."""
         if arcs:
             self._drive, self._until = Drive(arcs[-1].v, arcs[-1].w), now + STARVED
@@ -80,7 +80,7 @@ class Filtered:
         self._drive, self._until = STAND, -math.inf
         self.executed = 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:  # noqa: ARG002
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:  # noqa: ARG002
         """Queue the commands."""
         for arc in arcs:
             self._filter.receive(arc, now=now)
@@ -94,7 +94,7 @@ class Filtered:
         return self._drive if now < self._until - _ROUNDING else STAND
 
 
-class Following:
+class FollowingController:
     """Architecture III: the filter at T_p feeds the path generator; the uni-vector field follows the path."""
 
     def __init__(
@@ -118,7 +118,7 @@ class Following:
         """Where on the path each command ends [m], of those that aren't executed."""
         self.executed = 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:  # noqa: ARG002
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:  # noqa: ARG002
         """Queue the commands."""
         for arc in arcs:
             self._filter.receive(arc, now=now)
@@ -165,7 +165,7 @@ class PlayerConfig:
     needn't cover the longest delays."""
 
 
-class Player:
+class TimelineController:
     """Architecture `timeline`: plays the operator's path D behind him, D adaptive, and tracks it."""
 
     def __init__(self, posture: Posture, *, now: float, config: PlayerConfig) -> None:
@@ -184,7 +184,7 @@ class Player:
         """What it aimed at last."""
         return self._tracker.reference
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: Packet, *, now: float) -> None:
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
         """Lengthen the known path, and learn how late it is."""
         self._offset.heard(self._tracker.complete_until, now=now)
         self.D = self._offset.D

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.teleop.architectures.controllers import Controller, Following
-from interfaces.teleop.architectures.sites import Position
+from interfaces.teleop.architectures.controllers import DriveController, FollowingController
+from interfaces.teleop.architectures.sites import PositionSource
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import Chassis
@@ -28,7 +28,7 @@ CONTROL = 0.05
 """Period of the real robot's control [s]."""
 SENSING = ("extended",)
 """Architectures whose robot has sonars, and whose operator has the map of the room."""
-POSITIONS: Final[dict[str, Callable[[MobileRobot], Position]]] = {
+POSITIONS: Final[dict[str, Callable[[MobileRobot], PositionSource]]] = {
     "fused": FusedPosition,
     "laser": LaserPosition,
     "odometry": OdometryPosition,
@@ -79,7 +79,7 @@ def operator_surroundings(room: Room, chassis: Chassis, start: Posture, model: M
 
 
 def robot_surroundings(
-    body: MobileRobot, start: Posture, controller: Controller, period: float, *, since: float = 0.0
+    body: MobileRobot, start: Posture, controller: DriveController, period: float, *, since: float = 0.0
 ) -> RobotSurroundings:
     """What the real robot has on board of it.
 
@@ -105,7 +105,7 @@ def robot_surroundings(
         avoidance,
         MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
-        controller if isinstance(controller, Following) else None,
+        controller if isinstance(controller, FollowingController) else None,
     )
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from interfaces.teleop.architectures.segments import Packet
-from interfaces.teleop.architectures.sites import Report
-from interfaces.teleop.tasks import Doing, Errand, Sight, TaskReport
+from interfaces.teleop.architectures.segments import ArcPacket
+from interfaces.teleop.architectures.sites import ArchitectureReport
+from interfaces.teleop.tasks import Doing, Errand, SensedPoints, TaskReport
 from robots.onboard.driving import Drive, Posture
 
 STILL: Final = Drive(0.02, 0.05)
@@ -37,7 +37,7 @@ class DriveOrders:
     """When the epoch began, by the operator's clock [s]: time 0 of its arcs."""
     start: Posture | None
     """Where it began; None while nobody drives."""
-    packet: Packet
+    packet: ArcPacket
     """What the robot may lack."""
     errands: tuple[Errand, ...] = ()
     """Tasks that it isn't known to have, in their order."""
@@ -65,7 +65,7 @@ class DriveReport:
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
     refused: str = ""
     """Why the newest orders didn't count; empty if they did."""
-    report: Report | None = None
+    report: ArchitectureReport | None = None
     """The architecture's own; None while it's halted."""
     play: float | None = None
     """Time of the operator's path that it's at, from the epoch's beginning [s]; None: the architecture has none."""
@@ -86,5 +86,5 @@ class DriveReport:
     """Way to the goal of that [m]."""
     tasks: TaskReport | None = None
     """How far it is with that; None where that was told a moment ago."""
-    sight: Sight | None = None
+    sight: SensedPoints | None = None
     """What it sees; None where there's nothing new."""

@@ -40,7 +40,7 @@ class Transport(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
+class ArcPacket:
     """Arcs of the operator's path."""
 
     runs: tuple[tuple[int, tuple[ArcSegment, ...]], ...]
@@ -80,7 +80,7 @@ class Sender:
             self._arcs.popleft()
             self._first += 1
 
-    def packet(self, complete_until: float, tail: Sequence[ArcSegment] = ()) -> Packet:
+    def packet(self, complete_until: float, tail: Sequence[ArcSegment] = ()) -> ArcPacket:
         """Make a packet of what the robot may lack.
 
         Args:
@@ -93,7 +93,7 @@ class Sender:
             self.acknowledge(self.count)
         elif len(arcs) > MOST_REPEATED:
             runs = [(self._first, arcs[:half]), (self.count - half, arcs[-half:])]
-        return Packet(tuple(runs), complete_until, tuple(tail))
+        return ArcPacket(tuple(runs), complete_until, tuple(tail))
 
 
 class Receiver:
@@ -105,7 +105,7 @@ class Receiver:
         self.count = 0
         """Arcs given so far, to be acknowledged."""
 
-    def receive(self, packet: Packet) -> list[ArcSegment]:
+    def receive(self, packet: ArcPacket) -> list[ArcSegment]:
         """Take in a packet; return the arcs whose turn it is."""
         taken: list[ArcSegment] = []
         for first, arcs in packet.runs:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from interfaces.teleop.architectures.controllers import Controller
-from interfaces.teleop.architectures.segments import Packet, Receiver, Sender, Transport
+from interfaces.teleop.architectures.controllers import DriveController
+from interfaces.teleop.architectures.segments import ArcPacket, Receiver, Sender, Transport
 from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSurroundings, RobotSurroundings
-from interfaces.teleop.listening import Deed
+from interfaces.teleop.listening import CommandRecord
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
@@ -19,7 +19,7 @@ from vrs.mobile.model import braking, limited
 from vrs.segment import ArcSegment, known_arc
 
 
-class Position(Protocol):
+class PositionSource(Protocol):
     """Whatever tells a robot where it is."""
 
     def posture(self) -> Posture:
@@ -27,7 +27,7 @@ class Position(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class ArchitectureReport:
     """What the robot sends back."""
 
     number: int
@@ -47,7 +47,7 @@ class Report:
         return 48 + (0 if self.changes is None else self.changes.size)
 
 
-class OperatorSite:
+class ArchitectureOperatorSite:
     """The virtual robot, which answers at once; the posture estimator; and what is sent."""
 
     def __init__(
@@ -80,7 +80,7 @@ class OperatorSite:
         self._model = model
         self.surroundings = surroundings
         """What the virtual robot avoids, if anything."""
-        self.listener: Callable[[Deed], object] | None = None
+        self.listener: Callable[[CommandRecord], object] | None = None
         """Is told of each command at once."""
         self.before = STAND
         """What was driven last."""
@@ -90,7 +90,7 @@ class OperatorSite:
         """Where the virtual robot is after all commands."""
         return self._end
 
-    def drive(self, v: float, w: float, *, now: float) -> Packet:
+    def drive(self, v: float, w: float, *, now: float) -> ArcPacket:
         """Carry out a command of the operator, as far as the limits allow.
 
         Args:
@@ -110,18 +110,18 @@ class OperatorSite:
         command = DriveCommand(v, w, period, execute_at=start)
         receipt = self.engine.execute(command)
         if self.listener is not None:
-            self.listener(Deed(self._clock.now(), command, receipt, refused=False))
+            self.listener(CommandRecord(self._clock.now(), command, receipt, refused=False))
         self.estimator.command(v, w)
         arc = known_arc(start, period, self._end, v, w, receipt.command_id)
         self._sender.add(arc)
         self._end = Posture(*advanced(self._end, v, w, period))
         return self._sender.packet(arc.end, self._tail(arc))
 
-    def repeat(self) -> Packet:
+    def repeat(self) -> ArcPacket:
         """What goes to the robot while the operator gives no command."""
         return self._sender.packet(self.engine.timeline.end)
 
-    def receive(self, report: Report, *, now: float) -> None:
+    def receive(self, report: ArchitectureReport, *, now: float) -> None:
         """Correct the estimate, repeat no more what has arrived, and learn what changed around the robot [s]."""
         if self.surroundings is not None and report.changes is not None:
             self.surroundings.receive(report.changes, now=now)
@@ -138,13 +138,13 @@ class OperatorSite:
         return tail
 
 
-class RobotSite:
+class ArchitectureRobotSite:
     """Takes packets, knows where the robot is, lets the architecture's controller drive, and reports."""
 
     def __init__(
         self,
-        controller: Controller,
-        position: Position,
+        controller: DriveController,
+        position: PositionSource,
         limits: DriveLimits,
         *,
         period: float,
@@ -168,7 +168,7 @@ class RobotSite:
         self.posture = position.posture()
         """Where the robot took itself to be at the last drive."""
 
-    def receive(self, packet: Packet, *, now: float) -> None:
+    def receive(self, packet: ArcPacket, *, now: float) -> None:
         """Take in a packet [s]."""
         self.controller.receive(self._receiver.receive(packet), packet, now=now)
 
@@ -181,8 +181,10 @@ class RobotSite:
         self._drive = kept(wanted.v, wanted.w, self._drive.v, self._period, self._limits)
         return self._drive
 
-    def report(self, *, now: float) -> Report:
+    def report(self, *, now: float) -> ArchitectureReport:
         """What goes back to the operator now [s]."""
         self._reports += 1
         changes = None if self._surroundings is None else self._surroundings.changes(now=now)
-        return Report(self._reports, self.controller.executed, self.posture, self._receiver.count, changes)
+        return ArchitectureReport(
+            self._reports, self.controller.executed, self.posture, self._receiver.count, changes
+        )

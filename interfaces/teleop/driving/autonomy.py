@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from interfaces.jobs.carrying import ArmControl, NoArm, Screen, SilentSpeaker, Speaker, TextScreen
 from interfaces.jobs.file import digest
 from interfaces.jobs.messages import (
-    Command,
     Done,
-    End,
-    Failed,
+    EndJob,
     Interrupted,
+    JobFailed,
+    ListCommand,
     Load,
-    Lost,
     MoveTo,
+    OperatorLost,
     Request,
     RunArm,
     Show,
@@ -93,8 +93,8 @@ class Autonomy:
             case Load():
                 self._runner.receive(task, now=now)
                 self._digest = digest(self._runner.jobs)
-            case Command():
-                if task in (Command.RUN, Command.RESUME) and not self._runner.running:
+            case ListCommand():
+                if task in (ListCommand.RUN, ListCommand.RESUME) and not self._runner.running:
                     self._leave()
                 self._runner.receive(task, now=now)
         self._turn(now)
@@ -107,7 +107,7 @@ class Autonomy:
 
     def lost(self, reason: str, *, now: float) -> None:
         """The operator is lost: stop or go on, as the policy says."""
-        self._runner.receive(Lost(reason), now=now)
+        self._runner.receive(OperatorLost(reason), now=now)
         self._turn(now)
         if self.loss is OperatorLoss.STOP:
             self._leave(reason)
@@ -168,14 +168,14 @@ class Autonomy:
         if self._move and self._next is None and pilot.state not in GOING:
             attempt, self._move = self._move, 0
             well = pilot.state is JourneyState.ARRIVED
-            runner.receive(Done(attempt) if well else Failed(attempt, pilot.reason or "it was ended"), now=now)
+            runner.receive(Done(attempt) if well else JobFailed(attempt, pilot.reason or "it was ended"), now=now)
         if self._voice and not hands.speaker.is_speaking(now=now):
             attempt, self._voice, self._says = self._voice, 0, ""
             runner.receive(Done(attempt), now=now)
         outcome = hands.arm.outcome(now=now) if self._work else None
         if outcome is not None:
             attempt, self._work = self._work, 0
-            runner.receive(Failed(attempt, outcome) if outcome else Done(attempt), now=now)
+            runner.receive(JobFailed(attempt, outcome) if outcome else Done(attempt), now=now)
         return runner.advance(now=now)
 
     def _begin(self, request: Request, now: float) -> None:
@@ -193,10 +193,10 @@ class Autonomy:
             case RunArm(attempt, program, source):
                 refusal = hands.arm.run(program, source, now=now)
                 if refusal:
-                    self._runner.receive(Failed(attempt, refusal), now=now)
+                    self._runner.receive(JobFailed(attempt, refusal), now=now)
                 else:
                     self._work = attempt
-            case End(attempt):
+            case EndJob(attempt):
                 self._end(attempt, now)
 
     def _end(self, attempt: int, now: float) -> None:

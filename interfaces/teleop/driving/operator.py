@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Final, TypeAlias
 
 from interfaces.link.quantiles import SlidingQuantiles
-from interfaces.teleop.architectures import OperatorSite, OperatorSurroundings, Packet, Transport
+from interfaces.teleop.architectures import ArchitectureOperatorSite, ArcPacket, OperatorSurroundings, Transport
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
 from interfaces.teleop.driving.deviation import Deviation, PathDeviation
 from interfaces.teleop.line import SiteLine
-from interfaces.teleop.tasks import Doing, Errand, Halt, Sight, Task, TaskReport, stops
+from interfaces.teleop.tasks import Doing, Errand, Halt, SensedPoints, Task, TaskReport, stops
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import finite
 from vrs.mobile import MobileModel
@@ -34,7 +34,7 @@ ERRANDS: Final = 4
 """So many that the robot isn't known to have are sent at once."""
 WAITS: Final = 5.0
 """What is given while the robot comes to rest waits so long for that [s]."""
-TAKES_UP: Final = 4.0
+EPOCH_TIMEOUT: Final = 4.0
 """So long, and twice the usual round trip, a robot has to follow a new epoch [s]."""
 
 
@@ -75,7 +75,7 @@ class DrivingOperator:
         self.round_trips = SlidingQuantiles(1000, 120.0)
         self.tasks: TaskReport | None = None
         """How far the robot is with what it does by itself; None before it has said."""
-        self.sight: Sight | None = None
+        self.sight: SensedPoints | None = None
         """What it saw last."""
         self._errands: list[Errand] = []
         self._errand = 0
@@ -96,7 +96,9 @@ class DrivingOperator:
         self.began, self.start = now, posture
         self.steps = self._over = 0
         self._heard = now
-        self.site = OperatorSite(self._model, posture, Transport.DATAGRAMS, surroundings=self._around(posture))
+        self.site = ArchitectureOperatorSite(
+            self._model, posture, Transport.DATAGRAMS, surroundings=self._around(posture)
+        )
         self.path = PathDeviation(0.0, posture)
         self.deviation = None
 
@@ -231,17 +233,17 @@ class DrivingOperator:
     def advance(self, *, now: float) -> tuple[DriveOrders, ...]:
         """Do what is due by now [s], and say what is to be sent."""
         self._now = now
-        packet: Packet | None = None
+        packet: ArcPacket | None = None
         while now >= self._due - 1e-9:
             packet = self._step()
         if packet is None:
             if (not self.halted or self._over) and not self._prompt:
                 return ()
             # That a drive is over is said at once.
-            packet = Packet((), 0.0)
+            packet = ArcPacket((), 0.0)
         if self.halted in {"", BY_ITSELF} and self.report is not None and self.report.epoch < self.epoch:
             usual = self.round_trips.quantile(0.95) or 0.0
-            if now > self.began + TAKES_UP + 2.0 * usual:
+            if now > self.began + EPOCH_TIMEOUT + 2.0 * usual:
                 self.halted = ""
                 self.halt(self.report.refused or "the robot doesn't take up the new drive")
         self._packets += 1
@@ -263,18 +265,18 @@ class DrivingOperator:
     def _due(self) -> float:
         return self.began + self.next_t
 
-    def _step(self) -> Packet:
+    def _step(self) -> ArcPacket:
         """One command; of a drive that's over the virtual robot only comes to rest."""
         t = self.next_t
         wished = self._wish if self.began + t < self._until else self._braked()
         self.steps += 1
         if self.halted and self.stands:
-            return Packet((), 0.0)
+            return ArcPacket((), 0.0)
         packet = self.site.drive(wished.v, wished.w, now=t)
         v, w = self.site.before
         x, y, theta = self.site.engine.posture(t).tolist()
         self.path.add(ArcSegment(t, self._model.period, (x, y, theta), v, w))
-        return Packet((), 0.0) if self.halted else packet
+        return ArcPacket((), 0.0) if self.halted else packet
 
     def _braked(self) -> Drive:
         """The next command on the way to rest, along the arc."""

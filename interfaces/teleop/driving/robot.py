@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from interfaces.teleop.architectures import Player, Position, RobotSite
+from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
 from interfaces.teleop.driving.autonomy import Autonomy
 from interfaces.teleop.hosting import LOST, lost
-from interfaces.teleop.tasks import Doing, Errand, Sight, TaskReport, stops
+from interfaces.teleop.tasks import Doing, Errand, SensedPoints, TaskReport, stops
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.sensor_watch import SoundPosition
@@ -56,15 +56,15 @@ class DrivenRobot:
 
     def __init__(
         self,
-        make: Callable[[Posture, float], RobotSite],
-        position: Position,
+        make: Callable[[Posture, float], ArchitectureRobotSite],
+        position: PositionSource,
         limits: DriveLimits,
         *,
         now: float,
         world: Callable[[], float | None] = lambda: None,
         config: DrivenConfig | None = None,
         autonomy: Autonomy | None = None,
-        sight: Callable[[], Sight | None] = lambda: None,
+        sight: Callable[[], SensedPoints | None] = lambda: None,
     ) -> None:
         """Stand, and wait for an epoch.
 
@@ -88,7 +88,7 @@ class DrivenRobot:
         if not isinstance(position, SoundPosition):
             position = SoundPosition(position, lambda: self._now)
         self._position: SoundPosition = position
-        self._site: RobotSite | None = None
+        self._site: ArchitectureRobotSite | None = None
         self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
         self.epoch, self.halted = 0, ""
         self._began = 0.0
@@ -279,7 +279,7 @@ class DrivenRobot:
         self._reports += 1
         site = None if self.halted else self._site
         autonomy = self.autonomy
-        player = site.controller if site is not None and isinstance(site.controller, Player) else None
+        player = site.controller if site is not None and isinstance(site.controller, TimelineController) else None
         return DriveReport(
             epoch=self.epoch,
             number=self._reports,

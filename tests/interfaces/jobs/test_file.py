@@ -10,21 +10,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from interfaces.jobs import (
-    Arm,
-    Command,
-    Entry,
+    ArmJob,
     Job,
+    JobEntry,
     JobFile,
     JobList,
     JobProgress,
     JobRunner,
+    JobStage,
+    ListCommand,
     Load,
-    Message,
-    Move,
+    MessageJob,
+    MoveJob,
     Progress,
-    Stage,
-    Voice,
-    Wait,
+    VoiceJob,
+    WaitJob,
     read_jobs,
     written_jobs,
 )
@@ -35,35 +35,35 @@ NUMBERS = st.floats(-1000, 1000)
 GOALS = st.builds(Goal, NUMBERS, NUMBERS, st.none() | NUMBERS)
 TEXTS = st.text(min_size=1, max_size=30).filter(str.strip)
 JOBS: st.SearchStrategy[Job] = st.one_of(
-    st.builds(Move, GOALS | st.just("here")),
-    st.builds(Voice, TEXTS),
-    st.builds(Message, TEXTS),
-    st.builds(Wait, st.none() | st.floats(0, 86400)),
-    st.builds(Arm, TEXTS, st.text(max_size=100)),
+    st.builds(MoveJob, GOALS | st.just("here")),
+    st.builds(VoiceJob, TEXTS),
+    st.builds(MessageJob, TEXTS),
+    st.builds(WaitJob, st.none() | st.floats(0, 86400)),
+    st.builds(ArmJob, TEXTS, st.text(max_size=100)),
 )
 
 
 @given(jobs=st.lists(JOBS, max_size=8), goal=GOALS, data=st.data())
 def test_what_is_written_is_read_again_to_the_bit(jobs: list[Job], goal: Goal, data: st.DataObject) -> None:
     numbers = data.draw(st.permutations(range(1, len(jobs) + 1)))
-    entries = tuple(Entry(number, job) for number, job in zip(numbers, jobs, strict=True))
-    stages = data.draw(st.lists(st.sampled_from(Stage), min_size=len(jobs), max_size=len(jobs)))
+    entries = tuple(JobEntry(number, job) for number, job in zip(numbers, jobs, strict=True))
+    stages = data.draw(st.lists(st.sampled_from(JobStage), min_size=len(jobs), max_size=len(jobs)))
     listed = JobList(entries, {"here": goal})
     progress = Progress(
-        Stage.PAUSED, tuple(JobProgress(n, s, "so") for n, s in zip(numbers, stages, strict=True)), "why"
+        JobStage.PAUSED, tuple(JobProgress(n, s, "so") for n, s in zip(numbers, stages, strict=True)), "why"
     )
     assert read_jobs(written_jobs(listed, progress), "x") == (listed, progress)
 
 
 def test_a_list_survives_a_restart(tmp_path: Path) -> None:
     file = JobFile(tmp_path / "deep" / "jobs.json")
-    runner = JobRunner(JobList.of(Move("B"), Wait(), places={"B": Goal(1.0, 2.0, 0.5)}))
-    runner.receive(Command.RUN, now=0.0)
+    runner = JobRunner(JobList.of(MoveJob("B"), WaitJob(), places={"B": Goal(1.0, 2.0, 0.5)}))
+    runner.receive(ListCommand.RUN, now=0.0)
     file.save(runner.jobs, runner.progress)
     again = JobRunner()
     again.receive(Load(*JobFile(file.path).load()), now=0.0)
     assert again.jobs == runner.jobs
-    assert again.progress.stage is Stage.PAUSED
+    assert again.progress.stage is JobStage.PAUSED
     assert [path.name for path in file.path.parent.iterdir()] == ["jobs.json"]
     assert '"do": "move"' in file.path.read_text()
 
@@ -87,7 +87,7 @@ def test_what_is_damaged_says_so_and_is_kept(tmp_path: Path, text: str, says: st
     with pytest.raises(FormatError, match=says):
         file.load()
     assert path.read_text() == text
-    jobs = JobList.of(Wait(1.0))
+    jobs = JobList.of(WaitJob(1.0))
     file.save(jobs, Progress.of(jobs))
     assert (tmp_path / "jobs.json.damaged").read_text() == text
     assert JobFile(path).load() == (jobs, Progress.of(jobs))
@@ -125,16 +125,16 @@ def test_every_damaged_file_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_reason_of_any_length_can_be_read_again() -> None:
-    jobs, why = JobList.of(Wait()), "x" * 10_000
-    progress = Progress(Stage.FAILED, (JobProgress(1, Stage.FAILED, why),), why)
+    jobs, why = JobList.of(WaitJob()), "x" * 10_000
+    progress = Progress(JobStage.FAILED, (JobProgress(1, JobStage.FAILED, why),), why)
     _, found = read_jobs(written_jobs(jobs, progress), "x")
-    assert found.stage is Stage.FAILED
+    assert found.stage is JobStage.FAILED
     assert 100 <= len(found.reason) == len(found.jobs[0].reason) < len(why)
 
 
 def test_a_list_that_cant_be_written_leaves_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As where the disk is full: what is in the file's place is a whole list at any time."""
-    file, jobs = JobFile(tmp_path / "jobs.json"), JobList.of(Wait(1.0))
+    file, jobs = JobFile(tmp_path / "jobs.json"), JobList.of(WaitJob(1.0))
     file.save(jobs, Progress.of(jobs))
     with file.path.open("rb") as reading:
         file.save(jobs, Progress.of(jobs))

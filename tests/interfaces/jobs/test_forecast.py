@@ -6,8 +6,19 @@ import math
 
 import pytest
 
-from interfaces.jobs import Command, Forecast, JobList, Load, Message, Move, Stage, Voice, Wait, dry_run
-from interfaces.jobs.values import Arm
+from interfaces.jobs import (
+    Forecast,
+    JobList,
+    JobStage,
+    ListCommand,
+    Load,
+    MessageJob,
+    MoveJob,
+    VoiceJob,
+    WaitJob,
+    dry_run,
+)
+from interfaces.jobs.values import ArmJob
 from interfaces.teleop.tasks import Doing
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
@@ -18,7 +29,7 @@ OPEN = RouteMap((10.0, 8.0), [], RouteConfig(0.4, 0.25))
 
 
 def test_a_move_takes_what_the_limits_say() -> None:
-    forecast = dry_run(JobList.of(Move(Goal(6.0, 2.0))), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits)
+    forecast = dry_run(JobList.of(MoveJob(Goal(6.0, 2.0))), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits)
     # 5 m straight ahead can't take less than at 0.5 m/s, with what speeding up and braking need.
     fastest = 5.0 / 0.5 + 0.5 / 0.52
     assert fastest <= forecast.lasts <= 1.6 * fastest
@@ -27,7 +38,7 @@ def test_a_move_takes_what_the_limits_say() -> None:
 
 
 def test_each_move_begins_where_the_one_before_ended() -> None:
-    jobs = JobList.of(Move(Goal(3.0, 2.0, math.pi)), Wait(2.0), Wait(), Move(Goal(1.0, 2.0, math.pi)))
+    jobs = JobList.of(MoveJob(Goal(3.0, 2.0, math.pi)), WaitJob(2.0), WaitJob(), MoveJob(Goal(1.0, 2.0, math.pi)))
     there, wait, key, back = dry_run(jobs, Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits).jobs
     assert there.lasts is not None
     assert (wait.begins, wait.lasts) == (there.lasts, 2.0)
@@ -38,7 +49,7 @@ def test_each_move_begins_where_the_one_before_ended() -> None:
 
 
 def test_a_program_takes_what_somebody_says_or_fails() -> None:
-    jobs = JobList.of(Arm("pick"), Wait(1.0))
+    jobs = JobList.of(ArmJob("pick"), WaitJob(1.0))
     here = Posture(1.0, 2.0, 0.0)
     assert dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda _: 7.5).lasts == 8.5
     failing = dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda job: f"no program {job.program}")
@@ -49,19 +60,21 @@ def test_a_program_takes_what_somebody_says_or_fails() -> None:
 def test_the_prediction_is_about_what_happens() -> None:
     rig = Rig()
     rig.begin()
-    jobs = JobList.of(Voice("Good morning"), Move(Goal(7.0, 1.0, 0.0)), Move(Goal(2.0, 2.0)))
+    jobs = JobList.of(VoiceJob("Good morning"), MoveJob(Goal(7.0, 1.0, 0.0)), MoveJob(Goal(2.0, 2.0)))
     predicted = dry_run(jobs, Posture(*rig.truth), rig.roads, MODEL.limits).lasts
-    rig.operator.order(Load(jobs), Command.RUN)
+    rig.operator.order(Load(jobs), ListCommand.RUN)
     rig.run(1.0)
     began = rig.now - 1.0
     while rig.operator.doing is not Doing.NOTHING:
         rig.run(0.2)
         assert rig.now < began + 3 * predicted
     assert rig.operator.tasks is not None
-    assert rig.operator.tasks.progress.stage is Stage.DONE
+    assert rig.operator.tasks.progress.stage is JobStage.DONE
     assert rig.now - began == pytest.approx(predicted, rel=0.15)
 
 
 def test_a_message_takes_no_time() -> None:
-    look, key = dry_run(JobList.of(Message("Look"), Wait(2.0)), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits).jobs
+    look, key = dry_run(
+        JobList.of(MessageJob("Look"), WaitJob(2.0)), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits
+    ).jobs
     assert (look.lasts, key.begins) == (0.0, 0.0)

@@ -11,37 +11,37 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from interfaces.jobs import (
-    Arm,
-    Command,
+    ArmJob,
     Done,
-    End,
-    Entry,
-    Failed,
+    EndJob,
     Interrupted,
     Job,
+    JobEntry,
+    JobFailed,
     JobList,
     JobRunner,
+    JobStage,
+    ListCommand,
     Load,
-    Lost,
-    Message,
-    Move,
+    MessageJob,
+    MoveJob,
     MoveTo,
     OperatorLoss,
+    OperatorLost,
     Progress,
     Request,
     RunnerConfig,
     Show,
     Speak,
-    Stage,
-    Voice,
-    Wait,
+    VoiceJob,
+    WaitJob,
 )
 from robots.onboard.journey import Goal
 from vrs.errors import InvalidValueError
 
 A, B = Goal(1.0, 1.0, 0.0), Goal(4.0, 2.0)
 SCENARIO = JobList.of(
-    Move("B"), Voice("Hello!"), Message("Please put the book on my top side!"), Wait(), Move("A"),
+    MoveJob("B"), VoiceJob("Hello!"), MessageJob("Please put the book on my top side!"), WaitJob(), MoveJob("A"),
     places={"A": A, "B": B},
 )  # fmt: skip
 
@@ -59,7 +59,7 @@ def asked(runner: JobRunner, kind: type[Request], now: float) -> Any:
 
 def test_the_papers_scenario() -> None:
     runner = JobRunner(SCENARIO)
-    assert runner.receive(Command.RUN, now=0.0) == ""
+    assert runner.receive(ListCommand.RUN, now=0.0) == ""
     there = asked(runner, MoveTo, 0.0)
     assert there.goal == B
     runner.receive(Done(there.attempt), now=9.0)
@@ -71,28 +71,28 @@ def test_the_papers_scenario() -> None:
     assert runner.waits_for_key
     assert runner.next_deadline() is None
     assert runner.advance(now=5000.0) == ()
-    assert runner.receive(Command.KEY, now=5000.0) == ""
+    assert runner.receive(ListCommand.KEY, now=5000.0) == ""
     back = asked(runner, MoveTo, 5000.0)
     assert back.goal == A
     runner.receive(Done(back.attempt), now=5010.0)
-    assert runner.progress.stage is Stage.DONE
+    assert runner.progress.stage is JobStage.DONE
     assert set(stages(runner)) == {"done"}
-    assert "done: run it" in runner.receive(Command.RESUME, now=5011.0)
+    assert "done: run it" in runner.receive(ListCommand.RESUME, now=5011.0)
 
 
-@pytest.mark.parametrize("job", [Move(A), Voice("Hello!"), Wait(5.0), Wait(), Arm("pick")])
+@pytest.mark.parametrize("job", [MoveJob(A), VoiceJob("Hello!"), WaitJob(5.0), WaitJob(), ArmJob("pick")])
 @pytest.mark.parametrize(
-    "how", [Command.ABORT, Command.PAUSE, Interrupted("it touches a chair"), Lost("link loss")]
+    "how", [ListCommand.ABORT, ListCommand.PAUSE, Interrupted("it touches a chair"), OperatorLost("link loss")]
 )
 def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how: Any) -> None:
-    jobs = JobList.of(Message("Hm"), job, Move(B))
+    jobs = JobList.of(MessageJob("Hm"), job, MoveJob(B))
     runner = JobRunner(jobs)
-    runner.receive(Command.RUN, now=0.0)
+    runner.receive(ListCommand.RUN, now=0.0)
     begun = [request for request in runner.advance(now=0.0) if not isinstance(request, Show)]
     assert runner.receive(how, now=1.0) == ""
     ended = [request for request in runner.advance(now=1.0) if not isinstance(request, Show)]
-    assert ended == [End(request.attempt) for request in begun]
-    stage = "aborted" if how is Command.ABORT else "paused"
+    assert ended == [EndJob(request.attempt) for request in begun]
+    stage = "aborted" if how is ListCommand.ABORT else "paused"
     assert stages(runner) == ["done", stage, "planned"]
     assert runner.progress.stage == stage
     assert runner.jobs == jobs
@@ -102,62 +102,62 @@ def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how:
     assert runner.advance(now=100.0) == ()
     assert stages(runner) == ["done", stage, "planned"]
     # And it can go on.
-    assert runner.receive(Command.RESUME, now=100.0) == ""
+    assert runner.receive(ListCommand.RESUME, now=100.0) == ""
     assert stages(runner) == ["done", "running", "planned"]
     again = runner.advance(now=100.0)
     assert [type(request) for request in again] == [type(request) for request in begun]
 
 
 def test_a_wait_that_was_paused_goes_on_with_what_was_left() -> None:
-    runner = JobRunner(JobList.of(Wait(10.0), Voice("Now")))
-    runner.receive(Command.RUN, now=0.0)
+    runner = JobRunner(JobList.of(WaitJob(10.0), VoiceJob("Now")))
+    runner.receive(ListCommand.RUN, now=0.0)
     assert runner.next_deadline() == 10.0
-    runner.receive(Command.PAUSE, now=4.0)
+    runner.receive(ListCommand.PAUSE, now=4.0)
     assert runner.next_deadline() is None
-    runner.receive(Command.RESUME, now=100.0)
+    runner.receive(ListCommand.RESUME, now=100.0)
     assert runner.next_deadline() == 106.0
     assert runner.advance(now=105.9) == ()
     assert asked(runner, Speak, 106.0).text == "Now"
 
 
 def test_waits_end_when_they_were_to_however_late_somebody_looks() -> None:
-    runner = JobRunner(JobList.of(Wait(1.0), Wait(2.0), Wait(4.0)))
-    runner.receive(Command.RUN, now=0.0)
+    runner = JobRunner(JobList.of(WaitJob(1.0), WaitJob(2.0), WaitJob(4.0)))
+    runner.receive(ListCommand.RUN, now=0.0)
     runner.advance(now=3.5)
     assert stages(runner) == ["done", "done", "running"]
     assert runner.next_deadline() == 7.0
 
 
 def test_what_takes_too_long_has_failed_and_is_ended() -> None:
-    runner = JobRunner(JobList.of(Voice("Hello!")), RunnerConfig(longest_voice=30.0))
-    runner.receive(Command.RUN, now=0.0)
+    runner = JobRunner(JobList.of(VoiceJob("Hello!")), RunnerConfig(longest_voice=30.0))
+    runner.receive(ListCommand.RUN, now=0.0)
     said = asked(runner, Speak, 0.0)
-    assert runner.advance(now=30.0) == (End(said.attempt),)
-    assert runner.progress.stage is Stage.FAILED
+    assert runner.advance(now=30.0) == (EndJob(said.attempt),)
+    assert runner.progress.stage is JobStage.FAILED
     assert "longer" in runner.progress.reason
 
 
 def test_a_job_that_fails_says_why_and_can_be_tried_again() -> None:
     runner = JobRunner(SCENARIO)
-    runner.receive(Command.RUN, now=0.0)
+    runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveTo, 0.0)
-    runner.receive(Failed(first.attempt, "there's no way"), now=3.0)
-    assert runner.progress.stage is Stage.FAILED
+    runner.receive(JobFailed(first.attempt, "there's no way"), now=3.0)
+    assert runner.progress.stage is JobStage.FAILED
     assert runner.progress.reason == "there's no way"
     assert runner.advance(now=4.0) == ()
-    runner.receive(Command.RESUME, now=5.0)
+    runner.receive(ListCommand.RESUME, now=5.0)
     assert asked(runner, MoveTo, 5.0).attempt > first.attempt
 
 
 @pytest.mark.parametrize("loss", OperatorLoss)
 def test_losing_the_operator_follows_the_policy(loss: OperatorLoss) -> None:
     runner = JobRunner(SCENARIO, RunnerConfig(loss=loss))
-    runner.receive(Command.RUN, now=0.0)
+    runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveTo, 0.0)
-    runner.receive(Lost("the link is lost"), now=1.0)
+    runner.receive(OperatorLost("the link is lost"), now=1.0)
     if loss is OperatorLoss.STOP:
-        assert runner.advance(now=1.0) == (End(first.attempt),)
-        assert (runner.progress.stage, runner.progress.reason) == (Stage.PAUSED, "the link is lost")
+        assert runner.advance(now=1.0) == (EndJob(first.attempt),)
+        assert (runner.progress.stage, runner.progress.reason) == (JobStage.PAUSED, "the link is lost")
     else:
         assert runner.advance(now=1.0) == ()
         runner.receive(Done(first.attempt), now=2.0)
@@ -166,58 +166,70 @@ def test_losing_the_operator_follows_the_policy(loss: OperatorLoss) -> None:
 
 def test_a_list_is_edited_where_it_stands_still() -> None:
     runner = JobRunner(SCENARIO)
-    runner.receive(Command.RUN, now=0.0)
+    runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveTo, 0.0)
     assert "pause or abort" in runner.receive(Load(SCENARIO.removed(3)), now=0.5)
     runner.receive(Done(first.attempt), now=1.0)
-    runner.receive(Command.PAUSE, now=1.5)
-    edited = SCENARIO.moved(5, 0).changed(2, Voice("Good day!"))
+    runner.receive(ListCommand.PAUSE, now=1.5)
+    edited = SCENARIO.moved(5, 0).changed(2, VoiceJob("Good day!"))
     assert runner.receive(Load(edited), now=2.0) == ""
     # The job that was paused is another one now: the list has nothing that's half done.
-    assert runner.progress.stage is Stage.PLANNED
-    runner.receive(Command.RESUME, now=3.0)
+    assert runner.progress.stage is JobStage.PLANNED
+    runner.receive(ListCommand.RESUME, now=3.0)
     runner.advance(now=3.0)
     # What is done stays done, wherever it was put; what was put before it comes first.
     assert [(entry.number, job.stage) for entry, job in zip(edited.entries, runner.progress.jobs, strict=True)] == [
-        (5, Stage.RUNNING), (1, Stage.DONE), (6, Stage.PLANNED), (3, Stage.PLANNED), (4, Stage.PLANNED)
+        (5, JobStage.RUNNING), (1, JobStage.DONE), (6, JobStage.PLANNED), (3, JobStage.PLANNED),
+        (4, JobStage.PLANNED)
     ]  # fmt: skip
 
 
 def test_a_list_that_was_being_done_when_it_was_saved_is_paused() -> None:
     runner = JobRunner(SCENARIO)
-    runner.receive(Command.RUN, now=0.0)
+    runner.receive(ListCommand.RUN, now=0.0)
     other = JobRunner()
     assert other.receive(Load(runner.jobs, runner.progress), now=0.0) == ""
-    assert other.progress.stage is Stage.PAUSED
+    assert other.progress.stage is JobStage.PAUSED
     assert "anew" in other.progress.reason
     assert other.advance(now=1.0) == ()
-    assert other.receive(Command.RESUME, now=2.0) == ""
+    assert other.receive(ListCommand.RESUME, now=2.0) == ""
     assert asked(other, MoveTo, 2.0).goal == B
 
 
 @pytest.mark.parametrize(
     ("command", "says"),
-    [(Command.RUN, "no job"), (Command.PAUSE, "isn't being done"), (Command.RESUME, "no job"),
-     (Command.ABORT, "isn't being done"), (Command.KEY, "waits for the key")],
+    [(ListCommand.RUN, "no job"), (ListCommand.PAUSE, "isn't being done"), (ListCommand.RESUME, "no job"),
+     (ListCommand.ABORT, "isn't being done"), (ListCommand.KEY, "waits for the key")],
 )  # fmt: skip
-def test_what_cant_be_done_now_says_why(command: Command, says: str) -> None:
+def test_what_cant_be_done_now_says_why(command: ListCommand, says: str) -> None:
     assert says in JobRunner().receive(command, now=0.0)
 
 
 def test_edits_make_lists_that_are_whole() -> None:
-    jobs = SCENARIO.added(Wait(1.0), 0)
+    jobs = SCENARIO.added(WaitJob(1.0), 0)
     assert [entry.number for entry in jobs.entries] == [6, 1, 2, 3, 4, 5]
-    assert jobs.moved(6, 5).entries[5].job == Wait(1.0)
+    assert jobs.moved(6, 5).entries[5].job == WaitJob(1.0)
     assert jobs.removed(6) == SCENARIO
     with pytest.raises(InvalidValueError, match="place of this list"):
-        jobs.added(Move("C"))
+        jobs.added(MoveJob("C"))
     with pytest.raises(InvalidValueError, match="of this list"):
         jobs.removed(77)
     with pytest.raises(InvalidValueError, match="at most 64"):
-        JobList.of(*[Wait(1.0)] * 65)
+        JobList.of(*[WaitJob(1.0)] * 65)
 
 
-JOBS = st.sampled_from([Move(A), Move("A"), Voice("Hi"), Message("Look"), Wait(), Wait(0.0), Wait(3.0), Arm("p")])
+JOBS = st.sampled_from(
+    [
+        MoveJob(A),
+        MoveJob("A"),
+        VoiceJob("Hi"),
+        MessageJob("Look"),
+        WaitJob(),
+        WaitJob(0.0),
+        WaitJob(3.0),
+        ArmJob("p"),
+    ]
+)
 
 
 class Doing(RuleBasedStateMachine):
@@ -232,7 +244,7 @@ class Doing(RuleBasedStateMachine):
 
     def take(self) -> None:
         for request in self.runner.advance(now=self.now):
-            if isinstance(request, End):
+            if isinstance(request, EndJob):
                 assert request.attempt in self.open
                 self.open.remove(request.attempt)
                 self.over.add(request.attempt)
@@ -240,14 +252,14 @@ class Doing(RuleBasedStateMachine):
                 assert request.attempt not in self.open | self.over
                 self.open.add(request.attempt)
 
-    @rule(command=st.sampled_from(Command))
-    def command(self, command: Command) -> None:
+    @rule(command=st.sampled_from(ListCommand))
+    def command(self, command: ListCommand) -> None:
         before = self.runner.progress
         refused = self.runner.receive(command, now=self.now)
         if refused:
             assert self.runner.progress == before
-        elif command is Command.ABORT:
-            assert self.runner.progress.stage is Stage.ABORTED
+        elif command is ListCommand.ABORT:
+            assert self.runner.progress.stage is JobStage.ABORTED
         self.take()
 
     @precondition(lambda self: self.open)
@@ -255,7 +267,7 @@ class Doing(RuleBasedStateMachine):
     def answer(self, well: bool) -> None:
         attempt = self.open.pop()
         self.over.add(attempt)
-        self.runner.receive(Done(attempt) if well else Failed(attempt, "so"), now=self.now)
+        self.runner.receive(Done(attempt) if well else JobFailed(attempt, "so"), now=self.now)
         self.take()
 
     @precondition(lambda self: self.over)
@@ -263,11 +275,11 @@ class Doing(RuleBasedStateMachine):
     def answer_late(self, data: st.DataObject, well: bool) -> None:
         before = self.runner.progress
         attempt = data.draw(st.sampled_from(sorted(self.over)))
-        self.runner.receive(Done(attempt) if well else Failed(attempt, "so"), now=self.now)
+        self.runner.receive(Done(attempt) if well else JobFailed(attempt, "so"), now=self.now)
         assert self.runner.progress == before
 
-    @rule(message=st.sampled_from([Lost("gone"), Interrupted("touched")]))
-    def trouble(self, message: Lost | Interrupted) -> None:
+    @rule(message=st.sampled_from([OperatorLost("gone"), Interrupted("touched")]))
+    def trouble(self, message: OperatorLost | Interrupted) -> None:
         self.runner.receive(message, now=self.now)
         self.take()
         if isinstance(message, Interrupted) or self.runner.config.loss is OperatorLoss.STOP:
@@ -296,7 +308,7 @@ class Doing(RuleBasedStateMachine):
             return
         progress: Progress = self.runner.progress
         assert [job.number for job in progress.jobs] == [entry.number for entry in self.runner.jobs.entries]
-        running = [job for job in progress.jobs if job.stage is Stage.RUNNING]
+        running = [job for job in progress.jobs if job.stage is JobStage.RUNNING]
         assert len(running) == (1 if self.runner.running else 0)
         assert len(self.open) <= len(running)
         deadline = self.runner.next_deadline()
@@ -308,25 +320,25 @@ TestDoing.settings = settings(max_examples=60, stateful_step_count=25, deadline=
 
 
 def test_only_a_wait_has_time_left_when_it_is_paused() -> None:
-    for job, left in ((Move("B"), None), (Voice("Hello!"), None), (Wait(), None), (Wait(9.0), 7.0)):
+    for job, left in ((MoveJob("B"), None), (VoiceJob("Hello!"), None), (WaitJob(), None), (WaitJob(9.0), 7.0)):
         runner = JobRunner(JobList.of(job, places={"B": B}))
-        runner.receive(Command.RUN, now=0.0)
-        runner.receive(Command.PAUSE, now=2.0)
+        runner.receive(ListCommand.RUN, now=0.0)
+        runner.receive(ListCommand.PAUSE, now=2.0)
         assert runner.progress.jobs[0].left == left
 
 
 def test_a_list_that_was_done_isnt_when_a_job_is_added() -> None:
-    jobs = JobList.of(Message("Look"))
+    jobs = JobList.of(MessageJob("Look"))
     runner = JobRunner(jobs)
-    runner.receive(Command.RUN, now=0.0)
-    assert runner.progress.stage is Stage.DONE
-    longer = JobList((*jobs.entries, Entry(2, Message("Look again"))))
+    runner.receive(ListCommand.RUN, now=0.0)
+    assert runner.progress.stage is JobStage.DONE
+    longer = JobList((*jobs.entries, JobEntry(2, MessageJob("Look again"))))
     assert runner.receive(Load(longer), now=1.0) == ""
-    assert (runner.progress.stage, stages(runner)) == (Stage.PLANNED, ["done", "planned"])
+    assert (runner.progress.stage, stages(runner)) == (JobStage.PLANNED, ["done", "planned"])
 
 
 def test_a_list_that_was_aborted_leaves_an_empty_screen() -> None:
-    runner = JobRunner(JobList.of(Message("Look"), Wait()))
-    runner.receive(Command.RUN, now=0.0)
-    runner.receive(Command.ABORT, now=1.0)
+    runner = JobRunner(JobList.of(MessageJob("Look"), WaitJob()))
+    runner.receive(ListCommand.RUN, now=0.0)
+    runner.receive(ListCommand.ABORT, now=1.0)
     assert runner.advance(now=1.0)[-1] == Show("")

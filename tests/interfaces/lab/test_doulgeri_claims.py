@@ -20,7 +20,7 @@ from interfaces.lab.doulgeri import (
     jitter,
     segments,
 )
-from interfaces.messages import Form
+from interfaces.messages import ViewForm
 
 STUDY = Study(seed=0, runs=2, length=4.0)
 
@@ -210,7 +210,7 @@ def test_causality(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 SCRUBBED = interactivity.Scrubbed(
-    {Form.SEGMENTS: 0.01, Form.FRAMES: 0.28}, 0.0, (8.0, 1.5, 1.5), 0.0, (0.0,), (0.0,)
+    {ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.28}, 0.0, (8.0, 1.5, 1.5), 0.0, (0.0,), (0.0,)
 )
 
 
@@ -220,8 +220,8 @@ SCRUBBED = interactivity.Scrubbed(
         ({}, {}, []),
         ({"stop": 0.26}, {}, ["an edit shows after"]),
         ({"undo": math.inf}, {}, ["carried out and shown", "an edit shows after", "undo while live"]),
-        ({}, {"seek": {Form.SEGMENTS: 0.021, Form.FRAMES: 0.28}}, ["segments: first frame"]),
-        ({}, {"seek": {Form.SEGMENTS: 0.01, Form.FRAMES: 0.291}}, ["frames: first frame"]),
+        ({}, {"seek": {ViewForm.SEGMENTS: 0.021, ViewForm.FRAMES: 0.28}}, ["segments: first frame"]),
+        ({}, {"seek": {ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.291}}, ["frames: first frame"]),
         ({}, {"dragged": 0.01}, ["isn't dragged"]),
         ({}, {"live": (8.0, 1.6, 1.5)}, ["going live"]),
         ({}, {"others": 0.021}, ["keep their age"]),

@@ -16,7 +16,7 @@ from interfaces.lab.driving.operators import STYLES, operator
 from interfaces.lab.driving.output import COMPARED, summary
 from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
 from robots.ipr.bare import BareBody
 from robots.ipr.reality import MobileReality
@@ -64,7 +64,7 @@ def test_a_seed_drives_the_same_and_another_otherwise() -> None:
 def test_recorded_inputs_are_driven_as_they_were(tmp_path: Path) -> None:
     file = tmp_path / "inputs.csv"
     file.write_text("t,v,w\n0,0,0\n0.5,0.05,0\n1.5,0,0.2\n2,0,0\n", encoding="utf-8")
-    drive = run(Case(delay="none", robot="bare", operator=f"inputs:{file}", length=6.0, reality=IDEAL))
+    drive = run(DriveCase(delay="none", robot="bare", operator=f"inputs:{file}", length=6.0, reality=IDEAL))
     x, y, theta = drive.virtual[-1]
     assert (x, y, theta) == pytest.approx((0.05, 0.0, 0.1), abs=1e-9)
 
@@ -90,7 +90,7 @@ def test_inputs_that_are_none_are_refused_with_the_line(tmp_path: Path, text: st
 
 
 def test_a_run_is_the_same_to_the_last_bit() -> None:
-    case = Case("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 20.0)
+    case = DriveCase("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 20.0)
     one, other = run(case), run(case)
     for name in ("t", "real", "measured", "drives", "offset", "estimated"):
         assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
@@ -99,7 +99,9 @@ def test_a_run_is_the_same_to_the_last_bit() -> None:
 
 def test_without_delay_and_with_the_model_itself_the_twins_agree() -> None:
     for architecture in ("I", "II", "III-capped", "timeline"):
-        drive = run(Case(architecture, Transport.STREAM, "none", "bare", "figure-eight", 0, 30.0, reality=IDEAL))
+        drive = run(
+            DriveCase(architecture, Transport.STREAM, "none", "bare", "figure-eight", 0, 30.0, reality=IDEAL)
+        )
         found = drive.compare()
         assert found.progress is not None
         assert found.progress > 0.99
@@ -109,7 +111,7 @@ def test_without_delay_and_with_the_model_itself_the_twins_agree() -> None:
 
 
 def test_a_run_goes_on_for_the_largest_delay_and_five_seconds() -> None:
-    drive = run(Case("timeline", Transport.DATAGRAMS, "constant:3", "bare", "figure-eight", 0, 10.0))
+    drive = run(DriveCase("timeline", Transport.DATAGRAMS, "constant:3", "bare", "figure-eight", 0, 10.0))
     assert drive.t[-1] == pytest.approx(18.0, abs=0.1)
 
 
@@ -118,7 +120,7 @@ def test_lost_packets_are_repeated_and_the_path_is_kept(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     rows = ['""' if rng.random() < 0.3 else f"{rng.uniform(0.02, 0.6):.3f}" for _ in range(3000)]
     trace.write_text("delay_s\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    drive = run(Case("timeline", Transport.DATAGRAMS, f"trace:{trace}", "bare", "docking", 1, 60.0))
+    drive = run(DriveCase("timeline", Transport.DATAGRAMS, f"trace:{trace}", "bare", "docking", 1, 60.0))
     found = drive.compare()
     assert found.path_error_max is not None
     assert found.path_error_max < 0.03
@@ -132,7 +134,7 @@ def test_the_table_doesn_t_depend_on_the_workers() -> None:
 
 
 def test_a_paired_difference_has_a_verdict() -> None:
-    row = measure(Case("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
+    row = measure(DriveCase("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
 
     def group(name: str, worst: list[float]) -> object:
         rows = [
@@ -155,7 +157,7 @@ def test_a_paired_difference_has_a_verdict() -> None:
 
 
 def test_a_summary_pairs_what_ran_under_the_same_network_and_has_the_worst_run() -> None:
-    row = measure(Case("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
+    row = measure(DriveCase("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
     rows = [
         replace(row, architecture=who, delay=delay, seed=k, metrics=replace(row.metrics, path_error_max=worst))
         for who, delay in (("II", "mon"), ("III", "mon"), ("III", "wed"))
@@ -203,13 +205,13 @@ def test_a_wrong_name_is_one_error(tmp_path: Path, wrong: list[str]) -> None:
 
 
 def test_the_start_is_where_both_robots_begin() -> None:
-    drive = run(Case(robot="bare", operator="docking", delay="none", length=2.0))
+    drive = run(DriveCase(robot="bare", operator="docking", delay="none", length=2.0))
     assert Posture(*drive.virtual[0]) == Posture(*drive.real[0]) == operator("docking", 0, 0.1).start
 
 
 @pytest.mark.parametrize("architecture", ["II", "timeline"])
 def test_causes_add_up_and_are_those_that_were_made(architecture: str) -> None:
-    case = Case(architecture, Transport.STREAM, "constant:1.5", "bare", "corridor", 0, 40.0)
+    case = DriveCase(architecture, Transport.STREAM, "constant:1.5", "bare", "corridor", 0, 40.0)
     path, late = attributed(case)
     for found in (path, late):
         assert sum(found.parts) + found.residual == pytest.approx(found.total, rel=1e-9)
@@ -222,7 +224,7 @@ def test_causes_add_up_and_are_those_that_were_made(architecture: str) -> None:
 
 
 def test_odometry_alone_drifts() -> None:
-    case = Case("timeline", Transport.DATAGRAMS, "none", "bare", "figure-eight", 0, 60.0)
+    case = DriveCase("timeline", Transport.DATAGRAMS, "none", "bare", "figure-eight", 0, 60.0)
     fused, alone = (run(replace(case, position=position)).compare() for position in ("fused", "odometry"))
     assert fused.path_error_max is not None
     assert alone.path_error_max is not None

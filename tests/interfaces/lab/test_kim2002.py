@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.jobs import Stage
+from interfaces.jobs import JobStage
 from interfaces.lab import Study
 from interfaces.lab.claims import Claim, Figure
 from interfaces.lab.kim2002 import PAPER, paper
@@ -26,7 +26,7 @@ from vrs.errors import InvalidValueError
 
 def test_the_scenario_is_played_to_its_end() -> None:
     found = play(Scenario(3))
-    assert (found.stage, found.reason) == (Stage.DONE, "")
+    assert (found.stage, found.reason) == (JobStage.DONE, "")
     assert found.asked == ORDER
     assert found.shown == PLEASE
     assert found.on_top
@@ -62,7 +62,7 @@ def test_a_book_is_put_on_top_or_nowhere() -> None:
 
 
 GOOD = ScenarioResult(
-    stage=Stage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(ScenarioStop(0.01, 0.01, 0.001),) * 2,
+    stage=JobStage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(ScenarioStop(0.01, 0.01, 0.001),) * 2,
     book=(0.1, 0.0, 0.8), slid=0.0, on_top=True, touched=(), passed=0.5, lost=0.01, time=60.0,
     track=np.zeros((2, 3)),
 )  # fmt: skip
@@ -77,7 +77,7 @@ def concluded(monkeypatch: pytest.MonkeyPatch, *runs: ScenarioResult) -> dict[st
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"stage": Stage.FAILED}, ["done to its end"]),
+        ({"stage": JobStage.FAILED}, ["done to its end"]),
         ({"asked": ORDER[::-1]}, ["move, voice, message, move"]),
         ({"shown": ""}, ["until the key"]),
         ({"on_top": False}, ["on top at A"]),

@@ -12,7 +12,7 @@ from interfaces.lab.kim2006 import PAPER, links, narrow, packets
 from interfaces.lab.kim2006.following import Followed, FollowingCase, PathLeader, course, run
 from interfaces.lab.kim2006.links import LinkResult, Pair, pair
 from interfaces.rsp.schemes import SCHEMES
-from interfaces.rsp.schemes.ends import Seen
+from interfaces.rsp.schemes.ends import ReportedPosition
 from vrs.errors import InvalidValueError
 
 SMALL = Study(seed=0, runs=2, length=3.0)
@@ -74,7 +74,7 @@ def test_the_leader_has_no_error_of_its_own() -> None:
     x, y, theta = 0.0, 0.05, 0.3
     far = []
     for _ in range(900):
-        left, right = leader.rims(Seen(x, y, theta))
+        left, right = leader.rims(ReportedPosition(x, y, theta))
         v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / 0.15
         x, y, theta = x + 0.02 * v * math.cos(theta), y + 0.02 * v * math.sin(theta), theta + 0.02 * w
         far.append(float(np.linalg.norm(path - (x, y), axis=1).min()))

@@ -22,7 +22,7 @@ from interfaces.lab.localization.distinctive import distinctive
 from interfaces.lab.localization.searching import measure_carried, measure_symmetric, symmetric
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from interfaces.lab.localization.unobservable import measure_axis
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.apartments import ApartmentConfig, apartment
 from robots.ipr.floor_plan import FloorPlan, plan_map
@@ -204,7 +204,7 @@ def test_bad_input_is_one_line(wrong: list[str], said: str, tmp_path: Path) -> N
 
 
 def test_the_laser_feeds_the_twins_estimator_and_their_attribution() -> None:
-    case = Case("timeline", "datagrams", "none", robot="bare", operator="docking", seed=1, length=12.0)
+    case = DriveCase("timeline", "datagrams", "none", robot="bare", operator="docking", seed=1, length=12.0)
     wandering = MobileReality(radius_error=(0.01, -0.01), dt=1 / 60)
     off = {}
     for position in ("laser", "odometry"):

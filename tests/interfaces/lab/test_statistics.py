@@ -16,7 +16,7 @@ from interfaces.lab.driving.recorded import name_of, paths
 from interfaces.lab.driving.sweep import comparable, grouped, paired
 from interfaces.lab.statistics import bootstrap, clustered, interval_name, median
 from interfaces.runs.drive_row import Row
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from vrs.comparison import PathComparison
 from vrs.errors import InvalidValueError
 
@@ -151,7 +151,7 @@ def test_what_is_ahead_on_a_line_goes_round_its_corners() -> None:
 
 
 def test_of_equal_cases_one_is_recorded() -> None:
-    one, other = Case(seed=1), Case(seed=2)
+    one, other = DriveCase(seed=1), DriveCase(seed=2)
     out = Path("out")
     found = paths([one, other, one], out)
     assert found == [out / "runs" / f"{name_of(one)}.mcap", out / "runs" / f"{name_of(other)}.mcap", None]

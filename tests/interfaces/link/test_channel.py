@@ -22,10 +22,10 @@ from interfaces.link import (
     GilbertElliottLoss,
     Link,
     LinkConditions,
+    LinkPath,
     LossReason,
     PacketLog,
     PacketRecord,
-    Path,
     Service,
     Stream,
     TraceDelay,
@@ -239,7 +239,7 @@ def test_switching_an_impairment_on_leaves_the_delays_as_they_were():
     worse = Conditions(delay=delay_profile("thu"), loss=BernoulliLoss(0.3), duplicate=0.5)
     fates = [
         [path.fate(0.1 * i).arrivals for i in range(200)]
-        for path in (Path(c, np.random.default_rng(8)) for c in (plain, worse))
+        for path in (LinkPath(c, np.random.default_rng(8)) for c in (plain, worse))
     ]
     kept = [(a, b) for (a,), b in zip(*fates, strict=True) if b]
     assert 100 < len(kept) < 180
@@ -349,7 +349,7 @@ def test_a_stream_that_nobody_reads_holds_no_more_than_its_capacity():
 
 def test_flows_that_share_a_path_share_its_bandwidth():
     conditions = Conditions(bandwidth=8000.0)
-    path = Path(conditions, np.random.default_rng(0))
+    path = LinkPath(conditions, np.random.default_rng(0))
     lines = [make(conditions, np.random.default_rng(1), path=path) for make in (Channel, Stream, Stream)]
     assert [line.send("x", 0.0, 100) for line in lines] == pytest.approx([0.1, 0.2, 0.3])
 

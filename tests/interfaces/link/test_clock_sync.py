@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interfaces.link import delay_profile
-from interfaces.link.clock_sync import ClockEstimate, ClockSync, ClockSyncConfig, Evidence
+from interfaces.link.clock_sync import ClockEstimate, ClockEvidence, ClockSync, ClockSyncConfig
 from interfaces.link.round_trip import ProbeConfig, RoundTrip, RoundTripEstimator
 from vrs.errors import InvalidValueError
 
@@ -155,7 +155,7 @@ def run(seed, config=CONFIG, probes=25):
             outcome = estimator.receive(echo, now=due)
             if isinstance(outcome, RoundTrip):
                 evidence.append(watch.sync.receive(outcome))
-                assert evidence[-1] is not Evidence.IMPOSSIBLE
+                assert evidence[-1] is not ClockEvidence.IMPOSSIBLE
                 watch.look(due)
                 as_good_as_the_shortest(watch.sync, evidence[-1], outcome, taken)
         elif due > until:
@@ -173,9 +173,9 @@ def run(seed, config=CONFIG, probes=25):
 
 def as_good_as_the_shortest(sync, evidence, outcome, taken):
     """|error| ≤ minRTT/2 and what drift adds with age: the bound is no worse than any round trip's in use."""
-    if evidence in {Evidence.FIRST, Evidence.BETTER, Evidence.STEP}:
+    if evidence in {ClockEvidence.FIRST, ClockEvidence.BETTER, ClockEvidence.STEP}:
         taken.clear()
-    if evidence not in {Evidence.WIDE, Evidence.OVERTAKEN}:
+    if evidence not in {ClockEvidence.WIDE, ClockEvidence.OVERTAKEN}:
         taken.append(outcome.delay / 2 - CONFIG.max_drift * (outcome.sent + outcome.arrived) / 2)
         taken[:] = [min(taken)]
     now = outcome.arrived
@@ -185,7 +185,7 @@ def as_good_as_the_shortest(sync, evidence, outcome, taken):
 def test_the_error_is_within_its_bound_in_every_random_case():
     """Asymmetric, heavy-tailed, lossy, reordering links; drift to ±100 ppm; steps of 0.5 s to 1 h."""
     moments = covered = steps = found = 0
-    worst, kinds = 0.0, dict.fromkeys(Evidence, 0)
+    worst, kinds = 0.0, dict.fromkeys(ClockEvidence, 0)
     for seed in range(CASES):
         watch, evidence = run(seed)
         moments, covered, worst = moments + watch.moments, covered + watch.covered, max(worst, watch.worst)
@@ -196,7 +196,7 @@ def test_the_error_is_within_its_bound_in_every_random_case():
         assert covered > 0.7 * moments
         assert worst > 0.99
         assert found > 0.4 * steps
-        assert all(kinds[kind] for kind in Evidence if kind is not Evidence.IMPOSSIBLE)
+        assert all(kinds[kind] for kind in ClockEvidence if kind is not ClockEvidence.IMPOSSIBLE)
 
 
 @pytest.mark.parametrize("smallest", [0.0, 0.05, 5.0])
@@ -240,7 +240,7 @@ def test_a_step_is_found_by_the_first_echo_after_it(size):
     sync = settle(remote)
     before = sync.to_remote(10.5), sync.estimate(10.1)
     assert before[1].verified == pytest.approx(9.9)  # says itself that it knows of no later time
-    assert sync.receive(trip(remote, 10.1, 0.02, 0.03)) is Evidence.STEP
+    assert sync.receive(trip(remote, 10.1, 0.02, 0.03)) is ClockEvidence.STEP
     assert sync.step_count == 1
     assert sync.steps == pytest.approx(size, abs=0.05)
     now = sync.estimate(10.15)
@@ -254,8 +254,8 @@ def test_an_echo_from_before_the_step_does_not_bring_the_old_time_back():
     remote = Remote(0.0, steps=[(10.05, HOUR)])
     sync = settle(remote)
     straggler = trip(remote, 10.0, 0.02, 0.4)
-    assert sync.receive(trip(remote, 10.1, 0.02, 0.03)) is Evidence.STEP
-    assert sync.receive(straggler) is Evidence.OVERTAKEN
+    assert sync.receive(trip(remote, 10.1, 0.02, 0.03)) is ClockEvidence.STEP
+    assert sync.receive(straggler) is ClockEvidence.OVERTAKEN
     assert sync.estimate(10.5).offset == pytest.approx(HOUR, abs=0.03)
     assert sync.step_count == 1
 
@@ -266,10 +266,10 @@ def test_an_overtaken_probe_waits_for_proof():
     sync = settle(remote)
     late_forward = trip(remote, 10.0, 0.21, 0.02)  # read after the step
     late_back = trip(remote, 10.1, 0.02, 0.08)  # sent later, read before the step, and here first
-    assert sync.receive(late_back) is Evidence.TAKEN
-    assert sync.receive(late_forward) is Evidence.OVERTAKEN
+    assert sync.receive(late_back) is ClockEvidence.TAKEN
+    assert sync.receive(late_forward) is ClockEvidence.OVERTAKEN
     assert sync.estimate(10.24).verified == 10.1
-    assert sync.receive(trip(remote, 10.25, 0.02, 0.03)) is Evidence.STEP
+    assert sync.receive(trip(remote, 10.25, 0.02, 0.03)) is ClockEvidence.STEP
 
 
 def test_the_map_slews_to_a_better_estimate_and_no_faster():
@@ -277,7 +277,7 @@ def test_the_map_slews_to_a_better_estimate_and_no_faster():
     sync = ClockSync(ClockSyncConfig(max_drift=0.0))
     sync.receive(trip(remote, 0.0, 2.0, 0.0))
     assert sync.to_remote(2.0) - 2.0 == pytest.approx(1.0)
-    assert sync.receive(trip(remote, 2.0, 0.01, 0.01)) is Evidence.BETTER
+    assert sync.receive(trip(remote, 2.0, 0.01, 0.01)) is ClockEvidence.BETTER
     t = np.linspace(2.02, 30.0, 400)
     mapped = np.array([sync.to_remote(float(x)) for x in t])
     rates = np.diff(mapped) / np.diff(t)
@@ -348,10 +348,10 @@ def test_a_drift_beyond_the_stated_bound_shows_and_heals():
 def test_impossible_stamps_say_nothing():
     sync = settle(Remote(0.0))
     before = sync.estimate(20.0)
-    assert sync.receive(RoundTrip(10.0, 10.0, 10.2, 10.1)) is Evidence.IMPOSSIBLE
-    assert sync.receive(RoundTrip(10.0, 10.1, 10.0, 10.1)) is Evidence.IMPOSSIBLE
+    assert sync.receive(RoundTrip(10.0, 10.0, 10.2, 10.1)) is ClockEvidence.IMPOSSIBLE
+    assert sync.receive(RoundTrip(10.0, 10.1, 10.0, 10.1)) is ClockEvidence.IMPOSSIBLE
     assert sync.estimate(20.0) == before
-    assert ClockSync().receive(RoundTrip(10.0, 10.0, 10.2, 10.1)) is Evidence.IMPOSSIBLE
+    assert ClockSync().receive(RoundTrip(10.0, 10.0, 10.2, 10.1)) is ClockEvidence.IMPOSSIBLE
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from interfaces.link.round_trip import (
     SEQUENCE_NUMBERS,
     DelayStatistics,
     Echo,
+    EchoRefusal,
     Probe,
     ProbeConfig,
-    Refusal,
     RelativeDelays,
     RoundTrip,
     RoundTripEstimator,
@@ -71,7 +71,7 @@ def test_statistics_are_those_of_the_window():
 
     for outcome, echo, now in drive(estimator, fate, until=120.0):
         if not isinstance(outcome, RoundTrip):
-            assert outcome is Refusal.UNEXPECTED
+            assert outcome is EchoRefusal.UNEXPECTED
             continue
         delay = (now - echo.sent) - (echo.replied - echo.received)
         arrived.append((now, delay))
@@ -114,9 +114,9 @@ def test_every_fate_counts_once():
     assert estimator.next_deadline() == 2.5
     assert isinstance(estimator.receive(probes[2].echo(0.0), now=2.1), RoundTrip)
     assert isinstance(estimator.receive(probes[1].echo(0.0), now=2.2), RoundTrip)
-    assert estimator.receive(probes[1].echo(0.0), now=2.3) is Refusal.UNEXPECTED
+    assert estimator.receive(probes[1].echo(0.0), now=2.3) is EchoRefusal.UNEXPECTED
     assert estimator.to_send(now=2.5) is None
-    assert estimator.receive(probes[0].echo(0.0), now=2.6) is Refusal.UNEXPECTED
+    assert estimator.receive(probes[0].echo(0.0), now=2.6) is EchoRefusal.UNEXPECTED
     known = estimator.statistics()
     assert (known.sent, known.returned, known.lost, known.refused) == (3, 2, 1, 2)
     assert known.loss_share == 1 / 3
@@ -126,16 +126,16 @@ def test_every_fate_counts_once():
 @pytest.mark.parametrize(
     ("echo", "refusal"),
     [
-        (Echo(SESSION + 1, 0, 0.0, 1.0, 1.0), Refusal.FOREIGN),
-        (Echo(SESSION, 1, 0.0, 1.0, 1.0), Refusal.UNEXPECTED),
-        (Echo(SESSION, 0, 0.5, 1.0, 1.0), Refusal.UNEXPECTED),
-        (Echo(SESSION, 0, math.nan, 1.0, 1.0), Refusal.UNEXPECTED),
-        (Echo(SESSION, 0, 0.0, math.nan, 1.0), Refusal.IMPOSSIBLE),
-        (Echo(SESSION, 0, 0.0, 1.0, math.inf), Refusal.IMPOSSIBLE),
-        (Echo(SESSION, 0, 0.0, -math.inf, -math.inf), Refusal.IMPOSSIBLE),
-        (Echo(SESSION, 0, 0.0, 1e300, 1e300), Refusal.IMPOSSIBLE),
-        (Echo(SESSION, 0, 0.0, 1.0, 0.9), Refusal.IMPOSSIBLE),
-        (Echo(SESSION, 0, 0.0, 1.0, 3.0), Refusal.IMPOSSIBLE),
+        (Echo(SESSION + 1, 0, 0.0, 1.0, 1.0), EchoRefusal.FOREIGN),
+        (Echo(SESSION, 1, 0.0, 1.0, 1.0), EchoRefusal.UNEXPECTED),
+        (Echo(SESSION, 0, 0.5, 1.0, 1.0), EchoRefusal.UNEXPECTED),
+        (Echo(SESSION, 0, math.nan, 1.0, 1.0), EchoRefusal.UNEXPECTED),
+        (Echo(SESSION, 0, 0.0, math.nan, 1.0), EchoRefusal.IMPOSSIBLE),
+        (Echo(SESSION, 0, 0.0, 1.0, math.inf), EchoRefusal.IMPOSSIBLE),
+        (Echo(SESSION, 0, 0.0, -math.inf, -math.inf), EchoRefusal.IMPOSSIBLE),
+        (Echo(SESSION, 0, 0.0, 1e300, 1e300), EchoRefusal.IMPOSSIBLE),
+        (Echo(SESSION, 0, 0.0, 1.0, 0.9), EchoRefusal.IMPOSSIBLE),
+        (Echo(SESSION, 0, 0.0, 1.0, 3.0), EchoRefusal.IMPOSSIBLE),
     ],
 )
 def test_a_refused_echo_changes_nothing_but_its_counter(echo, refusal):
@@ -160,7 +160,7 @@ def test_sequence_numbers_wrap_and_an_old_echo_of_the_same_number_is_told_apart(
             kept = probe
             continue
         if probe.sequence == old.sequence:
-            assert estimator.receive(old.echo(0.0), now=now) is Refusal.UNEXPECTED
+            assert estimator.receive(old.echo(0.0), now=now) is EchoRefusal.UNEXPECTED
         assert isinstance(estimator.receive(probe.echo(0.0), now=now), RoundTrip)
     assert max(seen) == SEQUENCE_NUMBERS - 1
     assert seen.count(old.sequence) == 1
@@ -221,7 +221,7 @@ def test_any_schedule_is_counted_exactly(fates, most, period):
             assert now < echo.sent + 2.0
             returned[echo.sent] = now
         else:
-            assert outcome is Refusal.UNEXPECTED
+            assert outcome is EchoRefusal.UNEXPECTED
             assert echo.sent in returned or now >= echo.sent + 2.0
     known = estimator.statistics()
     assert known.returned == len(returned)

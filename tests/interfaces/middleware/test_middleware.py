@@ -11,9 +11,9 @@ from interfaces.link.round_trip import Probe
 from interfaces.middleware import (
     ActionAgent,
     ActionAgentConfig,
-    Command,
-    Feedback,
-    Middleware,
+    DriveFeedback,
+    DriveSetpoint,
+    GainSchedulingMiddleware,
     MiddlewareConfig,
     default_network,
     drive_measure,
@@ -53,10 +53,10 @@ def probed(middleware, delays, *, start=0.0):
 
 
 def test_probes_go_out_every_5_ms_and_ten_round_trips_count():
-    middleware = Middleware(Seen())
+    middleware = GainSchedulingMiddleware(Seen())
     assert [middleware.to_send(now=0.001 * k) is not None for k in range(11)] == [k % 5 == 0 for k in range(11)]
     assert middleware.config.probing.window.capacity == 10
-    middleware = Middleware(Seen())
+    middleware = GainSchedulingMiddleware(Seen())
     now = probed(middleware, [9.0 - 4.9] * 3 + [0.1, 0.1, 0.1, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3, 0.5])
     assert middleware.traffic.median == pytest.approx(0.15)
     assert middleware.traffic.mean == pytest.approx(0.2)
@@ -65,10 +65,10 @@ def test_probes_go_out_every_5_ms_and_ten_round_trips_count():
 
 def test_the_median_predicts_and_the_mean_slows():
     controller = Seen()
-    middleware = Middleware(controller)
+    middleware = GainSchedulingMiddleware(controller)
     now = probed(middleware, [0.1] * 9 + [1.1])
     driving = Drive(0.5, 0.4)
-    command = middleware.receive(Feedback(0, HERE, driving), now=now)
+    command = middleware.receive(DriveFeedback(0, HERE, driving), now=now)
     assert controller.postures == [predicted(HERE, driving, 0.1)]
     assert drive_measure(command.drive, 0.2) == pytest.approx(0.25)
     assert command.drive.w / command.drive.v == pytest.approx(0.5)
@@ -78,56 +78,56 @@ def test_the_median_predicts_and_the_mean_slows():
 @pytest.mark.parametrize(("predicts", "schedules"), [(True, False), (False, True), (False, False)])
 def test_each_half_goes_without_the_other(predicts, schedules):
     controller = Seen()
-    middleware = Middleware(controller, MiddlewareConfig(predicts=predicts, schedules=schedules))
+    middleware = GainSchedulingMiddleware(controller, MiddlewareConfig(predicts=predicts, schedules=schedules))
     if predicts or schedules:
-        assert middleware.receive(Feedback(0, HERE, STAND), now=0.0) is None
+        assert middleware.receive(DriveFeedback(0, HERE, STAND), now=0.0) is None
         now = probed(middleware, [0.2] * 3)
     else:
         assert middleware.next_deadline() is None
         assert middleware.to_send(now=0.0) is None
         now = 0.0
-    command = middleware.receive(Feedback(1, HERE, Drive(1.0, 0.0)), now=now)
+    command = middleware.receive(DriveFeedback(1, HERE, Drive(1.0, 0.0)), now=now)
     moved = (HERE[0] + 0.2 * math.cos(0.3), HERE[1] + 0.2 * math.sin(0.3), 0.3)
     assert controller.postures[-1] == pytest.approx(moved if predicts else HERE)
     assert (command.drive == (2.0, 1.0)) is not schedules
 
 
 def test_until_a_round_trip_is_known_nothing_is_sent():
-    middleware = Middleware(Seen())
-    assert middleware.receive(Feedback(0, HERE, STAND), now=0.0) is None
+    middleware = GainSchedulingMiddleware(Seen())
+    assert middleware.receive(DriveFeedback(0, HERE, STAND), now=0.0) is None
     now = probed(middleware, [0.2])
-    assert middleware.receive(Feedback(1, HERE, STAND), now=now) == Command(
+    assert middleware.receive(DriveFeedback(1, HERE, STAND), now=now) == DriveSetpoint(
         0, pytest.approx((1.118, 0.559), rel=1e-2)
     )
 
 
 def test_stale_and_senseless_reports_are_dropped():
     controller = Seen()
-    middleware = Middleware(controller, MiddlewareConfig(predicts=False, schedules=False))
+    middleware = GainSchedulingMiddleware(controller, MiddlewareConfig(predicts=False, schedules=False))
     numbers = [3, 2, 3, 5]
-    answers = [middleware.receive(Feedback(n, HERE, STAND), now=0.01 * k) for k, n in enumerate(numbers)]
+    answers = [middleware.receive(DriveFeedback(n, HERE, STAND), now=0.01 * k) for k, n in enumerate(numbers)]
     assert [answer and answer.number for answer in answers] == [0, None, None, 1]
     for bad in (Posture(math.nan, 0, 0), Posture(0, math.inf, -math.inf)):
-        assert middleware.receive(Feedback(9, bad, STAND), now=1.0) is None
-    assert middleware.receive(Feedback(9, HERE, Drive(0.0, math.nan)), now=1.0) is None
+        assert middleware.receive(DriveFeedback(9, bad, STAND), now=1.0) is None
+    assert middleware.receive(DriveFeedback(9, HERE, Drive(0.0, math.nan)), now=1.0) is None
     assert len(controller.postures) == 2
 
 
 def test_a_command_behind_a_newer_one_is_stale():
     robot = ActionAgent()
-    assert robot.sample(HERE, now=0.0) == Feedback(0, HERE, STAND)
+    assert robot.sample(HERE, now=0.0) == DriveFeedback(0, HERE, STAND)
     for number, v in ((4, 0.4), (3, 0.3), (4, 0.9), (6, math.nan), (5, 0.5)):
-        assert robot.receive(Command(number, Drive(v, 0.0)), now=0.01) is None
-    assert robot.sample(HERE, now=0.01) == Feedback(1, HERE, Drive(0.5, 0.0))
+        assert robot.receive(DriveSetpoint(number, Drive(v, 0.0)), now=0.01) is None
+    assert robot.sample(HERE, now=0.01) == DriveFeedback(1, HERE, Drive(0.5, 0.0))
     assert robot.stale == 2
 
 
 def test_a_starved_robot_stands_and_goes_on_with_the_next_command():
     robot = ActionAgent(ActionAgentConfig(starved=0.3))
-    robot.receive(Command(0, Drive(0.4, 0.0)), now=1.0)
+    robot.receive(DriveSetpoint(0, Drive(0.4, 0.0)), now=1.0)
     assert robot.driving(now=1.29) == (0.4, 0.0)
     assert robot.driving(now=1.31) == STAND
-    robot.receive(Command(1, Drive(0.6, 0.0)), now=9.0)
+    robot.receive(DriveSetpoint(1, Drive(0.6, 0.0)), now=9.0)
     assert robot.driving(now=9.0) == (0.6, 0.0)
 
 
@@ -146,9 +146,9 @@ def test_any_controller_goes_behind_it_unchanged():
         lambda: PathFollowingController(path).control,
     ):
         there, alone = make(), make()
-        middleware = Middleware(there, network=default_network())
+        middleware = GainSchedulingMiddleware(there, network=default_network())
         now = probed(middleware, [0.8] * 4)
-        found = middleware.receive(Feedback(0, HERE, Drive(0.2, 0.1)), now=now).drive
+        found = middleware.receive(DriveFeedback(0, HERE, Drive(0.2, 0.1)), now=now).drive
         wanted = alone(predicted(HERE, Drive(0.2, 0.1), 0.8))
         assert drive_measure(found, 0.8) <= 0.25 * (1 + 1e-9)
         if drive_measure(Drive(*wanted), 0.8) <= 0.25:
@@ -168,12 +168,12 @@ def test_impossible_configurations_are_refused(make, bad):
 
 @pytest.mark.parametrize("schedules", [True, False])
 def test_a_controller_that_says_nan_is_told_so(schedules):
-    middleware = Middleware(Seen((math.nan, 0.0)), MiddlewareConfig(schedules=schedules))
+    middleware = GainSchedulingMiddleware(Seen((math.nan, 0.0)), MiddlewareConfig(schedules=schedules))
     now = probed(middleware, [0.2])
     with pytest.raises(InvalidValueError, match="from the controller"):
-        middleware.receive(Feedback(0, HERE, STAND), now=now)
+        middleware.receive(DriveFeedback(0, HERE, STAND), now=now)
 
 
 def test_a_network_of_another_tolerance_is_refused():
     with pytest.raises(InvalidValueError, match="network must be"):
-        Middleware(Seen(), MiddlewareConfig(epsilon=0.5), network=default_network())
+        GainSchedulingMiddleware(Seen(), MiddlewareConfig(epsilon=0.5), network=default_network())

@@ -20,7 +20,7 @@ from interfaces.recording.runs import RunRecorder
 from interfaces.recording.track import REAL, VIRTUAL
 from interfaces.runs.keeper import RunFacts, Turn
 from interfaces.runs.summary import summarize, to_json
-from interfaces.runs.twin_run import Event
+from interfaces.runs.twin_run import RunEvent
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins
@@ -131,7 +131,9 @@ def test_texts_of_any_length_can_be_read_back(tmp_path):
     recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
     recorder.begin(RunFacts(MODEL, NOMINAL, "a", 0, "none", "adaptive", "datagram", "hold", 0.02), site)
     recorder.turn(
-        Turn(0.0, 0, *(np.empty((0, *n)) for n in ((), (6,), (6,))), (), (), (Event(0.0, "late", "x" * 3000),), ())
+        Turn(
+            0.0, 0, *(np.empty((0, *n)) for n in ((), (6,), (6,))), (), (), (RunEvent(0.0, "late", "x" * 3000),), ()
+        )
     )
     recorder.finish()
     with open_recording(tmp_path / "run.mcap") as recording:

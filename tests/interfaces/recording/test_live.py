@@ -25,7 +25,7 @@ from interfaces.recording.track import REAL
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
-from interfaces.stream.network import Impair, Way
+from interfaces.stream.network import DirectionConditions, Impair
 from interfaces.stream.server import application
 from interfaces.teleop import OperatorSite, Report, RobotLine
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until
@@ -65,7 +65,9 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             site.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
             site.undo(now=clock.now())
             await until(lambda: set(site.receipts) >= {1, 3, 4})
-            live.emulation.impair(Impair(1, 1, Way("constant:0.03", "0", "in-order")), "Ada", now=clock.now())
+            live.emulation.impair(
+                Impair(1, 1, DirectionConditions("constant:0.03", "0", "in-order")), "Ada", now=clock.now()
+            )
             await until(lambda: len({report.measured_at for report in reports}) > 30)
             # What came last is waited for to be written.
             await asyncio.sleep(0.5)

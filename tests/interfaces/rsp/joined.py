@@ -6,12 +6,12 @@ import heapq
 from dataclasses import dataclass, field
 from random import Random
 
-from interfaces.rsp.local import LocalCore, State
+from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.model import RobotModel
-from interfaces.rsp.outbox import Outcome, Settled
-from interfaces.rsp.outputs import Commanded, Lost, Occurred, Stored
+from interfaces.rsp.outbox import DeliveryOutcome, Settled
+from interfaces.rsp.outputs import Commanded, LinkLost, Occurred, Stored
 from interfaces.rsp.robot import RobotCore
-from interfaces.rsp.round_trip import RoundTrip
+from interfaces.rsp.round_trip import PacketRoundTrip
 from interfaces.rsp.security import Keyring, Rank
 
 ADDRESS = b"local"
@@ -57,7 +57,7 @@ class Pair:
 
     def opened(self, *, within: float = 5.0, takeover: bool = False) -> Pair:
         self.local.open(now=self.now, takeover=takeover)
-        self.until(lambda: self.local.state is State.OPEN and self.robot.session is not None, within)
+        self.until(lambda: self.local.state is LocalState.OPEN and self.robot.session is not None, within)
         return self
 
     def count_from(self, number: int) -> None:
@@ -66,7 +66,7 @@ class Pair:
         self.network.flight.clear()
         local.number, robot.number = number, number + 7
         robot.newest, local.newest = number - 1, number + 6
-        self.local._round_trip, self.robot._round_trip = RoundTrip(), RoundTrip()
+        self.local._round_trip, self.robot._round_trip = PacketRoundTrip(), PacketRoundTrip()
 
     def until(self, condition, within: float) -> None:
         end = self.now + within
@@ -112,7 +112,7 @@ class Judge:
         self.executed: list[int] = []
         self.stored: list[int] = []
         self.logged: list[int] = []
-        self.outcomes: dict[tuple[str, int], Outcome] = {}
+        self.outcomes: dict[tuple[str, int], DeliveryOutcome] = {}
         self.lost = self.occurred = 0
 
     def look(self) -> None:
@@ -129,14 +129,14 @@ class Judge:
                 self.stored.append(output.id)
             elif isinstance(output, Settled):
                 self._settled("memory event", output, self.events)
-            elif isinstance(output, Lost):
+            elif isinstance(output, LinkLost):
                 self.lost += 1
         for output in pair.told:
             if isinstance(output, Settled):
                 if pair.local.model.elements[output.index].name.startswith("program"):
                     self._settled("memory command", output, self.stores)
                 else:
-                    assert output.outcome is Outcome.DONE
+                    assert output.outcome is DeliveryOutcome.DONE
                     assert output.id in self.executed[-5000:], "acknowledged, but not executed"
                     self._settled("command", output, None)
             elif isinstance(output, Stored):
@@ -150,7 +150,7 @@ class Judge:
     def _settled(self, kind: str, output: Settled, deadlines: dict[int, float] | None) -> None:
         assert (kind, output.id) not in self.outcomes, "settled twice"
         self.outcomes[kind, output.id] = output.outcome
-        if deadlines is not None and output.outcome is Outcome.FAILED:
+        if deadlines is not None and output.outcome is DeliveryOutcome.FAILED:
             due = deadlines[output.id]
             assert due <= self.pair.now <= due + 0.25, f"due {due}, reported {self.pair.now}"
 
@@ -161,7 +161,7 @@ class Judge:
             ("memory command", self.stores, self.stored),
             ("memory event", self.events, self.logged),
         ):
-            done = [number for number in given if self.outcomes[kind, number] is Outcome.DONE]
+            done = [number for number in given if self.outcomes[kind, number] is DeliveryOutcome.DONE]
             assert set(done) <= set(got)
             assert set(got) <= set(given)
             assert len(got) == len(set(got))

@@ -15,8 +15,8 @@ import pytest
 
 from interfaces.rsp.creator import package, write_package
 from interfaces.rsp.errors import DeadlineError
-from interfaces.rsp.host import RobotHost
-from interfaces.rsp.local import LocalCore, State
+from interfaces.rsp.host import RspHost
+from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import (
     Effector,
@@ -29,7 +29,7 @@ from interfaces.rsp.model import (
     read_model,
     write_model,
 )
-from interfaces.rsp.outbox import Outcome
+from interfaces.rsp.outbox import DeliveryOutcome
 from interfaces.rsp.robot import RobotCore
 from robots.cubo import parameters
 from robots.cubo.body import MOVES, CuboBody
@@ -140,10 +140,10 @@ class Site:
         core = LocalCore(module.MODEL, random.randbytes)
         self.middleware = Middleware(core, self.clock)
         self.robot: Any = getattr(module, robot)(self.middleware)
-        self.host = RobotHost(RobotCore(module.MODEL, random.randbytes), body, frozenset(MOVES))
+        self.host = RspHost(RobotCore(module.MODEL, random.randbytes), body, frozenset(MOVES))
         core.open(now=0.0)
         self.run(0.1)
-        assert core.state is State.OPEN
+        assert core.state is LocalState.OPEN
 
     def run(self, seconds: float) -> None:
         end = self.clock.now() + seconds
@@ -215,8 +215,8 @@ def test_cubo_is_driven_by_its_own_package(written: Path, monkeypatch: pytest.Mo
         site.run(1.5)
         body.press("service")
         site.run(0.5)
-        assert given.wait(0.0) is Outcome.DONE
-        assert kept.outcome is Outcome.DONE
+        assert given.wait(0.0) is DeliveryOutcome.DONE
+        assert kept.outcome is DeliveryOutcome.DONE
         assert site.host.stored["album"] == b"song" * 500
         assert [(name, values) for _, name, values in body.done] == [("ir", (42.0,)), ("album", (2000.0,))]
         assert body.angles() == pytest.approx((-0.5, 1.2, 0.2), abs=0.03)

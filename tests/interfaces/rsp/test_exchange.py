@@ -8,8 +8,8 @@ from random import Random
 import pytest
 
 from interfaces.rsp.model import Command, Effector, MemoryCommand, MemoryEvent, OnLoss, RobotModel, example
-from interfaces.rsp.outbox import CommandOutbox, MemoryInbox, MemoryOutbox, Outcome
-from interfaces.rsp.outputs import Commanded, Ended, EndReason, Found, Lost, Settled
+from interfaces.rsp.outbox import CommandOutbox, DeliveryOutcome, MemoryInbox, MemoryOutbox
+from interfaces.rsp.outputs import Commanded, EndReason, LinkLost, LinkRestored, SessionEnded, Settled
 from tests.interfaces.rsp.joined import Judge, Network, Pair, talk, value
 
 PACKETS = int(os.environ.get("VRS_SOAK_PACKETS", "3000"))
@@ -43,7 +43,7 @@ def test_every_rule_holds(link: str, sealed: bool) -> None:
     assert len(judge.commands) > 50
     assert len(judge.stored) > 10
     assert judge.occurred > 0
-    failed = sum(outcome is Outcome.FAILED for outcome in judge.outcomes.values())
+    failed = sum(outcome is DeliveryOutcome.FAILED for outcome in judge.outcomes.values())
     assert 0 < failed < 0.95 * len(judge.outcomes)
 
 
@@ -136,7 +136,7 @@ def test_a_lost_link_rests_the_wheels_and_the_next_packet_lets_them_go_on() -> N
     assert pair.robot.effectors(now=pair.now)[wheel] == (100.0,)
     pair.network.closed = True
     heard = pair.robot._heard
-    while not any(isinstance(output, Lost) for output in pair.did):
+    while not any(isinstance(output, LinkLost) for output in pair.did):
         pair.robot.effectors(now=pair.now)
         pair.step()
     assert 0.5 <= pair.now - heard <= 0.62
@@ -145,7 +145,7 @@ def test_a_lost_link_rests_the_wheels_and_the_next_packet_lets_them_go_on() -> N
     pair.network.closed = False
     pair.run(0.1)
     pair.robot.effectors(now=pair.now)
-    assert any(isinstance(output, Found) for output in pair.did)
+    assert any(isinstance(output, LinkRestored) for output in pair.did)
     # Nothing was written: what the simulacrum has holds again.
     assert pair.robot.motion.given(wheel) == (100.0,)
 
@@ -160,9 +160,9 @@ def test_the_end_is_acknowledged_and_what_waits_is_reported() -> None:
     pair.local.end(now=pair.now)
     pair.run(3.0)
     outcomes = [output.outcome for output in pair.told if isinstance(output, Settled)]
-    assert outcomes == [Outcome.FAILED, Outcome.FAILED]
-    assert any(isinstance(o, Ended) and o.reason is EndReason.CLOSED for o in pair.told)
-    assert any(isinstance(o, Ended) and o.reason is EndReason.CLOSED for o in pair.did)
+    assert outcomes == [DeliveryOutcome.FAILED, DeliveryOutcome.FAILED]
+    assert any(isinstance(o, SessionEnded) and o.reason is EndReason.CLOSED for o in pair.told)
+    assert any(isinstance(o, SessionEnded) and o.reason is EndReason.CLOSED for o in pair.did)
     assert pair.robot.session is None
     pair.opened()
 
@@ -212,8 +212,8 @@ def test_a_silence_of_a_minute_ends_the_session_on_both_sides() -> None:
     pair = Pair(MODEL, Network(Random(1))).opened()
     pair.network.closed = True
     pair.run(61.0)
-    assert any(isinstance(o, Ended) and o.reason is EndReason.LOST for o in pair.told)
-    assert any(isinstance(o, Ended) and o.reason is EndReason.LOST for o in pair.did)
+    assert any(isinstance(o, SessionEnded) and o.reason is EndReason.LOST for o in pair.told)
+    assert any(isinstance(o, SessionEnded) and o.reason is EndReason.LOST for o in pair.did)
 
 
 def test_monitors_and_sensors_are_told_when_they_are_asked_for_and_changed() -> None:
@@ -258,12 +258,12 @@ def test_what_is_acknowledged_isnt_acknowledged_for_ever() -> None:
 
 
 def test_an_event_that_was_told_before_a_newer_one_is_no_news() -> None:
-    from interfaces.rsp.header import Type
+    from interfaces.rsp.header import PacketType
     from interfaces.rsp.outputs import Occurred
 
     pair = Pair(MODEL, Network(Random(1))).opened()
     bumper, session = MODEL.index("bumper"), pair.robot._claim.session
     for number in (0, 1, 0, 65_535, 1, 2):
         body = pair.robot.layout.join({bumper: number.to_bytes(2, "big") + b"\1"})
-        pair.local.receive(session.make(Type.UP, body, pair.now), now=pair.now)
+        pair.local.receive(session.make(PacketType.UP, body, pair.now), now=pair.now)
     assert [output.id for output in pair.local.take() if isinstance(output, Occurred)] == [0, 1, 2]

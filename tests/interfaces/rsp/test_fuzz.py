@@ -11,7 +11,7 @@ import pytest
 
 from interfaces.rsp import handshake, header
 from interfaces.rsp.model import example
-from interfaces.rsp.session import Drop
+from interfaces.rsp.session import DropReason
 from tests.interfaces.rsp.joined import ADDRESS, Network, Pair
 from tests.interfaces.rsp.test_security import WHEEL
 
@@ -96,7 +96,14 @@ def test_sealed_nothing_moves_whatever_comes() -> None:
     dropped = pair.robot.dropped
     # A mutation may change nothing: then it's a packet.
     assert sum(dropped.values()) >= 0.99 * RUNS
-    for reason in (Drop.MALFORMED, Drop.SESSION, Drop.AUTHENTICATION, Drop.DOWNGRADE, Drop.MODEL, Drop.UNEXPECTED):
+    for reason in (
+        DropReason.MALFORMED,
+        DropReason.SESSION,
+        DropReason.AUTHENTICATION,
+        DropReason.DOWNGRADE,
+        DropReason.MODEL,
+        DropReason.UNEXPECTED,
+    ):
         assert dropped[reason] > 0, reason
 
 

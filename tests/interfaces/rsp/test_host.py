@@ -9,8 +9,8 @@ import pytest
 
 from interfaces.rsp.devices import SensorDevice
 from interfaces.rsp.errors import DeadlineError
-from interfaces.rsp.host import MOST_BEHIND, RobotHost, packed
-from interfaces.rsp.local import LocalCore, State
+from interfaces.rsp.host import MOST_BEHIND, RspHost, packed
+from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import Effector, Event, OnLoss, RobotModel, Sensor
 from interfaces.rsp.robot import RobotCore
@@ -67,7 +67,7 @@ class Site:
 
     def __init__(self) -> None:
         self.random, self.clock, self.body = Random(1), ManualClock(), Stub()
-        self.host = RobotHost(RobotCore(MODEL, self.random.randbytes), self.body, frozenset({"wheel"}))
+        self.host = RspHost(RobotCore(MODEL, self.random.randbytes), self.body, frozenset({"wheel"}))
         self.locals: dict[bytes, Middleware] = {}
         self.flight: deque[list[tuple[bytes, bytes]]] = deque([[]] * 5)
 
@@ -76,7 +76,7 @@ class Site:
         core.open(now=self.clock.now(), takeover=takeover)
         self.locals[name] = Middleware(core, self.clock)
         self.run(0.15)
-        assert core.state is State.OPEN
+        assert core.state is LocalState.OPEN
         return self.locals[name]
 
     def run(self, seconds: float) -> None:
@@ -119,7 +119,7 @@ def test_a_body_begins_with_the_effectors_initial_values() -> None:
         Effector("speaker", initial=1.0, stream=9, binding="arm"),
     )
     body = Stub()
-    RobotHost(RobotCore(RobotModel("posed", 1, elements), bytes), body, frozenset({"arm", "wheel"}))
+    RspHost(RobotCore(RobotModel("posed", 1, elements), bytes), body, frozenset({"arm", "wheel"}))
     assert body.moved == [("arm", (0.5, 0.5))]
 
 

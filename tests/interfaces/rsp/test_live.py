@@ -20,7 +20,7 @@ from interfaces.rsp.errors import DeadlineError, NoSessionError
 from interfaces.rsp.live import opened
 from interfaces.rsp.local import LocalConfig
 from interfaces.rsp.model import example, read_model, write_model
-from interfaces.rsp.outbox import Outcome
+from interfaces.rsp.outbox import DeliveryOutcome
 from interfaces.rsp.outputs import EndReason
 from robots.cubo import parameters
 from vrs.errors import FormatError, InvalidValueError
@@ -63,8 +63,8 @@ def test_cubo_over_sockets_with_keys(tmp_path: Path, monkeypatch: pytest.MonkeyP
             mine.position.wait(5.0)
             mine.left_wheel.write(0, 250)
             mine.right_wheel.write(0, 250)
-            assert mine.ir_fire.send(1).wait(5.0) is Outcome.DONE
-            assert mine.album.send(b"x" * 4000, timeout=5.0).wait(6.0) is Outcome.DONE
+            assert mine.ir_fire.send(1).wait(5.0) is DeliveryOutcome.DONE
+            assert mine.album.send(b"x" * 4000, timeout=5.0).wait(6.0) is DeliveryOutcome.DONE
             start, end = mine.position.read(0), time.monotonic() + 10.0
             while mine.position.read(0) < start + 5000 and time.monotonic() < end:
                 mine.position.wait(5.0)

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from interfaces.rsp import header
 from interfaces.rsp.errors import PacketError
-from interfaces.rsp.header import Header, Type
-from interfaces.rsp.layout import Layout, Way
+from interfaces.rsp.header import Header, PacketType
+from interfaces.rsp.layout import Layout, PacketDirection
 from interfaces.rsp.model import Effector, MemoryCommand, Module, Monitor, RobotModel, Sensor, example
 from interfaces.rsp.numbers import MODULUS, unwrapped, up_to
 
 HEADERS = st.builds(
     Header,
-    st.integers(0, 65_535), st.booleans(), st.sampled_from(list(Type)), st.integers(0, 65_535),
+    st.integers(0, 65_535), st.booleans(), st.sampled_from(list(PacketType)), st.integers(0, 65_535),
     st.integers(0, 2**32 - 1), st.integers(0, 2**48 - 1), st.integers(0, 65_535), st.integers(0, 255),
 )  # fmt: skip
 MODEL = example()
@@ -38,7 +38,7 @@ def test_a_header_is_20_bytes_in_network_order(head: Header) -> None:
 
 @pytest.mark.parametrize(("at", "value"), [(0, 0), (0, 2), (3, 2), (4, 0), (4, 9)])
 def test_a_field_that_cant_be_is_refused(at: int, value: int) -> None:
-    data = bytearray(header.encode(Header(1, False, Type.UP, 0, 0, 0, 0, 0)))
+    data = bytearray(header.encode(Header(1, False, PacketType.UP, 0, 0, 0, 0, 0)))
     data[at] = value
     with pytest.raises(PacketError):
         header.decode(bytes(data))
@@ -60,7 +60,7 @@ def test_a_number_that_is_near_is_found_again(number: int, off: int) -> None:
 
 
 @st.composite
-def payloads(draw: st.DrawFn, way: Way) -> dict[int, bytes]:
+def payloads(draw: st.DrawFn, way: PacketDirection) -> dict[int, bytes]:
     """Payloads that a packet of the example may have."""
     found = {}
     for index, size in enumerate(LAYOUT.sizes[way]):
@@ -73,8 +73,8 @@ def payloads(draw: st.DrawFn, way: Way) -> dict[int, bytes]:
     return found
 
 
-@pytest.mark.parametrize("way", Way)
-def test_what_is_joined_is_split_again(way: Way) -> None:
+@pytest.mark.parametrize("way", PacketDirection)
+def test_what_is_joined_is_split_again(way: PacketDirection) -> None:
     @given(payloads(way))
     def law(found: dict[int, bytes]) -> None:
         body = LAYOUT.join(found)
@@ -89,8 +89,8 @@ def test_what_is_joined_is_split_again(way: Way) -> None:
     law()
 
 
-@given(st.binary(max_size=64), st.sampled_from(Way))
-def test_whatever_comes_is_payloads_or_an_error(body: bytes, way: Way) -> None:
+@given(st.binary(max_size=64), st.sampled_from(PacketDirection))
+def test_whatever_comes_is_payloads_or_an_error(body: bytes, way: PacketDirection) -> None:
     try:
         found = LAYOUT.split(body, way)
     except PacketError:
@@ -99,7 +99,11 @@ def test_whatever_comes_is_payloads_or_an_error(body: bytes, way: Way) -> None:
 
 
 def test_bits_that_cant_be_are_refused() -> None:
-    for bits, way in ((b"\x00\x01", Way.DOWN), (b"\x80\x00", Way.UP), (b"\x04\x00", Way.UP)):
+    for bits, way in (
+        (b"\x00\x01", PacketDirection.DOWN),
+        (b"\x80\x00", PacketDirection.UP),
+        (b"\x04\x00", PacketDirection.UP),
+    ):
         with pytest.raises(PacketError):
             LAYOUT.split(bits + bytes(12), way)
 
@@ -108,19 +112,21 @@ def test_an_item_is_as_long_as_its_element_at_most() -> None:
     index, longest = MODEL.index("program"), 256
     for size in (0, longest):
         body = LAYOUT.join({index: struct.pack("!HH", 0, size) + bytes(size)})
-        assert LAYOUT.split(body, Way.DOWN)[index][4:] == bytes(size)
+        assert LAYOUT.split(body, PacketDirection.DOWN)[index][4:] == bytes(size)
     # Longer by a byte, in a packet that may be as long.
     left = MODEL.index("left_wheel")
     for size in (longest + 1, 65_000):
         with pytest.raises(PacketError, match="length"):
-            LAYOUT.split(LAYOUT.join({left: b"\0\0", index: struct.pack("!HH", 0, size) + bytes(size)}), Way.DOWN)
+            LAYOUT.split(
+                LAYOUT.join({left: b"\0\0", index: struct.pack("!HH", 0, size) + bytes(size)}), PacketDirection.DOWN
+            )
 
 
 def test_maps_of_strangers_dont_fill_the_memory() -> None:
     wide = Layout(RobotModel("wide", 1, tuple(Sensor(f"s{k}") for k in range(64))))
     for bits in range(3000):
-        wide.split(bits.to_bytes(8, "big"), Way.DOWN)
-    assert 64 * len(wide._plans[Way.DOWN]) <= 16_384
+        wide.split(bits.to_bytes(8, "big"), PacketDirection.DOWN)
+    assert 64 * len(wide._plans[PacketDirection.DOWN]) <= 16_384
 
 
 def test_sizes_of_each_kind() -> None:

@@ -15,7 +15,7 @@ from interfaces.rsp.local import LocalCore
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import Effector, Filling, RobotModel, example
 from interfaces.rsp.motion_filter import Fastest, MotionFilter, MotionFilterConfig
-from interfaces.rsp.outbox import CommandOutbox, MemoryOutbox, Outcome, Settled
+from interfaces.rsp.outbox import CommandOutbox, DeliveryOutcome, MemoryOutbox, Settled
 from interfaces.rsp.outputs import Occurred
 from interfaces.rsp.period import PeriodConfig, PeriodControl
 from interfaces.rsp.streams import StreamInbox, StreamOutbox
@@ -281,7 +281,7 @@ def test_a_command_goes_until_the_number_of_its_first_packet_is_acknowledged() -
         outbox.fill(payloads, packet)
         assert payloads == {3: b"\0\0go"}
         assert outbox.acknowledge(4) == []
-    assert outbox.acknowledge(5) == [Settled(3, number, Outcome.DONE)]
+    assert outbox.acknowledge(5) == [Settled(3, number, DeliveryOutcome.DONE)]
     payloads = {}
     outbox.fill(payloads, 8)
     assert payloads == {}
@@ -291,8 +291,8 @@ def test_an_acknowledgement_is_of_its_own_element() -> None:
     outbox = MemoryOutbox()
     first, second = outbox.put(3, b"map", deadline=9.0), outbox.put(4, b"route", deadline=9.0)
     outbox.fill({}, now=0.0, timeout=0.1)
-    assert outbox.acknowledge(4, second.to_bytes(2, "big")) == [Settled(4, second, Outcome.DONE)]
-    assert outbox.expire(9.0) == [Settled(3, first, Outcome.FAILED)]
+    assert outbox.acknowledge(4, second.to_bytes(2, "big")) == [Settled(4, second, DeliveryOutcome.DONE)]
+    assert outbox.expire(9.0) == [Settled(3, first, DeliveryOutcome.FAILED)]
 
 
 def test_two_threads_that_write_two_values_of_one_effector_lose_none() -> None:
@@ -319,7 +319,7 @@ def test_what_nobody_fetches_goes_oldest_first() -> None:
     middleware = Middleware(core, ManualClock())
     bumper, fire = core.model.index("bumper"), core.model.index("ir_fire")
     core._outputs += [Occurred(bumper, k, k.to_bytes(2, "big")) for k in range(300)]
-    core._outputs += [Settled(fire, k, Outcome.DONE) for k in range(9000)]
+    core._outputs += [Settled(fire, k, DeliveryOutcome.DONE) for k in range(9000)]
     middleware.advance((), now=0.0)
     fetched = []
     while (payload := middleware.came(bumper)) is not None:

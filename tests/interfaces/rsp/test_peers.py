@@ -10,14 +10,14 @@ import pytest
 
 from interfaces.rsp import handshake, header
 from interfaces.rsp.devices import EffectorDevice
-from interfaces.rsp.header import Header, Type
-from interfaces.rsp.local import LocalCore, State
+from interfaces.rsp.header import Header, PacketType
+from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import Command, Effector, Filling, MemoryCommand, MemoryEvent, OnLoss, RobotModel
-from interfaces.rsp.outputs import Began, Commanded, Ended, Stored
+from interfaces.rsp.outputs import Began, Commanded, SessionEnded, Stored
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.security import Rank
-from interfaces.rsp.session import Drop
+from interfaces.rsp.session import DropReason
 from tests.interfaces.rsp.joined import ADDRESS, KEYS, Network, Pair
 from vrs.clock import ManualClock
 from vrs.errors import InvalidValueError
@@ -55,7 +55,7 @@ def test_an_f32_effector_takes_nothing_beyond_them(beyond: float) -> None:
     pair.local.write(ARM, struct.pack("!f", beyond))
     pair.run(0.3)
     assert pair.robot.effectors(now=pair.now) == {}
-    assert pair.robot.dropped[Drop.MALFORMED] > 5
+    assert pair.robot.dropped[DropReason.MALFORMED] > 5
 
 
 @pytest.mark.parametrize(("value", "done"), [(0.5, True), (math.nan, False), (-math.inf, False)])
@@ -64,7 +64,7 @@ def test_a_command_whose_values_arent_finite_isnt_carried_out(value: float, done
     pair.local.command(TURN, struct.pack("!f", value))
     pair.run(0.3)
     assert any(isinstance(output, Commanded) for output in pair.did) is done
-    assert (pair.robot.dropped[Drop.MALFORMED] == 0) is done
+    assert (pair.robot.dropped[DropReason.MALFORMED] == 0) is done
 
 
 @pytest.mark.parametrize("filling", Filling)
@@ -116,7 +116,7 @@ def test_an_end_whose_acknowledgement_was_lost_is_acknowledged_again(sealed: boo
     usual, lost = pair.network.send, []
 
     def send(to: str, data: bytes, now: float) -> None:
-        if header.decode(data).type is Type.ENDED and len(lost) < 3:
+        if header.decode(data).type is PacketType.ENDED and len(lost) < 3:
             lost.append(now)
         else:
             usual(to, data, now)
@@ -124,11 +124,11 @@ def test_an_end_whose_acknowledgement_was_lost_is_acknowledged_again(sealed: boo
     pair.network.send = send
     begin = pair.now
     pair.local.end(now=begin)
-    pair.until(lambda: pair.local.state is State.CLOSED, 3.0)
+    pair.until(lambda: pair.local.state is LocalState.CLOSED, 3.0)
     assert [round(at - begin, 2) for at in lost] == [0.01, 0.26, 0.51]
-    assert sum(isinstance(output, Ended) for output in pair.did) == 1
+    assert sum(isinstance(output, SessionEnded) for output in pair.did) == 1
     # Not what comes twice, and nothing else of that session.
-    assert pair.robot.dropped == dict.fromkeys(Drop, 0)
+    assert pair.robot.dropped == dict.fromkeys(DropReason, 0)
     pair.opened()
 
 
@@ -148,9 +148,9 @@ def test_of_two_who_open_at_once_one_has_the_robot_and_the_other_is_told(sealed:
         for data, name in sent:
             robot.receive(data, name, now=now)
         came = robot.to_send(now=now)
-    assert both[b"one"].state is State.CLOSED
-    assert [type(output) for output in both[b"one"].take()] == [Began, Ended]
-    assert both[b"other"].state is State.OPEN
+    assert both[b"one"].state is LocalState.CLOSED
+    assert [type(output) for output in both[b"one"].take()] == [Began, SessionEnded]
+    assert both[b"other"].state is LocalState.OPEN
     assert robot.session == both[b"other"].take()[0].session
 
 
@@ -166,22 +166,22 @@ def test_who_is_challenged_and_then_never_answered_gives_up() -> None:
     pair.until(lambda: pair.local._asked.cookie != bytes(16), 1.0)
     pair.network.closed = True
     pair.network.flight.clear()
-    pair.until(lambda: pair.local.state is State.CLOSED, 5.2)
+    pair.until(lambda: pair.local.state is LocalState.CLOSED, 5.2)
 
 
-@pytest.mark.parametrize("kind", [Type.CHALLENGE, Type.OPENED, Type.REFUSED])
-def test_an_answer_to_another_question_is_dropped_and_counted(kind: Type) -> None:
+@pytest.mark.parametrize("kind", [PacketType.CHALLENGE, PacketType.OPENED, PacketType.REFUSED])
+def test_an_answer_to_another_question_is_dropped_and_counted(kind: PacketType) -> None:
     pair = Pair(MODEL, Network(Random(1)))
     pair.local.open(now=0.0)
     before = pair.local.to_send(now=0.0)
-    if kind is Type.REFUSED:
-        body = handshake.encode_refused(b"n" * 16, handshake.Refusal.BUSY)
+    if kind is PacketType.REFUSED:
+        body = handshake.encode_refused(b"n" * 16, handshake.SessionRefusal.BUSY)
     else:
-        body = handshake.encode_answer(handshake.Answer(b"n" * 16, b"c" * 16))
+        body = handshake.encode_answer(handshake.HandshakeAnswer(b"n" * 16, b"c" * 16))
     head = Header(MODEL.id, False, kind, 0, 0, 5, 65_535, 0)
     pair.local.receive(handshake.sent(kind, body, head, None, Rank.OPERATOR), now=0.0)
-    assert pair.local.state is State.OPENING
-    assert pair.local.dropped[Drop.SESSION] == 1
+    assert pair.local.state is LocalState.OPENING
+    assert pair.local.dropped[DropReason.SESSION] == 1
     assert [data[20:] for data in pair.local.to_send(now=0.25)] == [data[20:] for data in before]
 
 
@@ -227,6 +227,6 @@ def test_a_packet_of_another_model_is_dropped_on_both_sides() -> None:
     for session in (down, up):
         session._model += 1
     empty = pair.local.layout.join({})
-    pair.robot.receive(down.make(Type.DOWN, empty, pair.now), ADDRESS, now=pair.now)
-    pair.local.receive(up.make(Type.UP, empty, pair.now), now=pair.now)
-    assert pair.robot.dropped[Drop.MODEL] == pair.local.dropped[Drop.MODEL] == 1
+    pair.robot.receive(down.make(PacketType.DOWN, empty, pair.now), ADDRESS, now=pair.now)
+    pair.local.receive(up.make(PacketType.UP, empty, pair.now), now=pair.now)
+    assert pair.robot.dropped[DropReason.MODEL] == pair.local.dropped[DropReason.MODEL] == 1

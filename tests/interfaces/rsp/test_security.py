@@ -8,14 +8,14 @@ from random import Random
 import pytest
 
 from interfaces.rsp import handshake, header
-from interfaces.rsp.handshake import Open, Refusal
-from interfaces.rsp.header import Type
-from interfaces.rsp.local import LocalCore, State
+from interfaces.rsp.handshake import Open, SessionRefusal
+from interfaces.rsp.header import PacketType
+from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.model import example
-from interfaces.rsp.outputs import Ended, EndReason, Refused
+from interfaces.rsp.outputs import EndReason, Refused, SessionEnded
 from interfaces.rsp.robot import RobotConfig, RobotCore
 from interfaces.rsp.security import Keyring, Rank
-from interfaces.rsp.session import Drop
+from interfaces.rsp.session import DropReason
 from tests.interfaces.rsp.joined import ADDRESS, KEYS, Network, Pair
 from vrs.errors import InvalidValueError
 
@@ -59,7 +59,7 @@ def test_a_spoofed_session_is_dropped_and_counted(sealed: bool) -> None:
     other = data[:12] + bytes([data[12] ^ 1]) + data[13:]
     pair.robot.receive(other, ADDRESS, now=pair.now)
     pair.robot.receive(data, b"elsewhere", now=pair.now)
-    assert pair.robot.dropped[Drop.SESSION] == 2
+    assert pair.robot.dropped[DropReason.SESSION] == 2
     assert state(pair) == before
 
 
@@ -73,13 +73,13 @@ def test_every_flipped_bit_of_a_sealed_packet_is_dropped_and_counted() -> None:
         pair.robot.receive(bytes(flipped), ADDRESS, now=pair.now)
     assert state(pair) == before
     assert sum(pair.robot.dropped.values()) == 8 * len(data)
-    assert pair.robot.dropped[Drop.AUTHENTICATION] > 8 * 24
+    assert pair.robot.dropped[DropReason.AUTHENTICATION] > 8 * 24
     pair.robot.receive(data, ADDRESS, now=pair.now)
     assert state(pair) != before
 
 
-@pytest.mark.parametrize(("sealed", "reason"), [(False, Drop.LATE), (True, Drop.REPLAY)])
-def test_a_replayed_packet_is_dropped_and_counted(sealed: bool, reason: Drop) -> None:
+@pytest.mark.parametrize(("sealed", "reason"), [(False, DropReason.LATE), (True, DropReason.REPLAY)])
+def test_a_replayed_packet_is_dropped_and_counted(sealed: bool, reason: DropReason) -> None:
     pair = pair_of(sealed=sealed)
     data = next_down(pair)
     pair.robot.receive(data, ADDRESS, now=pair.now)
@@ -95,7 +95,7 @@ def test_a_packet_from_before_the_newest_is_late_though_it_never_came() -> None:
     pair.robot.receive(late, ADDRESS, now=pair.now)
     before = state(pair)
     pair.robot.receive(early, ADDRESS, now=pair.now + 0.1)
-    assert pair.robot.dropped[Drop.LATE] == 1
+    assert pair.robot.dropped[DropReason.LATE] == 1
     assert state(pair) == before
 
 
@@ -103,10 +103,10 @@ def test_a_sealed_packets_number_is_its_counters() -> None:
     pair = pair_of(sealed=True)
     session, before = pair.local._session, state(pair)
     number = session.number
-    head = header.Header(MODEL.id, True, Type.DOWN, number, 0, session.id, 0, 0)
+    head = header.Header(MODEL.id, True, PacketType.DOWN, number, 0, session.id, 0, 0)
     data = session._sealer.seal(header.encode(head), b"\0\0", number + 1)
     pair.robot.receive(data, ADDRESS, now=pair.now)
-    assert pair.robot.dropped[Drop.MALFORMED] == 1
+    assert pair.robot.dropped[DropReason.MALFORMED] == 1
     assert state(pair) == before
 
 
@@ -117,9 +117,9 @@ def test_a_bit_of_the_header_downgrades_nobody() -> None:
     before = state(sealed)
     sealed.robot.receive(in_clear, ADDRESS, now=sealed.now)
     sealed.local.receive(in_clear, now=sealed.now)
-    assert sealed.robot.dropped[Drop.DOWNGRADE] == sealed.local.dropped[Drop.DOWNGRADE] == 1
+    assert sealed.robot.dropped[DropReason.DOWNGRADE] == sealed.local.dropped[DropReason.DOWNGRADE] == 1
     plain.robot.receive(body, ADDRESS, now=plain.now)
-    assert plain.robot.dropped[Drop.DOWNGRADE] == 1
+    assert plain.robot.dropped[DropReason.DOWNGRADE] == 1
     assert state(sealed) == before
 
 
@@ -132,7 +132,7 @@ def test_a_replayed_opening_takes_nothing_over() -> None:
     ]
     pair.opened()
     pair.run(3.0)
-    opening = [data for data in sent if header.decode(data).type is Type.OPEN]
+    opening = [data for data in sent if header.decode(data).type is PacketType.OPEN]
     pair.network.closed = True
     pair.run(2.5)
     before = pair.robot.session
@@ -161,7 +161,7 @@ def test_no_answer_is_longer_than_its_question_and_asking_leaves_nothing(sealed:
         robot.receive(asked, k.to_bytes(2, "big"), now=0.1 * k)
         for answer, _ in robot.to_send(now=0.1 * k):
             assert len(answer) <= len(asked)
-            assert header.decode(answer).type is Type.CHALLENGE
+            assert header.decode(answer).type is PacketType.CHALLENGE
     assert robot.session is None
     assert robot._door.pending is None
 
@@ -199,25 +199,25 @@ def second(pair: Pair, *, rank: Rank = Rank.OPERATOR, keys: Keyring | None = Non
 @pytest.mark.parametrize(
     ("sealed", "rank", "takeover", "refusal"),
     [
-        (False, Rank.OPERATOR, False, Refusal.BUSY),
-        (True, Rank.OPERATOR, False, Refusal.BUSY),
-        (True, Rank.ADMIN, False, Refusal.BUSY),
-        (True, Rank.OPERATOR, True, Refusal.FORBIDDEN),
+        (False, Rank.OPERATOR, False, SessionRefusal.BUSY),
+        (True, Rank.OPERATOR, False, SessionRefusal.BUSY),
+        (True, Rank.ADMIN, False, SessionRefusal.BUSY),
+        (True, Rank.OPERATOR, True, SessionRefusal.FORBIDDEN),
     ],
 )
-def test_a_session_in_use_is_refused(sealed: bool, rank: Rank, takeover: bool, refusal: Refusal) -> None:
+def test_a_session_in_use_is_refused(sealed: bool, rank: Rank, takeover: bool, refusal: SessionRefusal) -> None:
     pair = pair_of(sealed=sealed)
     other = second(pair, rank=rank, keys=KEYS if sealed else None, takeover=takeover)
     assert other.take() == [Refused(refusal)]
-    assert pair.local.state is State.OPEN
+    assert pair.local.state is LocalState.OPEN
 
 
 @pytest.mark.parametrize("sealed", [False, True])
 def test_a_takeover_passes_through_a_stop(sealed: bool) -> None:
     pair = pair_of(sealed=sealed)
     other = second(pair, rank=Rank.ADMIN if sealed else Rank.OPERATOR, keys=KEYS if sealed else None, takeover=True)
-    assert other.state is State.OPEN
-    assert [o.reason for o in pair.told if isinstance(o, Ended)] == [EndReason.TAKEN]
+    assert other.state is LocalState.OPEN
+    assert [o.reason for o in pair.told if isinstance(o, SessionEnded)] == [EndReason.TAKEN]
     assert pair.robot.session == other._session.id
     assert pair.robot.stopping
     assert pair.robot.effectors(now=pair.now)[WHEEL] == (0.0,)
@@ -232,7 +232,7 @@ def test_a_takeover_passes_through_a_stop(sealed: bool) -> None:
 
     exchange()
     assert pair.robot.motion.given(WHEEL) == (0.0,)
-    assert pair.robot.dropped[Drop.STOPPING] > 0
+    assert pair.robot.dropped[DropReason.STOPPING] > 0
     pair.robot.rested()
     exchange()
     assert pair.robot.motion.given(WHEEL) == (10.0,)
@@ -240,7 +240,7 @@ def test_a_takeover_passes_through_a_stop(sealed: bool) -> None:
 
 def test_where_nobody_may_nobody_takes_over_in_the_clear() -> None:
     pair = Pair(MODEL, Network(Random(1)), robot=RobotConfig(takeover=False)).opened()
-    assert second(pair, takeover=True).take() == [Refused(Refusal.FORBIDDEN)]
+    assert second(pair, takeover=True).take() == [Refused(SessionRefusal.FORBIDDEN)]
 
 
 def test_an_idle_session_gives_way() -> None:
@@ -248,8 +248,8 @@ def test_an_idle_session_gives_way() -> None:
     pair.network.closed = True
     pair.run(2.1)
     pair.local.end(now=pair.now)
-    pair.local.state = State.CLOSED
-    assert second(pair, keys=KEYS, takeover=False).state is State.OPEN
+    pair.local.state = LocalState.CLOSED
+    assert second(pair, keys=KEYS, takeover=False).state is LocalState.OPEN
 
 
 def test_another_key_or_rank_opens_nothing() -> None:
@@ -259,8 +259,8 @@ def test_another_key_or_rank_opens_nothing() -> None:
         (Keyring({Rank.ADMIN: b"o" * 32}), Rank.ADMIN),
     ):
         assert second(pair, keys=keys, rank=rank, takeover=True).take() == []
-    assert pair.robot.dropped[Drop.AUTHENTICATION] > 0
-    assert pair.local.state is State.OPEN
+    assert pair.robot.dropped[DropReason.AUTHENTICATION] > 0
+    assert pair.local.state is LocalState.OPEN
 
 
 def test_keys_are_checked() -> None:
@@ -290,9 +290,11 @@ def test_the_derivation_is_hkdf() -> None:
 
 def asked(robot: RobotCore, question: Open, address: bytes, now: float, keys: Keyring | None = None) -> list:
     """What a robot answers to an OPEN: type, address, session and body of each."""
-    head = header.Header(MODEL.id, False, Type.OPEN, 0, 0, 0, 65_535, 0)
+    head = header.Header(MODEL.id, False, PacketType.OPEN, 0, 0, 0, 65_535, 0)
     rank = Rank.OPERATOR if keys is not None else question.rank
-    robot.receive(handshake.sent(Type.OPEN, handshake.encode_open(question), head, keys, rank), address, now=now)
+    robot.receive(
+        handshake.sent(PacketType.OPEN, handshake.encode_open(question), head, keys, rank), address, now=now
+    )
     found = []
     for data, to in robot.to_send(now=now):
         answer = header.decode(data)
@@ -304,22 +306,22 @@ def challenged(robot: RobotCore, nonce: bytes, address: bytes, now: float) -> Op
     """The question with the cookie that it's answered with."""
     question = Open(Rank.OPERATOR, False, nonce)
     ((kind, _, _, body),) = asked(robot, question, address, now)
-    assert kind is Type.CHALLENGE
+    assert kind is PacketType.CHALLENGE
     return question._replace(cookie=handshake.decode_answer(body).given)
 
 
 @pytest.mark.parametrize(
     ("address", "later", "nonce", "given"),
     [
-        (ADDRESS, 0.0, b"n" * 16, Type.OPENED),
-        (ADDRESS, 10.0, b"n" * 16, Type.OPENED),
-        (ADDRESS, 20.0, b"n" * 16, Type.CHALLENGE),
-        (b"elsewhere", 0.0, b"n" * 16, Type.CHALLENGE),
-        (ADDRESS, 0.0, b"m" * 16, Type.CHALLENGE),
+        (ADDRESS, 0.0, b"n" * 16, PacketType.OPENED),
+        (ADDRESS, 10.0, b"n" * 16, PacketType.OPENED),
+        (ADDRESS, 20.0, b"n" * 16, PacketType.CHALLENGE),
+        (b"elsewhere", 0.0, b"n" * 16, PacketType.CHALLENGE),
+        (ADDRESS, 0.0, b"m" * 16, PacketType.CHALLENGE),
     ],
 )
 def test_a_cookie_is_for_an_address_a_nonce_and_a_while(
-    address: bytes, later: float, nonce: bytes, given: Type
+    address: bytes, later: float, nonce: bytes, given: PacketType
 ) -> None:
     robot = RobotCore(MODEL, Random(1).randbytes)
     question = challenged(robot, b"n" * 16, ADDRESS, 5.0)._replace(nonce=nonce)
@@ -332,7 +334,7 @@ def test_the_same_question_from_another_address_is_another_session() -> None:
     sessions = {}
     for address in (ADDRESS, b"elsewhere"):
         *_, (kind, to, session, _) = asked(robot, challenged(robot, b"n" * 16, address, 5.0), address, 5.0)
-        assert (kind, to) == (Type.OPENED, address)
+        assert (kind, to) == (PacketType.OPENED, address)
         sessions[session] = address
     assert len(sessions) == 2
 
@@ -342,16 +344,16 @@ def test_who_makes_addresses_up_locks_nobody_out_whose_address_is_proven() -> No
     question = challenged(robot, b"n" * 16, ADDRESS, 5.0)
     for k in range(1000):
         asked(robot, Open(Rank.OPERATOR, False, k.to_bytes(16, "big")), k.to_bytes(6, "big"), 5.0)
-    assert robot.dropped[Drop.UNEXPECTED] > 800
+    assert robot.dropped[DropReason.UNEXPECTED] > 800
     *_, (kind, to, _, _) = asked(robot, question, ADDRESS, 5.0)
-    assert (kind, to) == (Type.OPENED, ADDRESS)
+    assert (kind, to) == (PacketType.OPENED, ADDRESS)
 
 
 def test_an_operators_key_doesnt_make_an_admin() -> None:
     robot = RobotCore(MODEL, Random(1).randbytes, keys=KEYS)
-    assert asked(robot, Open(Rank.OPERATOR, True, b"n" * 16), ADDRESS, 0.0, KEYS)[0][0] is Type.CHALLENGE
+    assert asked(robot, Open(Rank.OPERATOR, True, b"n" * 16), ADDRESS, 0.0, KEYS)[0][0] is PacketType.CHALLENGE
     assert asked(robot, Open(Rank.ADMIN, True, b"n" * 16), ADDRESS, 0.0, KEYS) == []
-    assert robot.dropped[Drop.AUTHENTICATION] == 1
+    assert robot.dropped[DropReason.AUTHENTICATION] == 1
 
 
 def test_a_local_system_takes_nothing_of_another_session() -> None:
@@ -360,7 +362,7 @@ def test_a_local_system_takes_nothing_of_another_session() -> None:
     (data, _), *_ = pair.robot.to_send(now=pair.now + 1.0)
     before = pair.local._session.newest
     pair.local.receive(data[:12] + bytes([data[12] ^ 1]) + data[13:], now=pair.now)
-    assert pair.local.dropped[Drop.SESSION] == 1
+    assert pair.local.dropped[DropReason.SESSION] == 1
     assert pair.local._session.newest == before
     pair.local.receive(data, now=pair.now)
     assert pair.local._session.newest > before

@@ -10,30 +10,30 @@ from hypothesis import strategies as st
 
 from interfaces import messages as m
 from interfaces.jobs import (
-    Command,
     Forecast,
     JobForecast,
     JobList,
     JobProgress,
+    JobStage,
+    ListCommand,
     Load,
-    Message,
-    Move,
+    MessageJob,
+    MoveJob,
     OperatorLoss,
     Progress,
-    Stage,
-    Voice,
-    Wait,
+    VoiceJob,
+    WaitJob,
 )
-from interfaces.link import Measured
+from interfaces.link import LinkFigures
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.stream import network as n
 from interfaces.stream import tasks as w
-from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
-from interfaces.teleop.architectures import Report as Followed
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
-from interfaces.teleop.tasks import Doing, Errand, Go, Halt, Sight, TaskReport
+from interfaces.teleop.architectures import ArchitectureReport as Followed
+from interfaces.teleop.architectures import ArcPacket, CellChanges, DriveOrders, DriveReport
+from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
+from interfaces.teleop.tasks import Doing, Errand, Go, Halt, SensedPoints, TaskReport
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState
@@ -144,11 +144,11 @@ def welcomes(draw):
     return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(floats(0.1, 60)))
 
 
-ways = st.builds(n.Way, words, words, words)
+ways = st.builds(n.DirectionConditions, words, words, words)
 spans = st.none() | floats(0, 1e9)
-measured = st.builds(Measured, counts, st.none() | floats(0, 1), spans, spans)
+measured = st.builds(LinkFigures, counts, st.none() | floats(0, 1), spans, spans)
 plans = st.builds(PlanPart, counts, times, arrays, runs())
-entries = st.builds(Entry, numbers, times, st.none() | commands, counts)
+entries = st.builds(LogEntry, numbers, times, st.none() | commands, counts)
 echoes = st.none() | st.tuples(numbers, times, times)
 postures = st.builds(Posture, times, times, times)
 drives = st.builds(Drive, floats(-1e6, 1e6), floats(-1e6, 1e6))
@@ -164,7 +164,7 @@ arcs = st.lists(
     ),
     max_size=3,
 ).map(tuple)
-packets = st.builds(Packet, st.lists(st.tuples(counts, arcs), max_size=2).map(tuple), times, arcs)
+packets = st.builds(ArcPacket, st.lists(st.tuples(counts, arcs), max_size=2).map(tuple), times, arcs)
 cells = st.lists(st.builds(CellChange, st.tuples(counts, counts), times, st.booleans()), max_size=2).map(tuple)
 followed = st.builds(Followed, numbers, counts, postures, counts, st.none() | st.builds(CellChanges, times, cells))
 
@@ -177,12 +177,12 @@ near = floats(-1000, 1000)
 goals = st.builds(Goal, near, near, st.none() | near)
 texts = words.filter(str.strip)
 jobs = st.one_of(
-    st.builds(Move, goals), st.builds(Voice, texts), st.builds(Message, texts),
-    st.builds(Wait, st.none() | floats(0, 1e4)),
+    st.builds(MoveJob, goals), st.builds(VoiceJob, texts), st.builds(MessageJob, texts),
+    st.builds(WaitJob, st.none() | floats(0, 1e4)),
 )  # fmt: skip
 job_lists = st.builds(lambda some, goal: JobList.of(*some, places={"A": goal}), st.lists(jobs, max_size=4), goals)
 job_numbers = st.integers(1, 2**31 - 1)
-stages = st.sampled_from(Stage)
+stages = st.sampled_from(JobStage)
 progress = st.builds(
     Progress, stages,
     st.lists(
@@ -197,11 +197,13 @@ forecasts = st.builds(
     ).map(tuple),
 )  # fmt: skip
 wanted = st.one_of(
-    st.builds(Go, goals), st.builds(Load, job_lists, st.none() | progress), st.sampled_from([*Command, *w.Trial])
+    st.builds(Go, goals),
+    st.builds(Load, job_lists, st.none() | progress),
+    st.sampled_from([*ListCommand, *w.Trial]),
 )
 tasks = st.one_of(
     st.builds(Go, goals), st.builds(Halt, words), st.builds(Load, job_lists, st.none() | progress),
-    st.sampled_from(Command),
+    st.sampled_from(ListCommand),
 )  # fmt: skip
 task_reports = st.builds(
     TaskReport, st.sampled_from(JourneyState), words, st.none() | goals, rows, words, progress,
@@ -211,7 +213,7 @@ task_reports = st.builds(
 messages = {
     m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
     m.Ask: st.builds(m.Ask, numbers, stamps),
-    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.Form), st.none() | floats(0.1, 1e3)),
+    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.ViewForm), st.none() | floats(0.1, 1e3)),
     m.Want: st.builds(m.Want, counts, st.none() | counts),
     m.Outcome: st.builds(m.Outcome, numbers, st.none() | receipts, words, counts, times),
     m.Answer: st.builds(m.Answer, frames, times),
@@ -276,7 +278,7 @@ messages = {
         DriveReport, st.integers(0, 2**64 - 1), numbers, times, times, postures, drives, echoes, words, words,
         st.none() | followed, stamps, stamps, st.booleans(), st.none() | positive, stamps, counts,
         st.sampled_from(Doing), positive, st.none() | task_reports,
-        st.none() | st.builds(Sight, times, rows, st.none() | doubts),
+        st.none() | st.builds(SensedPoints, times, rows, st.none() | doubts),
     ),
     n.Survey: st.builds(n.Survey, numbers),
     n.Impair: st.builds(n.Impair, numbers, epochs, st.none() | ways, st.none() | ways),

@@ -14,23 +14,23 @@ import numpy as np
 
 from interfaces import messages as m
 from interfaces.jobs import (
-    Arm,
-    Command,
+    ArmJob,
     Forecast,
     JobForecast,
     JobList,
     JobProgress,
+    JobStage,
+    ListCommand,
     Load,
-    Message,
-    Move,
+    MessageJob,
+    MoveJob,
     OperatorLoss,
     Progress,
-    Stage,
-    Voice,
-    Wait,
+    VoiceJob,
+    WaitJob,
     digest,
 )
-from interfaces.link import ClockSync, Measured, RoundTrip
+from interfaces.link import ClockSync, LinkFigures, RoundTrip
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.site import Site
 from interfaces.stream import Encoding, encode
@@ -38,11 +38,11 @@ from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.stream import network as n
 from interfaces.stream import tasks as w
-from interfaces.teleop.architectures import CellChanges, DriveOrders, DriveReport, Packet
-from interfaces.teleop.architectures import Report as Followed
+from interfaces.teleop.architectures import ArchitectureReport as Followed
+from interfaces.teleop.architectures import ArcPacket, CellChanges, DriveOrders, DriveReport
 from interfaces.teleop.measured import Sample
-from interfaces.teleop.messages import Entry, Orders, PlanPart, Report
-from interfaces.teleop.tasks import Doing, Errand, Go, Halt, Sight, TaskReport
+from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
+from interfaces.teleop.tasks import Doing, Errand, Go, Halt, SensedPoints, TaskReport
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
@@ -61,12 +61,14 @@ POSE = np.array([[0.0, -1.0, 0.0, 0.4], [1.0, 0.0, 0.0, 0.1], [0.0, 0.0, 1.0, -0
 
 
 JOBS = JobList.of(
-    Move("B"), Move(Goal(1.0, 2.0)), Voice("Hello!"), Message("Look"), Wait(2.5), Wait(),
-    Arm("pick", ".PROGRAM pick"),
+    MoveJob("B"), MoveJob(Goal(1.0, 2.0)), VoiceJob("Hello!"), MessageJob("Look"), WaitJob(2.5), WaitJob(),
+    ArmJob("pick", ".PROGRAM pick"),
     places={"B": Goal(4.0, 1.5, 0.25)},
 )  # fmt: skip
 PROGRESS = Progress(
-    Stage.PAUSED, (JobProgress(1, Stage.DONE), JobProgress(5, Stage.PAUSED, "somebody stopped it", 1.5)), "somebody"
+    JobStage.PAUSED,
+    (JobProgress(1, JobStage.DONE), JobProgress(5, JobStage.PAUSED, "somebody stopped it", 1.5)),
+    "somebody",
 )
 
 
@@ -114,7 +116,7 @@ def values() -> dict[str, Any]:
     limits = Limits([-1.0] * 3, [1.0] * 3, [2.0] * 3, [4.0] * 3, [40.0] * 3)
     held = c.Lease(LeaseState.HELD, 2**64 - 1, "Ada", True, 3)
     plan = PlanPart(4, 2.5, Q, segments())
-    entries = Entry(1, 2.0, ordered()["move"], 6), Entry(2, 2.0, None, 6)
+    entries = LogEntry(1, 2.0, ordered()["move"], 6), LogEntry(2, 2.0, None, 6)
     orders = {
         f"order: {name}": m.Order(number, order, 7_730_941_132_801)
         for number, (name, order) in enumerate(ordered().items(), 1)
@@ -147,17 +149,17 @@ def values() -> dict[str, Any]:
         ),
         "drive orders": DriveOrders(
             3, 5, 2.75, 2.5, Posture(1.5, 3.0, 0.0),
-            Packet(
+            ArcPacket(
                 ((2, (ArcSegment(0.2, 0.1, (1.5, 3.0, 0.0), 0.05, -0.01),)),), 0.3,
                 (ArcSegment(0.3, 0.1, (1.505, 3.0, -0.001), 0.02, -0.004),),
             ),
         ),
-        "drive orders without a drive": DriveOrders(1, 1, 0.5, 0.0, None, Packet((), 0.0)),
+        "drive orders without a drive": DriveOrders(1, 1, 0.5, 0.0, None, ArcPacket((), 0.0)),
         "drive orders with errands": DriveOrders(
-            3, 6, 2.85, 2.5, None, Packet((), 0.0),
+            3, 6, 2.85, 2.5, None, ArcPacket((), 0.0),
             errands=(
                 Errand(1, Go(Goal(4.0, 1.5, 0.25))), Errand(2, Halt()), Errand(3, Load(JOBS, PROGRESS)),
-                Errand(4, Command.RUN),
+                Errand(4, ListCommand.RUN),
             ),
         ),
         "drive report of a robot that drives by itself": DriveReport(
@@ -166,11 +168,11 @@ def values() -> dict[str, Any]:
                 JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), digest(JOBS), PROGRESS,
                 OperatorLoss.CARRY_ON, "Look", "Hello!",
             ),
-            sight=Sight(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
+            sight=SensedPoints(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
         ),
         "task: a goal": w.TaskOrder(7, 7_730_941_132_801, Go(Goal(4.0, 1.5))),
         "task: a list": w.TaskOrder(8, 7_730_941_132_801, Load(JOBS)),
-        "task: run it": w.TaskOrder(9, 7_730_941_132_801, Command.RUN),
+        "task: run it": w.TaskOrder(9, 7_730_941_132_801, ListCommand.RUN),
         "task: try it": w.TaskOrder(10, 7_730_941_132_801, w.Trial.DRY_RUN),
         "tasks": w.Tasks(
             Doing.JOBS, JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), 2.5, JOBS,
@@ -216,22 +218,27 @@ def values() -> dict[str, Any]:
             34, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7, late=((1.25, Q), (1.31, 1.001 * Q))
         ),
         "survey": n.Survey(7),
-        "impair both ways": n.Impair(8, 7_730_941_132_801, n.Way("mon", "0.05"), n.Way("constant:0.3")),
-        "impair one way": n.Impair(9, 7_730_941_132_801, n.Way("none", "burst:0.1,3", "in-order")),
+        "impair both ways": n.Impair(
+            8, 7_730_941_132_801, n.DirectionConditions("mon", "0.05"), n.DirectionConditions("constant:0.3")
+        ),
+        "impair one way": n.Impair(9, 7_730_941_132_801, n.DirectionConditions("none", "burst:0.1,3", "in-order")),
         "network": n.Network(
-            n.Way("mon", "0.05"), n.Way("none"), Measured(412, 0.05, 0.139, 1.9), Measured(300, 0.0, 0.0, 0.0),
-            Measured(290, None, 0.141, 1.91), 7, 31.5, "Ada", "ws://127.0.0.1:41000/site", "", 0.002, "halt", 0.5,
+            n.DirectionConditions("mon", "0.05"), n.DirectionConditions("none"),
+            LinkFigures(412, 0.05, 0.139, 1.9), LinkFigures(300, 0.0, 0.0, 0.0),
+            LinkFigures(290, None, 0.141, 1.91), 7, 31.5, "Ada", "ws://127.0.0.1:41000/site", "", 0.002,
+            "halt", 0.5,
             0.5, -0.5, "messages will often be old", 7,
         ),
         "network without a robot": n.Network(
-            n.Way("none"), n.Way("none"), Measured(0, None, None, None), Measured(0, None, None, None),
-            Measured(0, None, None, None), problem="not connected yet",
+            n.DirectionConditions("none"), n.DirectionConditions("none"),
+            LinkFigures(0, None, None, None), LinkFigures(0, None, None, None),
+            LinkFigures(0, None, None, None), problem="not connected yet",
         ),
         **orders,
         "ask": m.Ask(9, 2.75),
         "ask for the present": m.Ask(10, None),
-        "follow segments": m.Follow(11, m.Form.SEGMENTS),
-        "follow frames": m.Follow(11, m.Form.FRAMES, 60.0),
+        "follow segments": m.Follow(11, m.ViewForm.SEGMENTS),
+        "follow frames": m.Follow(11, m.ViewForm.FRAMES, 60.0),
         "want history": m.Want(3, 256),
         "want edits": m.Want(3, None),
         "outcome": m.Outcome(1, receipt, "", 0, 2.5),
@@ -326,7 +333,7 @@ def stream() -> dict[str, Any]:
         came = [encode(reply, Encoding.JSON).decode() for reply in servlet.advance(now=site.time(now))]
         steps.append({"now": now, "asked": sent, "messages": came})
 
-    step(0.0, m.Follow(1, m.Form.SEGMENTS))
+    step(0.0, m.Follow(1, m.ViewForm.SEGMENTS))
     step(0.05, m.Want(3, 0))
     step(0.1, m.Want(3, None))
     orders = [

@@ -5,7 +5,7 @@ import pytest
 
 from interfaces.designer import Designer
 from interfaces.link.round_trip import Pong
-from interfaces.messages import Form, Order
+from interfaces.messages import Order, ViewForm
 from interfaces.observer import Observer
 from interfaces.stream import control
 from interfaces.stream.client import FIRST_PONGS, KEPT, UNKNOWN, ClientCore, Phase
@@ -43,7 +43,7 @@ def test_the_four_interfaces_over_a_connection(encoding):
     observer = Observer(core.port)
     joined.parts[core].append(observer)
     viewers = {}
-    for form in Form:
+    for form in ViewForm:
         peer = joined.client(role=Role.VIEWER, encoding=encoding)
         joined.run(0.1)
         viewers[form] = Viewer(peer.port, rate=30.0, form=form)
@@ -56,7 +56,7 @@ def test_the_four_interfaces_over_a_connection(encoding):
         shown = viewer.history
         assert len(shown) > 25
         assert all(np.abs(frame.q - engine.joints(frame.t)).max() <= 1e-9 for frame in shown)
-    assert viewers[Form.SEGMENTS].timeline.end == engine.timeline.end
+    assert viewers[ViewForm.SEGMENTS].timeline.end == engine.timeline.end
 
 
 @pytest.mark.parametrize("ahead", [0.0, 100.0, -3.0, 1e6])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from interfaces import connect
-from interfaces.messages import Form
+from interfaces.messages import ViewForm
 from interfaces.stream.control import ProblemCode
 from interfaces.stream.line import UnreachableError
 from tests.interfaces.joined import to
@@ -27,7 +27,7 @@ def test_the_four_interfaces(encoding):
             assert robot.supervisor.ask(1e3).frame.q.tolist() == serving.hub.site.engine.joints(1e3).tolist()
             assert robot.observer.ask(0.0).frame.q.tolist() == HOME.tolist()
             viewer = robot.viewer(rate=50)
-            frames = robot.viewer(rate=60, form=Form.FRAMES)
+            frames = robot.viewer(rate=60, form=ViewForm.FRAMES)
             assert viewer.wait(lambda v: len(v.history) > 5)
             assert frames.wait(lambda v: len(v.history) > 5)
             engine = serving.hub.site.engine

@@ -16,7 +16,7 @@ from interfaces.stream.control import Problem
 from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.mobile import Postures
-from interfaces.stream.session import Session
+from interfaces.stream.session import HubSession
 from interfaces.stream.tasks import Seen, Tasks, Wanted
 from interfaces.teleop.tasks import Go
 from robots.onboard.driving import Drive, Posture
@@ -82,7 +82,7 @@ def hub() -> Hub:
     return Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), welcome=site.welcome)
 
 
-def said(session: Session, *messages: dict[str, Any], now: float = 5.0) -> list[dict[str, Any]]:
+def said(session: HubSession, *messages: dict[str, Any], now: float = 5.0) -> list[dict[str, Any]]:
     """What a client hears that says something."""
     for message in messages:
         session.receive(json.dumps(message), now=now)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from interfaces.messages import Follow, Form, Order
+from interfaces.messages import Follow, Order, ViewForm
 from interfaces.stream import control
 from interfaces.stream.codec import encode
 from interfaces.stream.control import ProblemCode, Role
@@ -177,7 +177,7 @@ def test_what_was_left_is_forgotten_in_time_and_in_number():
     hub = make_hub(limits=ClientLimits(absence=10.0, absent=5))
     for k in range(20):
         peer = Peer(hub, now=0.1 * k)
-        peer.tell(Follow(1, Form.FRAMES, 60.0), now=0.1 * k)
+        peer.tell(Follow(1, ViewForm.FRAMES, 60.0), now=0.1 * k)
         hub.leave(peer.session, done=False, now=0.1 * k)
         assert hub.seats <= 5
     hub.advance(now=20.0)
@@ -211,7 +211,7 @@ def test_hundreds_that_came_and_went_leave_nothing(role, done):
     hub = make_hub()
     for k in range(300):
         peer = Peer(hub, role=role, now=0.01 * k)
-        peer.tell(Follow(1, Form.FRAMES, 60.0), now=0.01 * k)
+        peer.tell(Follow(1, ViewForm.FRAMES, 60.0), now=0.01 * k)
         hub.leave(peer.session, done=done, now=0.01 * k)
     assert (hub.seats, hub.sessions) == (0, ())
     assert all(broadcaster.viewers == 0 for broadcaster in hub.site.broadcasters)
@@ -237,7 +237,7 @@ def test_an_edit_reaches_followers_of_segments_at_once():
     hub = make_hub()
     peer, epoch = holder(hub)
     viewer = Peer(hub, role=Role.VIEWER)
-    viewer.tell(Follow(1, Form.SEGMENTS), now=0.1)
+    viewer.tell(Follow(1, ViewForm.SEGMENTS), now=0.1)
     peer.tell(Order(1, to(1), epoch), now=0.123)
     ready = hub.advance(now=0.123)
     assert viewer.session in ready

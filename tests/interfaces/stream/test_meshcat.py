@@ -14,7 +14,7 @@ import pytest
 
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.commands import set_transform
-from interfaces.stream.meshcat.committed import PIECE, Path
+from interfaces.stream.meshcat.committed import PIECE, CommittedPath
 from interfaces.stream.meshcat.library import module
 from interfaces.stream.meshcat.meshes import shaded, tube
 from interfaces.stream.meshcat.newest import MOST_READERS, Newest
@@ -274,7 +274,7 @@ def test_a_robot_that_is_away_is_hidden_and_comes_back(scene: MeshcatScene) -> N
 @pytest.mark.parametrize("play", [0.0, 0.3, 1.0, 1.26])
 def test_the_path_goes_from_the_real_tool_to_where_it_rests(play: float) -> None:
     timeline = plan(0.5, -0.4)
-    pieces = Path(MODEL, timeline, play, TOOL).pieces(play)
+    pieces = CommittedPath(MODEL, timeline, play, TOOL).pieces(play)
     line = np.vstack([piece.points for piece in pieces])
     np.testing.assert_allclose(line[0], tool(timeline, play)[0], atol=1e-9)
     np.testing.assert_allclose(line[-1], tool(timeline, timeline.end)[0], atol=1e-4)
@@ -291,7 +291,7 @@ def test_the_path_goes_from_the_real_tool_to_where_it_rests(play: float) -> None
 
 def test_ticks_stand_where_the_tool_will_be_at_halves_of_a_second() -> None:
     timeline = plan(0.5, -0.4)
-    pieces = Path(MODEL, timeline, 0.3, TOOL).pieces(0.3)
+    pieces = CommittedPath(MODEL, timeline, 0.3, TOOL).pieces(0.3)
     ticks = {piece.index * PIECE: piece.marks[0] for piece in pieces if piece.marks and piece.marks[0][1] > 0}
     assert set(ticks) == set(np.arange(0.5, timeline.end, 0.5))
     for t, (X, radius) in ticks.items():
@@ -315,7 +315,7 @@ def test_ticks_stand_where_the_tool_will_be_at_halves_of_a_second() -> None:
 def test_a_turn_of_the_flange_alone_has_an_end_and_no_line() -> None:
     engine = Engine(MODEL, q=NOMINAL, clock=ManualClock(0.0))
     engine.execute(MotionCommand(target=JointTarget(NOMINAL + np.array([0, 0, 0, 0, 0, 1.0])), speed=0.3))
-    pieces = Path(MODEL, engine.timeline, 0.0, TOOL).pieces(0.0)
+    pieces = CommittedPath(MODEL, engine.timeline, 0.0, TOOL).pieces(0.0)
     assert sum(len(piece.points) for piece in pieces) == 0
     assert [piece.ends for piece in pieces if piece] == [True]
 
@@ -323,8 +323,8 @@ def test_a_turn_of_the_flange_alone_has_an_end_and_no_line() -> None:
 def test_a_plan_that_is_over_or_empty_draws_nothing() -> None:
     for timeline in (plan(), plan(0.3)):
         end = timeline.end + 1e-9
-        assert Path(MODEL, timeline, end, TOOL).pieces(end) == ()
-        assert Path(MODEL, timeline, 1e6, TOOL).pieces(1e6) == ()
+        assert CommittedPath(MODEL, timeline, end, TOOL).pieces(end) == ()
+        assert CommittedPath(MODEL, timeline, 1e6, TOOL).pieces(1e6) == ()
 
 
 def test_a_long_plan_is_drawn_as_far_as_the_horizon_and_renewed(scene: MeshcatScene) -> None:

@@ -12,7 +12,7 @@ from interfaces.runtime.ages import late_often
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.stream import control
 from interfaces.stream.control import Attached, ProblemCode, Role
-from interfaces.stream.network import Impair, Survey, Way
+from interfaces.stream.network import DirectionConditions, Impair, Survey
 from interfaces.teleop import OperatorSite, RobotLine
 from tests.interfaces.stream.served import HOME, MODEL, make_hub
 from tests.interfaces.stream.test_session import Peer, holder
@@ -42,12 +42,16 @@ def test_who_asks_is_told_and_of_every_change_from_then_on():
     mine, epoch = holder(hub)
     watcher, silent = Peer(hub, role=Role.VIEWER), Peer(hub)
     (found,) = watcher.tell(Survey(4), now=0.2)
-    assert (found.forward, found.answers, found.changed_at) == (Way("constant:0.1", "burst:0.2,4"), 4, None)
+    assert (found.forward, found.answers, found.changed_at) == (
+        DirectionConditions("constant:0.1", "burst:0.2,4"),
+        4,
+        None,
+    )
     assert (found.seed, found.robot, found.link_loss, found.offset) == (3, "ws://there/site", "halt", -0.3)
     assert found.there.packets == 0
     assert found.there.median is None
-    (answer,) = mine.tell(Impair(5, epoch, Way("mon", "0.05", "in-order")), now=0.3)
-    assert (answer.forward, answer.backward) == (Way("mon", "0.05", "in-order"), found.backward)
+    (answer,) = mine.tell(Impair(5, epoch, DirectionConditions("mon", "0.05", "in-order")), now=0.3)
+    assert (answer.forward, answer.backward) == (DirectionConditions("mon", "0.05", "in-order"), found.backward)
     assert (answer.answers, answer.changed_at, answer.changed_by) == (5, 0.3, "peer")
     (seen,) = [message for message in watcher.got(now=0.3) if message.kind == "network"]
     assert (seen.forward, seen.answers) == (answer.forward, None)
@@ -64,19 +68,19 @@ def test_who_asks_is_told_and_of_every_change_from_then_on():
 @pytest.mark.parametrize(
     ("way", "words"),
     [
-        (Way("tomorrow"), "constant:S"),
-        (Way("constant:-1"), "[0, 3600]"),
-        (Way("trace:/etc/passwd"), "only if the server was started with it"),
-        (Way("none", "1.5"), "burst:P,N"),
-        (Way("none", "nan"), "burst:P,N"),
-        (Way("none", "0", "sometimes"), "datagram"),
+        (DirectionConditions("tomorrow"), "constant:S"),
+        (DirectionConditions("constant:-1"), "[0, 3600]"),
+        (DirectionConditions("trace:/etc/passwd"), "only if the server was started with it"),
+        (DirectionConditions("none", "1.5"), "burst:P,N"),
+        (DirectionConditions("none", "nan"), "burst:P,N"),
+        (DirectionConditions("none", "0", "sometimes"), "datagram"),
     ],
 )
 def test_what_is_wrong_is_said_once_and_changes_nothing(way, words):
     hub, line, told = emulated()
     mine, epoch = holder(hub)
     before = line.link.conditions
-    for wish in (Impair(5, epoch, way), Impair(6, epoch, Way("mon"), way)):
+    for wish in (Impair(5, epoch, way), Impair(6, epoch, DirectionConditions("mon"), way)):
         (problem,) = mine.tell(wish, now=0.3)
         assert (problem.code, problem.number, problem.fatal) == (ProblemCode.OUT_OF_RANGE, wish.number, False)
         assert words in problem.text
@@ -88,7 +92,7 @@ def test_only_who_has_control_changes_it():
     hub, line, _ = emulated()
     mine, epoch = holder(hub)
     before = line.link.conditions
-    wish = Way("mon")
+    wish = DirectionConditions("mon")
     for peer, given, code in (
         (Peer(hub, role=Role.VIEWER), epoch, ProblemCode.NOT_ALLOWED),
         (Peer(hub), epoch, ProblemCode.STALE_EPOCH),
@@ -106,21 +110,29 @@ def test_only_who_has_control_changes_it():
 def test_it_does_not_change_too_often():
     hub, _, told = emulated()
     mine, epoch = holder(hub)
-    answers = [mine.tell(Impair(k, epoch, Way(f"constant:{k / 100}")), now=0.3)[-1] for k in range(1, 30)]
+    answers = [
+        mine.tell(Impair(k, epoch, DirectionConditions(f"constant:{k / 100}")), now=0.3)[-1] for k in range(1, 30)
+    ]
     refused = [answer for answer in answers if answer.kind == "problem"]
     assert {answer.code for answer in refused} == {ProblemCode.TOO_FAST}
     assert len(told) == 29 - len(refused) == 10
-    assert mine.tell(Impair(31, epoch, Way("mon")), now=1.0)[-1].kind == "network"
+    assert mine.tell(Impair(31, epoch, DirectionConditions("mon")), now=1.0)[-1].kind == "network"
 
 
 def test_messages_that_will_often_be_too_old_are_spoken_of():
     hub, _, _ = emulated()
     mine, epoch = holder(hub)
     assert mine.tell(Survey(1), now=0.2)[0].advice == ""
-    assert "will often be" in mine.tell(Impair(2, epoch, Way("lunar"), Way("none")), now=0.3)[0].advice
+    assert (
+        "will often be"
+        in mine.tell(Impair(2, epoch, DirectionConditions("lunar"), DirectionConditions("none")), now=0.3)[0].advice
+    )
     hub, _, _ = emulated(link_loss="hold")
     mine, epoch = holder(hub)
-    assert mine.tell(Impair(2, epoch, Way("lunar"), Way("none")), now=0.3)[0].advice == ""
+    assert (
+        mine.tell(Impair(2, epoch, DirectionConditions("lunar"), DirectionConditions("none")), now=0.3)[0].advice
+        == ""
+    )
     slow = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.3")))
     assert "0.6 s old" in late_often(slow, "halt", 0.5)
     assert late_often(slow, "halt", 0.7) == ""
@@ -137,7 +149,7 @@ def test_the_way_is_measured_since_it_changed():
     assert found.back.packets > 100
     assert (found.back.median, found.back.p95) == (pytest.approx(0.1), pytest.approx(0.1))
     assert 0.02 < found.back.lost < 0.5
-    changed = mine.tell(Impair(2, epoch, None, Way("constant:0.02")), now=2.0)[-1]
+    changed = mine.tell(Impair(2, epoch, None, DirectionConditions("constant:0.02")), now=2.0)[-1]
     assert changed.back.packets == 0
     for k in range(200, 220):
         line.link.backward.send(Ping(k + 1, 0.0), 0.01 * k)
@@ -149,7 +161,7 @@ def test_the_way_is_measured_since_it_changed():
 def test_packets_under_way_are_not_lost():
     hub, line, _ = emulated()
     mine, epoch = holder(hub)
-    mine.tell(Impair(2, epoch, None, Way("constant:1.5", "0.2")), now=0.0)
+    mine.tell(Impair(2, epoch, None, DirectionConditions("constant:1.5", "0.2")), now=0.0)
     found, shown = {}, []
     for k in range(1200):
         now = 0.02 * k

@@ -15,11 +15,11 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from interfaces.link.round_trip import Ping
-from interfaces.messages import Follow, Form
+from interfaces.messages import Follow, ViewForm
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.control import Role
-from interfaces.stream.session import Session
+from interfaces.stream.session import HubSession
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.test_session import COMING
 
@@ -61,7 +61,7 @@ def test_both_encodings_health_and_frames():
     async def talk(serving):
         for encoding in Encoding:
             connection = await greeted(serving, encoding=encoding)
-            follow = encode(Follow(1, Form.FRAMES, 60.0), encoding)
+            follow = encode(Follow(1, ViewForm.FRAMES, 60.0), encoding)
             await connection.send(follow.decode() if encoding is Encoding.JSON else follow)
             first = await wait(connection, "broadcast")
             assert (await wait(connection, "broadcast")).frame.number > first.frame.number
@@ -137,7 +137,7 @@ def stuck(serving):
     connection.sendall(handshake(serving, Encoding.JSON))
     while b"\r\n\r\n" not in connection.recv(4096, socket.MSG_PEEK):
         time.sleep(0.01)
-    for message in (control.Hello(Role.VIEWER, "stuck"), Follow(1, Form.FRAMES, 1000.0)):
+    for message in (control.Hello(Role.VIEWER, "stuck"), Follow(1, ViewForm.FRAMES, 1000.0)):
         connection.sendall(frame(message, Encoding.JSON))
     return connection
 
@@ -145,7 +145,7 @@ def stuck(serving):
 def test_who_reads_nothing_is_cut_off_and_the_others_get_their_frames():
     async def talk(serving):
         connection = await greeted(serving)
-        await connection.send(encode(Follow(1, Form.FRAMES, 60.0), Encoding.MSGPACK))
+        await connection.send(encode(Follow(1, ViewForm.FRAMES, 60.0), Encoding.MSGPACK))
         first = (await wait(connection, "broadcast")).frame.number
         frames, until = 0, time.monotonic() + 20.0
         while not serving.server.cut_off and time.monotonic() < until:
@@ -168,7 +168,7 @@ def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
         writer.write(handshake(serving, Encoding.MSGPACK))
         await reader.readuntil(b"\r\n\r\n")
         writer.write(frame(control.Hello(Role.VIEWER, "peer"), Encoding.MSGPACK))
-        writer.write(frame(Follow(1, Form.FRAMES, 60.0), Encoding.MSGPACK))
+        writer.write(frame(Follow(1, ViewForm.FRAMES, 60.0), Encoding.MSGPACK))
         await reader.readuntil(b"welcome")
         if k % 2:
             writer.write(b"\x88\x80" + bytes(4))
@@ -203,7 +203,7 @@ def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
 def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
     from vrs.errors import VrsError
 
-    receive = Session.receive
+    receive = HubSession.receive
 
     def faulty(self, data, *, now):
         if b"\xc1" in data:
@@ -218,7 +218,7 @@ def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
         await wait(other, "pong")
         await other.close()
 
-    monkeypatch.setattr(Session, "receive", faulty)
+    monkeypatch.setattr(HubSession, "receive", faulty)
     with served() as serving:
         asyncio.run(talk(serving))
     assert "planted" in caplog.text

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from interfaces.link.round_trip import Ping, Pong
-from interfaces.messages import Ask, Follow, Form, Order, Pulse, Reply, Want
+from interfaces.messages import Ask, Follow, Order, Pulse, Reply, ViewForm, Want
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.control import Notice, ProblemCode, Role
@@ -277,7 +277,7 @@ def test_an_outcome_is_told_again_after_the_lease_has_ended():
 def test_a_slow_reader_gets_the_newest_frame_and_no_more_waits_than_it_may():
     hub = make_hub(limits=ClientLimits(waiting=4096))
     peer = Peer(hub, role=Role.VIEWER)
-    peer.tell(Follow(1, Form.FRAMES, 60.0), now=0.0)
+    peer.tell(Follow(1, ViewForm.FRAMES, 60.0), now=0.0)
     for k in range(1, 600):
         hub.advance(now=k / 60)
     assert peer.session.waiting == 0
@@ -292,7 +292,7 @@ def test_one_who_asks_and_never_reads_costs_little():
     for k in range(300):
         hub.site.time(0.01 * k)
         hub.site.engine.execute(to(k, execute_at=100.0 + 3 * k))
-    peer.session.receive(encode(Follow(1, Form.SEGMENTS), Encoding.MSGPACK), now=4.0)
+    peer.session.receive(encode(Follow(1, ViewForm.SEGMENTS), Encoding.MSGPACK), now=4.0)
     worst = 0
     for k in range(2, 700):
         for message in (Ask(k, 0.01 * k), Want(300, 0), Want(0, None), Order(1, to(1), epoch)):
@@ -311,7 +311,7 @@ def test_random_bytes_never_do_anything_else():
     hub = make_hub(limits=ClientLimits(bad=1000, rate=1e5, burst=1e5))
     other, epoch = holder(hub)
     valid = [encode(m, Encoding.MSGPACK) for m in (Order(1, to(1), epoch), Ask(1, 0.0), Ping(1, 0.0),
-             control.Acquire(1), control.Beat(epoch), Follow(1, Form.SEGMENTS), Want(1, 0))]  # fmt: skip
+             control.Acquire(1), control.Beat(epoch), Follow(1, ViewForm.SEGMENTS), Want(1, 0))]  # fmt: skip
     peer = Peer(hub)
     for _ in range(900):
         data = bytearray(rng.choice(valid))
@@ -329,7 +329,7 @@ def test_what_many_get_is_written_once(monkeypatch):
     hub = make_hub(rates=(50.0,))
     peers = [Peer(hub, role=Role.VIEWER) for _ in range(20)]
     for peer in peers:
-        peer.session.receive(encode(Follow(1, Form.FRAMES, 50.0), Encoding.MSGPACK), now=0.0)
+        peer.session.receive(encode(Follow(1, ViewForm.FRAMES, 50.0), Encoding.MSGPACK), now=0.0)
         peer.got(now=0.0)
     hub.advance(now=0.02)
     frames = [peer.session.advance(now=0.02) for peer in peers]

@@ -12,12 +12,12 @@ from websockets.typing import Subprotocol
 
 from interfaces.link import LinkConditions
 from interfaces.link.round_trip import Ping
-from interfaces.messages import Follow, Form, Order, Want
+from interfaces.messages import Follow, Order, ViewForm, Want
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.control import ProblemCode, Role
 from interfaces.stream.limits import Allowance, Allowances, ClientLimits
-from interfaces.stream.network import Impair, Network, Survey, Way
+from interfaces.stream.network import DirectionConditions, Impair, Network, Survey
 from interfaces.stream.server import Slices
 from interfaces.teleop import Report
 from tests.interfaces.stream.served import HOME, make_hub, served
@@ -93,7 +93,7 @@ def planned(**options):
 def test_a_timeline_is_made_and_written_once_for_all_who_ask(monkeypatch: pytest.MonkeyPatch) -> None:
     hub = planned(waiting=1 << 20)
     viewers = [Peer(hub, role=Role.VIEWER) for _ in range(5)]
-    scenes = [m for peer in viewers for m in peer.tell(Follow(1, Form.SEGMENTS), now=3.0) if m.kind == "scene"]
+    scenes = [m for peer in viewers for m in peer.tell(Follow(1, ViewForm.SEGMENTS), now=3.0) if m.kind == "scene"]
     edit = scenes[0].edit
     made: list[int] = []
     from interfaces import journal
@@ -131,7 +131,7 @@ def test_whatever_raises_at_a_message_ends_that_client_s_connection_alone() -> N
     mine, epoch = holder(hub)
     other = Peer(hub)
     other.session.seat.servlet.receive = lambda *given, **named: 1 / 0
-    found = other.tell(Follow(1, Form.SEGMENTS), now=0.2)
+    found = other.tell(Follow(1, ViewForm.SEGMENTS), now=0.2)
     assert (found[-1].code, found[-1].fatal) == (ProblemCode.FAILED, True)
     assert other.session.closing[0] == 1011
     third = Peer(hub, now=0.3)
@@ -176,7 +176,7 @@ def test_no_way_that_is_taken_ever_fails_and_others_say_what_is_allowed() -> Non
             f"gamma:0.1,0.05{tau}", f"mon{tau}",
         ))  # fmt: skip
         loss = rng.choice(("0", one[3], f"burst:{one[3]},{one[4]}", "burst:0.2,4"))
-        way = Way(delay, loss, rng.choice(("datagram", "in-order")))
+        way = DirectionConditions(delay, loss, rng.choice(("datagram", "in-order")))
         now += 0.25
         found = mine.tell(Impair(k + 1, epoch, way, way), now=now)
         mine.tell(control.Beat(epoch), now=now)
@@ -205,7 +205,7 @@ def test_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
         async with connect(url, subprotocols=[Subprotocol(Encoding.JSON)], max_size=None) as socket:
             reader = asyncio.create_task(_passed_over(socket))
             await socket.send(encode(control.Hello(Role.VIEWER, "viewer"), Encoding.JSON).decode())
-            await socket.send(encode(Follow(1, Form.SEGMENTS), Encoding.JSON).decode())
+            await socket.send(encode(Follow(1, ViewForm.SEGMENTS), Encoding.JSON).decode())
             sent = 0
             while not stop.is_set():
                 for message in (Want(edit, 0), Want(0, None)):

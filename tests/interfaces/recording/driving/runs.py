@@ -8,16 +8,16 @@ from tempfile import TemporaryDirectory
 
 from interfaces.lab.driving.run import run
 from interfaces.recording.driving.recorder import DriveRecorder
-from interfaces.runs.drive_run import Case, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import Transport
 
-SLALOM = Case("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 6.0)
-WANDER = Case("extended", Transport.STREAM, "constant:0.4", "bare", "wander", 1, 12.0)
+SLALOM = DriveCase("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 6.0)
+WANDER = DriveCase("extended", Transport.STREAM, "constant:0.4", "bare", "wander", 1, 12.0)
 _FOLDER = TemporaryDirectory(prefix="vrs-drives-")
 
 
 @cache
-def recorded(case: Case) -> tuple[DriveRun, Path]:
+def recorded(case: DriveCase) -> tuple[DriveRun, Path]:
     """A run, and where its recording stands; it isn't to be changed."""
     path = Path(_FOLDER.name) / f"{abs(hash(case))}.mcap"
     recorder = DriveRecorder(path)

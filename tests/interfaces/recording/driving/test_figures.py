@@ -16,7 +16,7 @@ from interfaces.recording.driving.figures import driven, summary
 from interfaces.recording.playback import Playback
 from interfaces.report.recorded import render
 from interfaces.runs.drive_row import COLUMNS, METRICS, facts_of, row_of
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from interfaces.station.shelf import checked_name
 from interfaces.teleop.architectures import Transport
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
@@ -26,7 +26,7 @@ from vrs.errors import FormatError
 
 
 @pytest.mark.parametrize("case", [SLALOM, WANDER], ids=lambda case: case.operator)
-def test_a_recording_gives_the_row_of_its_run(case: Case) -> None:
+def test_a_recording_gives_the_row_of_its_run(case: DriveCase) -> None:
     drive, path = recorded(case)
     with open_recording(path) as recording:
         found = summary(recording)
@@ -50,7 +50,7 @@ def test_the_laboratory_keeps_recordings_and_nothing_else_changes(tmp_path: Path
     assert [file.name for file in files] == [f"I-datagrams-constant_0.3-bare-slalom-{seed}.mcap" for seed in (0, 1)]
     for file, row in zip(files, rows, strict=True):
         # The same bytes from a worker and from this process.
-        case = Case("I", Transport.DATAGRAMS, "constant:0.3", "bare", "slalom", int(row["seed"]), 4.0)
+        case = DriveCase("I", Transport.DATAGRAMS, "constant:0.3", "bare", "slalom", int(row["seed"]), 4.0)
         again = measure_recorded(case, False, tmp_path / "again.mcap")
         assert (again.drive, again.problem) == (None, "")
         assert (tmp_path / "again.mcap").read_bytes() == file.read_bytes()
@@ -153,7 +153,7 @@ def test_flipped_bits_never_give_wrong_figures(tmp_path: Path) -> None:
     ],
 )
 def test_a_name_says_what_it_is_and_is_one(architecture: str, delay: str, operator: str, name: str) -> None:
-    assert name_of(Case(architecture, Transport.STREAM, delay, "micro", operator, 7)) == name
+    assert name_of(DriveCase(architecture, Transport.STREAM, delay, "micro", operator, 7)) == name
     checked_name(f"{name}.mcap")
 
 
@@ -169,7 +169,7 @@ def test_names_of_other_cases_are_others_and_all_are_plain() -> None:
     ]
     operators = ["mixed", "inputs:../up.csv", "inputs:up.csv", "inputs:" + "y" * 99]
     cases = [
-        Case(architecture, transport, delay, "micro", operator, seed)
+        DriveCase(architecture, transport, delay, "micro", operator, seed)
         for architecture in ("I", "timeline")
         for transport in Transport
         for delay in delays

@@ -21,7 +21,7 @@ from interfaces.recording.driving.rooms import room_entry, room_of
 from interfaces.recording.rerun import rerun
 from interfaces.recording.sink import Sink
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
-from interfaces.runs.drive_run import Case
+from interfaces.runs.drive_run import DriveCase
 from robots.ipr.robot import PLACES, place
 from tests.interfaces.recording.disks import Failing
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
@@ -31,7 +31,7 @@ BOTH = pytest.mark.parametrize("case", [SLALOM, WANDER], ids=lambda case: case.o
 
 
 @BOTH
-def test_the_public_reader_finds_messages_that_keep_to_the_schemas(case: Case) -> None:
+def test_the_public_reader_finds_messages_that_keep_to_the_schemas(case: DriveCase) -> None:
     drive, path = recorded(case)
     found = defaultdict(list)
     times = []
@@ -62,7 +62,7 @@ def test_the_public_reader_finds_messages_that_keep_to_the_schemas(case: Case) -
 
 
 @BOTH
-def test_everything_comes_back_to_the_last_bit(case: Case) -> None:
+def test_everything_comes_back_to_the_last_bit(case: DriveCase) -> None:
     drive, path = recorded(case)
     with open_recording(path) as recording:
         assert recording.damage == Damage(until=drive.t[-1])
@@ -87,7 +87,7 @@ def test_everything_comes_back_to_the_last_bit(case: Case) -> None:
 
 
 @BOTH
-def test_the_commands_make_the_same_timelines_again(case: Case) -> None:
+def test_the_commands_make_the_same_timelines_again(case: DriveCase) -> None:
     _, path = recorded(case)
     with open_recording(path) as recording:
         again = rerun(recording)
@@ -117,7 +117,7 @@ def test_a_disk_that_fills_up_is_a_problem_and_nothing_else(
             raise OSError(errno.ENOSPC, "full")
 
     disk, recorder = Full(4, how="full"), DriveRecorder(tmp_path / "run.mcap")
-    drive = run(Case("timeline", robot="bare", length=1.0), witness=recorder)
+    drive = run(DriveCase("timeline", robot="bare", length=1.0), witness=recorder)
     monkeypatch.setattr(Sink, "create", classmethod(lambda cls, path: cls(disk, str(path))))
     recorder.finish(drive)
     assert disk.closed
@@ -128,7 +128,7 @@ def test_packets_on_their_way_at_the_end_are_told_from_lost_ones(tmp_path: Path)
     trace = tmp_path / ("d" * 200) / "caf\udce9.csv"
     trace.parent.mkdir()
     trace.write_text("delay_s\n" + '0.1\n""\n0.2\n5\n' * 500, encoding="utf-8")
-    case = Case("timeline", delay=f"trace:{trace}", robot="bare", length=4.0)
+    case = DriveCase("timeline", delay=f"trace:{trace}", robot="bare", length=4.0)
     recorder = DriveRecorder(tmp_path / "run.mcap")
     drive = run(case, witness=recorder)
     recorder.finish(drive)

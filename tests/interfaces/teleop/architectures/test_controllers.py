@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from interfaces.teleop.architectures import ARCHITECTURES, Constants, Controller, Packet, controller
+from interfaces.teleop.architectures import ARCHITECTURES, ArcPacket, Constants, DriveController, controller
 from robots.onboard.driving import Posture
 from vrs.errors import InvalidValueError
 from vrs.segment import ArcSegment
@@ -26,13 +26,13 @@ def arcs(speeds: list[tuple[float, float]]) -> list[ArcSegment]:
     return made
 
 
-def driven(made: Controller, packets: dict[int, list[ArcSegment]], steps: int) -> tuple[Posture, list[float]]:
+def driven(made: DriveController, packets: dict[int, list[ArcSegment]], steps: int) -> tuple[Posture, list[float]]:
     """Drive a robot like the model by a controller; packets by the step at which they come."""
     posture, v, speeds = START, 0.0, []
     for k in range(steps):
         now = k * PERIOD
         if k in packets:
-            made.receive(packets[k], Packet((), packets[k][-1].end), now=now)
+            made.receive(packets[k], ArcPacket((), packets[k][-1].end), now=now)
         drive = made.control(posture, now=now, v_before=v)
         x, y, theta = ArcSegment(0.0, PERIOD, posture, drive.v, drive.w).value(PERIOD).tolist()
         posture, v = Posture(x, y, theta), drive.v

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from interfaces.lab.driving.run import run
-from interfaces.runs.drive_run import Case, DriveRun
-from interfaces.teleop.architectures import CellChanges, OperatorSurroundings, Report, RobotSurroundings
+from interfaces.runs.drive_run import DriveCase, DriveRun
+from interfaces.teleop.architectures import ArchitectureReport, CellChanges, OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.equipment import BodySonar, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
 from robots.ipr.bare import BareBody
@@ -116,8 +116,8 @@ def test_the_virtual_robot_stands_before_what_was_reported() -> None:
 
 
 def test_changes_count_on_the_wire() -> None:
-    plain = Report(1, 0, Posture(0, 0, 0), 0)
-    full = Report(1, 0, Posture(0, 0, 0), 0, told(0.0, 0.0, True))
+    plain = ArchitectureReport(1, 0, Posture(0, 0, 0), 0)
+    full = ArchitectureReport(1, 0, Posture(0, 0, 0), 0, told(0.0, 0.0, True))
     assert plain.size == 48
     assert full.size == 48 + 10 + 6 * len(BLOCK)
 
@@ -219,7 +219,7 @@ def near(room: Room, name: str) -> set[tuple[int, int]]:
 @pytest.mark.parametrize("seed", range(2))
 def test_obstacles_are_learnt_within_two_seconds_of_being_seen_and_forgotten_in_their_lifetime(seed: int) -> None:
     room = read_room(CHANGING)
-    case = Case("extended", "datagrams", f"constant:{DELAY}", "bare", "wander", seed, 24.0, room=room)
+    case = DriveCase("extended", "datagrams", f"constant:{DELAY}", "bare", "wander", seed, 24.0, room=room)
     drive = run(case)
     assert drive.collisions == 0
     assert drive.limits_passed() == 0
@@ -238,7 +238,7 @@ def test_obstacles_are_learnt_within_two_seconds_of_being_seen_and_forgotten_in_
 def test_nobody_who_walks_through_is_run_into(seed: int) -> None:
     """Collisions of any kind count: also the person's with the robot while it stands."""
     length = 20.0 if PEOPLE <= 2 else 40.0
-    drive = run(Case("extended", "datagrams", "mon@3.3", "bare", "wander", seed, length, room="fig13_person"))
+    drive = run(DriveCase("extended", "datagrams", "mon@3.3", "bare", "wander", seed, length, room="fig13_person"))
     assert place("fig13_person").people
     assert drive.touched == ()
     assert drive.limits_passed() == 0

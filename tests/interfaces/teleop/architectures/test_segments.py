@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.teleop.architectures.segments import MOST_REPEATED, Packet, Receiver, Sender, Transport
+from interfaces.teleop.architectures.segments import MOST_REPEATED, ArcPacket, Receiver, Sender, Transport
 from vrs.segment import ArcSegment
 
 
@@ -17,7 +17,7 @@ def arc(k: int) -> ArcSegment:
 def test_any_packet_makes_up_for_those_that_were_lost_or_overtaken(seed: int) -> None:
     rng = np.random.default_rng(seed)
     sender, receiver = Sender(Transport.DATAGRAMS), Receiver()
-    underway: list[tuple[float, Packet]] = []
+    underway: list[tuple[float, ArcPacket]] = []
     taken: list[ArcSegment] = []
     for k in range(300):
         if k < 280:
@@ -71,5 +71,5 @@ def test_what_is_acknowledged_isn_t_sent_again_and_old_acknowledgements_change_n
 
 
 def test_a_packet_says_what_it_takes_on_the_wire() -> None:
-    assert Packet((), 0.0).size == 8
-    assert Packet(((0, (arc(0), arc(1))),), 0.2, (arc(2),)).size == 8 + 44 + 3 * 24
+    assert ArcPacket((), 0.0).size == 8
+    assert ArcPacket(((0, (arc(0), arc(1))),), 0.2, (arc(2),)).size == 8 + 44 + 3 * 24

@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.jobs import ArmControl, RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.teleop.architectures import Constants, RobotSite, controller
+from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, controller
 from interfaces.teleop.driving import (
     Autonomy,
     DriveLine,
@@ -72,9 +72,9 @@ class Rig:
     def _site(self, t: float) -> DrivenRobot:
         return DrivenRobot(self._made, self.position, IPR_LIMITS, now=t, config=self.config, autonomy=self.autonomy)
 
-    def _made(self, start: Posture, since: float) -> RobotSite:
+    def _made(self, start: Posture, since: float) -> ArchitectureRobotSite:
         assert since >= 0.0
-        return RobotSite(
+        return ArchitectureRobotSite(
             controller(self.architecture, start, Constants()), self.position, IPR_LIMITS, period=CONTROL * TURN
         )
 

@@ -8,21 +8,21 @@ from itertools import pairwise
 import pytest
 
 from interfaces.jobs import (
-    Arm,
-    Command,
+    ArmJob,
     Job,
     JobList,
+    JobStage,
+    ListCommand,
     Load,
-    Message,
-    Move,
+    MessageJob,
+    MoveJob,
     OperatorLoss,
     RunnerConfig,
-    Stage,
-    Voice,
-    Wait,
+    VoiceJob,
+    WaitJob,
 )
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.teleop.architectures import DriveOrders, Packet
+from interfaces.teleop.architectures import ArcPacket, DriveOrders
 from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
 from interfaces.teleop.tasks import Doing, Go, Halt
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
@@ -112,26 +112,28 @@ def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None
     way = Conditions(delay=delay_profile("mon"), loss=loss_model("0.3"))
     rig.begin()
     rig.line.change(LinkConditions.symmetric(way), now=rig.now)
-    jobs = JobList.of(Voice("Hello!"), Move(THERE), Wait(1.0))
-    assert rig.operator.order(Load(jobs), Command.RUN) == ""
+    jobs = JobList.of(VoiceJob("Hello!"), MoveJob(THERE), WaitJob(1.0))
+    assert rig.operator.order(Load(jobs), ListCommand.RUN) == ""
     rig.run(30.0)
     tasks = rig.operator.tasks
     assert tasks is not None
-    assert tasks.progress.stage is Stage.DONE
+    assert tasks.progress.stage is JobStage.DONE
     assert rig.operator.doing is Doing.NOTHING
 
 
-@pytest.mark.parametrize("job", [Move(THERE), Voice("A long text that takes a while. " * 6), Wait(30.0), Wait()])
+@pytest.mark.parametrize(
+    "job", [MoveJob(THERE), VoiceJob("A long text that takes a while. " * 6), WaitJob(30.0), WaitJob()]
+)
 @pytest.mark.parametrize("stop", ["abort", "pause", "stop", "wheel", "touch"])
 def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_intact(job: Job, stop: str) -> None:
     rig = Rig()
     rig.begin()
-    jobs = JobList.of(Message("Look"), job, Move(FAR))
-    rig.operator.order(Load(jobs), Command.RUN)
+    jobs = JobList.of(MessageJob("Look"), job, MoveJob(FAR))
+    rig.operator.order(Load(jobs), ListCommand.RUN)
     rig.run(2.0)
     assert rig.operator.doing is Doing.JOBS
     if stop in {"abort", "pause"}:
-        rig.operator.order(Command(stop))
+        rig.operator.order(ListCommand(stop))
     elif stop == "stop":
         rig.operator.stop()
     elif stop == "wheel":
@@ -143,14 +145,14 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
     assert within_limits(rig)
     tasks = rig.operator.tasks
     assert tasks is not None
-    assert tasks.progress.stage is (Stage.ABORTED if stop == "abort" else Stage.PAUSED)
+    assert tasks.progress.stage is (JobStage.ABORTED if stop == "abort" else JobStage.PAUSED)
     assert rig.autonomy._runner.jobs == jobs
     assert not rig.hands.speaker.is_speaking(now=rig.now)
     assert not tasks.says
     # And it goes on under a new drive.
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    assert rig.operator.order(Command.RESUME) == ""
+    assert rig.operator.order(ListCommand.RESUME) == ""
     rig.run(1.0)
     assert rig.operator.doing is Doing.JOBS
 
@@ -158,11 +160,11 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
 def test_a_job_without_an_arm_fails_and_says_so() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(Load(JobList.of(Arm("pick"), Move(THERE))), Command.RUN)
+    rig.operator.order(Load(JobList.of(ArmJob("pick"), MoveJob(THERE))), ListCommand.RUN)
     rig.run(1.0)
     tasks = rig.operator.tasks
     assert tasks is not None
-    assert (tasks.progress.stage, tasks.progress.jobs[0].stage) == (Stage.FAILED, Stage.FAILED)
+    assert (tasks.progress.stage, tasks.progress.jobs[0].stage) == (JobStage.FAILED, JobStage.FAILED)
     assert "no arm" in tasks.progress.reason
     assert stands(rig)
 
@@ -173,8 +175,8 @@ def test_a_job_without_an_arm_fails_and_says_so() -> None:
 def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, jobs: bool) -> None:
     rig = Rig(hold=hold, jobs=RunnerConfig(loss=loss))
     rig.begin()
-    listed = JobList.of(Move(THERE), Wait(), Voice("Hi"))
-    rig.operator.order(*((Load(listed), Command.RUN) if jobs else (Go(THERE),)))
+    listed = JobList.of(MoveJob(THERE), WaitJob(), VoiceJob("Hi"))
+    rig.operator.order(*((Load(listed), ListCommand.RUN) if jobs else (Go(THERE),)))
     rig.run(2.0)
     rig.line.connected = False
     rig.run(4.0)
@@ -187,7 +189,7 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
         assert stands(rig)
         if jobs:
             assert rig.operator.tasks is not None
-            assert rig.operator.tasks.progress.stage is Stage.PAUSED
+            assert rig.operator.tasks.progress.stage is JobStage.PAUSED
     else:
         rig.run(20.0)
         assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) < 0.05
@@ -196,10 +198,10 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
         if jobs:
             # It's heard again, and may end its waiting.
             assert rig.operator.doing is Doing.JOBS
-            assert rig.operator.order(Command.KEY) == ""
+            assert rig.operator.order(ListCommand.KEY) == ""
             rig.run(3.0)
             assert rig.operator.tasks is not None
-            assert rig.operator.tasks.progress.stage is Stage.DONE
+            assert rig.operator.tasks.progress.stage is JobStage.DONE
         assert rig.autonomy.doing is Doing.NOTHING
     # Nothing moves any more before somebody says so.
     rig.run(1.0)
@@ -229,12 +231,12 @@ def test_what_was_told_just_before_the_link_broke_doesnt_begin_when_it_is_back()
 def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_takes_long() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(Load(JobList.of(Move(THERE))), Command.RUN)
+    rig.operator.order(Load(JobList.of(MoveJob(THERE))), ListCommand.RUN)
     rig.run(4.0)
-    rig.operator.order(Command.PAUSE)
+    rig.operator.order(ListCommand.PAUSE)
     while rig.operator.halted != STOPPED:
         rig.run(0.05)
-    assert rig.operator.order(Command.RESUME) == ""
+    assert rig.operator.order(ListCommand.RESUME) == ""
     assert rig.operator.doing is Doing.NOTHING
     rig.run(2.0)
     assert rig.operator.resume(now=rig.now) == ""
@@ -259,29 +261,29 @@ def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_tak
 def test_what_stops_counts_however_old_it_is_and_nothing_else_does() -> None:
     rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
     rig.begin()
-    rig.operator.order(Load(JobList.of(Wait(), Move(FAR))), Command.RUN)
+    rig.operator.order(Load(JobList.of(WaitJob(), MoveJob(FAR))), ListCommand.RUN)
     rig.run(1.0)
     rig.line.change(LinkConditions.symmetric(Conditions(delay=delay_profile("constant:1.0"))), now=rig.now)
     rig.run(4.0)
     assert rig.autonomy.doing is Doing.JOBS
-    rig.operator.order(Command.KEY)
+    rig.operator.order(ListCommand.KEY)
     rig.run(3.0)
-    assert rig.autonomy.report().progress.jobs[0].stage is Stage.RUNNING, "too old to move anything"
-    rig.operator.order(Command.ABORT)
+    assert rig.autonomy.report().progress.jobs[0].stage is JobStage.RUNNING, "too old to move anything"
+    rig.operator.order(ListCommand.ABORT)
     rig.run(3.0)
-    assert rig.autonomy.report().progress.stage is Stage.ABORTED
+    assert rig.autonomy.report().progress.stage is JobStage.ABORTED
     assert stands(rig)
 
 
 def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> None:
     rig = Rig(hold=True)
     rig.begin()
-    rig.operator.order(Load(JobList.of(Wait())), Command.RUN)
+    rig.operator.order(Load(JobList.of(WaitJob())), ListCommand.RUN)
     rig.run(1.0)
     robot, (x, y, theta) = rig.robot, rig.truth
     epoch = robot.epoch
     start = Posture(x, y, theta)
-    robot.receive(DriveOrders(epoch + 1, 1, rig.now, rig.now, start, Packet((), 0.0)), now=rig.now)
+    robot.receive(DriveOrders(epoch + 1, 1, rig.now, rig.now, start, ArcPacket((), 0.0)), now=rig.now)
     assert robot.epoch == epoch
     assert rig.autonomy.doing is Doing.JOBS
 
@@ -289,7 +291,7 @@ def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> 
 def test_another_operator_finds_the_list_paused() -> None:
     rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
     rig.begin()
-    rig.operator.order(Load(JobList.of(Move(THERE))), Command.RUN)
+    rig.operator.order(Load(JobList.of(MoveJob(THERE))), ListCommand.RUN)
     rig.run(2.0)
     rig.line.connected = False
     rig.run(2.5)
@@ -297,7 +299,7 @@ def test_another_operator_finds_the_list_paused() -> None:
     assert rig.host.hello("another", now=rig.now + rig.AHEAD) == ""
     rig.run(3.0)
     assert rig.autonomy.doing is Doing.NOTHING
-    assert rig.autonomy.report().progress.stage is Stage.PAUSED
+    assert rig.autonomy.report().progress.stage is JobStage.PAUSED
     assert stands(rig)
 
 
@@ -318,12 +320,12 @@ class Busy:
         return None
 
 
-@pytest.mark.parametrize("stop", [Command.ABORT, Command.PAUSE, Halt()])
-def test_an_arm_that_works_is_stopped_with_its_list(stop: Command | Halt) -> None:
+@pytest.mark.parametrize("stop", [ListCommand.ABORT, ListCommand.PAUSE, Halt()])
+def test_an_arm_that_works_is_stopped_with_its_list(stop: ListCommand | Halt) -> None:
     arm = Busy()
     autonomy = Rig(arm=arm).autonomy
-    autonomy.receive(Load(JobList.of(Arm("pick"))), now=0.0)
-    autonomy.receive(Command.RUN, now=0.0)
+    autonomy.receive(Load(JobList.of(ArmJob("pick"))), now=0.0)
+    autonomy.receive(ListCommand.RUN, now=0.0)
     assert arm.told == ["pick"]
     autonomy.receive(stop, now=1.0)
     assert arm.told == ["pick", "end"]
