@@ -20,7 +20,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from interfaces.runtime.merging import ReferenceBlending
 from interfaces.runtime.physics_messages import (
     Attach,
     Close,
@@ -36,6 +35,7 @@ from interfaces.runtime.physics_messages import (
     Rows,
     TickCounter,
 )
+from interfaces.runtime.reference_blending import ReferenceBlending
 from interfaces.runtime.row_buffer import RowBuffer
 from robots.onboard.following import SensorMonitor
 from robots.onboard.stops import from_measured

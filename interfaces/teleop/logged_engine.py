@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from interfaces.teleop.listening import CommandRecord
+from interfaces.teleop.observers import CommandRecord
 from vrs.clock import ManualClock
 from vrs.commands import (
     Cancel,

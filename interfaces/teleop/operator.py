@@ -10,10 +10,10 @@ from functools import partial
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
-from interfaces.teleop.listening import CommandRecord, Correction, SiteObserver
 from interfaces.teleop.logged_engine import LoggedEngine, resolved
 from interfaces.teleop.measured import Gathering, Sample
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
+from interfaces.teleop.observers import CommandRecord, Correction, SiteObserver
 from interfaces.wire.commands import check_crosses
 from vrs.checks import number_in
 from vrs.clock import ManualClock

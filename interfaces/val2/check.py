@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from interfaces.val2 import forms, kinds, walk
-from interfaces.val2.alone import stray
 from interfaces.val2.compiler import compiled, refusal
 from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
 from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.grammar import SIGNIFICANT
+from interfaces.val2.immediate import stray
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment

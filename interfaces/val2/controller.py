@@ -12,12 +12,12 @@ from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from interfaces.val2.alone import meanwhile, stray
 from interfaces.val2.compiler import compiled
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.events import Event, ProgramFailed
 from interfaces.val2.functions import expressions
+from interfaces.val2.immediate import meanwhile, stray
 from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.ports import ArmPort

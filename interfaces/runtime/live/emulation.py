@@ -10,8 +10,8 @@ from interfaces.link import Conditions, LinkConditions, Service, delay_profile, 
 from interfaces.link.delay import DelayProfile
 from interfaces.link.gauge import LinkFigures
 from interfaces.link.profiles import ALLOWED
-from interfaces.runtime.ages import late_often
 from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.runtime.staleness import late_often
 from interfaces.stream.network import DirectionConditions, Impair, Network
 from interfaces.teleop.line import SiteLine
 from vrs.errors import InvalidValueError

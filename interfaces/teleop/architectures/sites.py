@@ -9,7 +9,7 @@ from typing import Protocol
 from interfaces.teleop.architectures.controllers import DriveController
 from interfaces.teleop.architectures.segments import ArcPacket, Receiver, Sender, Transport
 from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSurroundings, RobotSurroundings
-from interfaces.teleop.listening import CommandRecord
+from interfaces.teleop.observers import CommandRecord
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
