@@ -12,7 +12,7 @@ demo: $(STAMP)
 	.venv/bin/vrs demo
 
 test: $(DEV_STAMP) lint types
-	$(PY) -m pytest -n 2 --durations=5
+	$(PY) -m pytest -n 3 --durations=5
 
 # What must not change, through doors alone: commands, sockets, files, public packages; the slow papers, too.
 contract: $(DEV_STAMP)

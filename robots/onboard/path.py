@@ -23,6 +23,8 @@ from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
 
+_STRAIGHT = 1e-12
+"""An arc of less curvature is a line [1/m]."""
 _EQUAL = 1e-13
 """Curvatures nearer than this [1/m], relatively from 1 on, are one."""
 
@@ -276,7 +278,8 @@ def _nearest(piece: _Piece, at: float, x: float, y: float) -> float:
     along, left = cos * dx + sin * dy, cos * dy - sin * dx
     curvature = piece.curvature
     # From the centre of the arc: as the curvature goes to 0, the angle over it goes to `along`.
-    way = math.atan2(curvature * along, 1 - curvature * left) / curvature if curvature else along
+    bent = abs(curvature) > _STRAIGHT
+    way = math.atan2(curvature * along, 1 - curvature * left) / curvature if bent else along
     return min(at + max(way, 0.0), piece.amount)
 
 

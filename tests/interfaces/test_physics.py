@@ -180,19 +180,19 @@ PARENT = """
 import select
 import numpy as np
 from interfaces.runtime.physics import *
-from interfaces.runtime.physics_messages import Ready
-from interfaces.teleop import Reference
+from interfaces.runtime.physics_messages import PhysicsReady
+from interfaces.teleop import JointReference
 from robots import puma560
 from vrs.clock import WallClock
 model = puma560.model()
 q, clock = np.array(model.poses["nominal"]), WallClock(0.0)
 physics = PhysicsProcess(PhysicsConfig(model.limits, q, body="exact"), clock)
-while not any(isinstance(e, Ready) for e in physics.poll(now=clock.now())):
+while not any(isinstance(e, PhysicsReady) for e in physics.poll(now=clock.now())):
     select.select([physics], [], [], 1.0)
 first, h = int(clock.now() / TICK) + 200, TICK * np.arange(1000)[:, None] * np.ones(6)
 for k in range(4):
     u = h + k
-    part = Reference(q + 0.1 * (1 - np.cos(2 * u)), 0.2 * np.sin(2 * u), 0.4 * np.cos(2 * u))
+    part = JointReference(q + 0.1 * (1 - np.cos(2 * u)), 0.2 * np.sin(2 * u), 0.4 * np.cos(2 * u))
     assert physics.feed(part, first + 1000 * k)
 print(physics.pid, flush=True)
 select.select([], [], [], 60.0)

@@ -70,7 +70,7 @@ def reachable(roots: Iterable[Any]) -> set[str]:
 def test_the_document_names_what_there_is() -> None:
     titles = list(diagrams().values())
     assert len(titles) == 3
-    assert {"Session", "Leasing", "Lease"} <= titles[0]
+    assert {"HubSession", "Leasing", "Lease"} <= titles[0]
     assert {"RobotHost", "RobotSite", "Watchdog", "SensorMonitor", "Engine", "TickLoop", *FUNCTIONS} <= titles[1]
     assert {"DrivenRobot", "Watchdog", "SoundPosition", "SensorWatch"} <= titles[2]
 
