@@ -10,6 +10,7 @@ import pytest
 
 from robots.onboard.driving import IPR_LIMITS, Posture
 from robots.onboard.trajectory_tracking import KnownTrajectory, TrackingConfig, TrajectoryTracker
+from tests.memory import values_held
 from tests.robots.onboard.driven import Unicycle, assert_kept
 from vrs import ArcSegment
 from vrs.errors import InvalidValueError
@@ -190,7 +191,7 @@ def test_what_is_known_is_bounded():
         posture = Posture(*advanced(posture, 0.02 / T, arc.w, T))
         tracker.receive([arc], complete_until=arc.end)
         tracker.advance(tracker.reference.posture, now=i * T)
-    assert len(tracker._known) < 200
+    assert values_held(tracker) < 2000
     known = KnownTrajectory((0, 0, 0), 0.0, capacity=20)
     arcs = operated(10, seed=0)
     assert not known.hear(arcs, 10.0)
