@@ -253,3 +253,76 @@ def test_the_door_opens_quickly_and_loads_nothing_heavy(code, most, tmp_path):
         best = min(best, seconds)
         yardstick = min(yardstick, probe("import numpy")[0])
     assert best <= most * max(1.0, yardstick / NUMPY)
+
+
+PRIVATE_USES = 272
+"""Uses of our private names in tests: a bar that only goes down."""
+
+
+def private_names(home):
+    """Names with a leading underscore that our packages define: functions, classes, attributes and variables."""
+    names = set()
+    for path in (path for package in OURS for path in (home / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+                names.add(node.name)
+            elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+                names.add(node.attr)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+    return {name for name in names if name.startswith("_") and not name.startswith("__") and name != "_"}
+
+
+def private_uses(home):
+    """Where tests use private names of ours: attributes, imports, and strings as patches have them."""
+    ours = private_names(home)
+    for path in sorted((home / "tests").rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        own = set()
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                own.add(node.name)
+            elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+                own.add(node.attr)
+        texts = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in ast.walk(node)}
+        for node in ast.walk(tree):
+            names = []
+            if isinstance(node, ast.Attribute):
+                of_self = isinstance(node.value, ast.Name) and node.value.id in {"self", "cls"}
+                names = [] if of_self and node.attr in own else [node.attr]
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in OURS:
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in texts:
+                names = [node.value.rpartition(".")[2]] if node.value.replace(".", "").isidentifier() else []
+            yield from (f"{path.relative_to(home)}:{node.lineno} {name}" for name in names if name in ours)
+
+
+def test_tests_use_no_more_private_names_than_before():
+    found = list(private_uses(HOME))
+    assert len(found) == PRIVATE_USES, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("line", "count"),
+    [
+        ("from vrs.one import f, C\n", 0),
+        ("from vrs.one import _f, _C\n", 2),
+        ("c._x\n", 1),
+        ("c.y._x._g()\n", 2),
+        ("patch(c, '_g')\n", 1),
+        ("patch('vrs.one._LIMIT', 3)\n", 1),
+        ("c._of_others\n", 0),
+        ("class D:\n    def f(self):\n        self._x = 1\n", 0),
+        ("class D(C):\n    def f(self):\n        return self._x\n", 1),
+        ("f'{c}_x'\n", 0),
+        ("'a text of _x'\n", 0),
+    ],
+)
+def test_a_private_name_in_a_test_is_seen(tmp_path, line, count):
+    for name, text in (
+        ("vrs/one.py", "_LIMIT = 1\ndef _f(): ...\nclass _C:\n    def _g(self):\n        self._x = 1\n"),
+        ("tests/test_one.py", line),
+    ):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(text)
+    assert len(list(private_uses(tmp_path))) == count
