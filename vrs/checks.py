@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from types import NoneType
+from typing import Annotated, Any, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
+
+_ClassT = TypeVar("_ClassT", bound=type)
+_Converters: TypeAlias = tuple[tuple[str, Callable[[object], object]], ...]
 
 LARGEST = 1e9
 """Size of the largest value that a command may ask for, in any unit: squares and products are far from overflow."""
@@ -130,3 +138,81 @@ def one_of(name: str, value: str, words: Iterable[str], *more: str) -> str:
     if value not in allowed:
         raise InvalidValueError(name, value, f"one of {', '.join((*allowed, *more))}")
     return value
+
+
+def within(low: float, high: float, unit: str = "") -> msgspec.Meta:
+    """Return a range that stands in the annotation of a field.
+
+    `pace: Annotated[float, within(0.1, 10.0, "s")]` is what it looks like there.
+
+    Args:
+        low: Smallest allowed.
+        high: Largest allowed.
+        unit: What follows the range in messages.
+    """
+    return msgspec.Meta(ge=low, le=high, extra={"unit": unit} if unit else None)
+
+
+def validated(cls: _ClassT) -> _ClassT:
+    """Check the fields of a dataclass by their annotations when one is made; stands below `@dataclass`.
+
+    A field with a range (`within`) is a number in it, kept as a float, or an integer where the annotation says so;
+    a `bool` is True or False; None passes where the annotation admits it. The class's own `__post_init__` follows.
+    What is not allowed raises InvalidValueError.
+
+    Args:
+        cls: The class, its fields annotated.
+    """
+    own = cls.__dict__.get("__post_init__")
+    converters: dict[type, _Converters] = {}
+
+    def check(self: Any) -> None:
+        kind = type(self)
+        if kind not in converters:
+            converters[kind] = _converters(kind)
+        for name, convert in converters[kind]:
+            object.__setattr__(self, name, convert(getattr(self, name)))
+        if own is not None:
+            own(self)
+
+    setattr(cls, "__post_init__", check)  # noqa: B010 (mypy knows of no such attribute)
+    return cls
+
+
+def _converters(cls: type) -> _Converters:
+    """Return what checks and converts each field of a class that says what it allows."""
+    hints = get_type_hints(cls, include_extras=True)
+    return tuple((item.name, found) for item in fields(cls) if (found := _converter(item.name, hints[item.name])))
+
+
+def _converter(name: str, hint: object) -> Callable[[object], object] | None:
+    """Return what checks a field of this annotation; None where it allows all."""
+    kinds = [kind for kind in get_args(hint) if kind is not NoneType] if NoneType in get_args(hint) else [hint]
+    optional = kinds != [hint]
+    if kinds == [bool]:
+        return functools.partial(_boolean, name)
+    if len(kinds) != 1 or get_origin(kinds[0]) is not Annotated:
+        return None
+    base, *notes = get_args(kinds[0])
+    for note in notes:
+        if isinstance(note, msgspec.Meta):
+            return functools.partial(_in_range, name, base, note, optional)
+    return None
+
+
+def _boolean(name: str, value: object) -> object:
+    if not isinstance(value, bool):
+        raise InvalidValueError(name, value, "True or False")
+    return value
+
+
+def _in_range(name: str, kind: type, note: msgspec.Meta, optional: bool, value: object) -> object:
+    if optional and value is None:
+        return None
+    low, high = note.ge, note.le
+    assert low is not None, name
+    assert high is not None, name
+    if kind is int:
+        return integer_in(name, value, int(low), int(high))
+    unit = (note.extra or {}).get("unit", "")
+    return number_in(name, value, low, high, unit=unit and f" {unit}")

@@ -8,12 +8,12 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 from math import inf
-from typing import Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import LARGEST, finite, finite_array, normal, number_in, sized_array
+from vrs.checks import LARGEST, finite, finite_array, normal, number_in, sized_array, validated, within
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -303,17 +303,17 @@ class InsertVia:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ScaleTime:
     """Run what is scheduled `factor` times as fast: the path stays, holds are scaled too."""
 
-    factor: float
+    factor: Annotated[float, within(1e-3, 1e3)]
     """Ratio of the new pace to the present one, 0.001 to 1000."""
     issued_at: float | None = None
     execute_at: float | None = None
     """When it begins [s]; None means as soon as possible (offline: the start of the timeline)."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "factor", number_in("factor", self.factor, 1e-3, 1e3))
         _check_stamps(self)
 
 

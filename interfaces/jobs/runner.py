@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from interfaces.jobs.messages import (
     Done,
@@ -27,7 +28,7 @@ from interfaces.jobs.messages import (
 )
 from interfaces.jobs.progress import JobProgress, JobStage, OperatorLoss, Progress
 from interfaces.jobs.values import ArmJob, JobEntry, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 
 RUNS = "the list is being done: pause or abort it first"
 """Why a list can't be changed or begun."""
@@ -44,21 +45,18 @@ NO_KEY = "no job waits for the key"
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class RunnerConfig:
     """How a runner behaves."""
 
     loss: OperatorLoss = OperatorLoss.STOP
     """When the operator is lost."""
-    longest_move: float = 3600.0
+    longest_move: Annotated[float, within(1.0, 86_400.0, "s")] = 3600.0
     """A move that takes longer has failed [s], in [1, 86400]."""
-    longest_voice: float = 120.0
+    longest_voice: Annotated[float, within(1.0, 86_400.0, "s")] = 120.0
     """The same of speaking [s], in [1, 86400]."""
-    longest_arm: float = 3600.0
+    longest_arm: Annotated[float, within(1.0, 86_400.0, "s")] = 3600.0
     """The same of a program [s], in [1, 86400]."""
-
-    def __post_init__(self) -> None:
-        for name in ("longest_move", "longest_voice", "longest_arm"):
-            number_in(name, getattr(self, name), 1.0, 86_400.0, unit=" s")
 
 
 def carried_over(jobs: JobList, progress: Progress, load: Load) -> Progress:

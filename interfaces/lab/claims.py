@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from vrs.checks import integer_in
+from vrs.checks import validated, within
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 
@@ -30,19 +30,18 @@ def interval_said(interval: Sequence[float] | None) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Study:
     """How much is measured."""
 
-    seed: int = 0
+    seed: Annotated[int, within(0, 2**32 - 1)] = 0
     """Seed of everything random, 0 to 2³² − 1."""
-    runs: int = 10
+    runs: Annotated[int, within(2, 1000)] = 10
     """Runs behind each random figure, 2 to 1000."""
     length: float = 20.0
     """For how long each run's operator gives commands [s], 2 to 3600."""
 
     def __post_init__(self) -> None:
-        integer_in("seed", self.seed, 0, 2**32 - 1)
-        integer_in("runs", self.runs, 2, 1000)
         if not 2 <= finite("length", self.length, "2 to 3600 s") <= 3600:
             raise InvalidValueError("length", self.length, "2 to 3600 s")
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Annotated, Protocol, TypeAlias
 
 import numpy as np
 
-from vrs.checks import number_in
+from vrs.checks import number_in, validated, within
 from vrs.errors import InvalidValueError
 
 
@@ -34,24 +34,23 @@ class BernoulliLoss:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class GilbertElliottLoss:
     """Two states, good and bad, that change from packet to packet: losses come in bursts.
 
     Source: E. N. Gilbert (1960); E. O. Elliott (1963), Bell System Technical Journal 39 and 42.
     """
 
-    enter: float
+    enter: Annotated[float, within(0.0, 1.0)]
     """Probability that the packet after a good one is bad, in [0, 1]."""
-    leave: float
+    leave: Annotated[float, within(0.0, 1.0)]
     """Probability that the packet after a bad one is good, in (0, 1]."""
-    loss_bad: float = 1.0
+    loss_bad: Annotated[float, within(0.0, 1.0)] = 1.0
     """Probability of loss in the bad state, in [0, 1]."""
-    loss_good: float = 0.0
+    loss_good: Annotated[float, within(0.0, 1.0)] = 0.0
     """Probability of loss in the good state, in [0, 1]."""
 
     def __post_init__(self) -> None:
-        for name in ("enter", "leave", "loss_bad", "loss_good"):
-            number_in(name, getattr(self, name), 0.0, 1.0)
         if self.leave == 0:
             raise InvalidValueError("leave", self.leave, "in (0, 1]")
 

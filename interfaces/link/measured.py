@@ -9,21 +9,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Annotated
 
 import numpy as np
 
 from interfaces.link.congestion import Congestion, correlation_time
 from interfaces.link.delay import CORRELATION_TIME, MAX_DELAY, DelaySource, share_of
-from vrs.checks import number_in
+from vrs.checks import number_in, validated, within
 from vrs.errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class HeavyTailedDelay:
     """Clipped log-normal delay with correlated congestion."""
 
     name: str
-    mu: float
+    mu: Annotated[float, within(-50.0, 50.0)]
     """Mean of ln L, L in milliseconds; in [−50, 50]."""
     sigma: float
     """Standard deviation of ln L, in (0, 10]."""
@@ -35,7 +37,6 @@ class HeavyTailedDelay:
     """Time constant of the autoregression of ln L [s], in [0, 3600]; 0 makes the draws independent."""
 
     def __post_init__(self) -> None:
-        number_in("mu", self.mu, -50.0, 50.0)
         if number_in("sigma", self.sigma, 0.0, 10.0) == 0:
             raise InvalidValueError("sigma", self.sigma, "in (0, 10]")
         number_in("low", self.low, 0.0, MAX_DELAY, "seconds")

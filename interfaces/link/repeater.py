@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Annotated, Generic, TypeVar
 
 from interfaces.link.channel import moment
 from interfaces.link.conditions import Service
 from interfaces.link.delay import MAX_DELAY
-from vrs.checks import integer_in, number_in
+from vrs.checks import integer_in, number_in, validated, within
 from vrs.errors import InvalidValueError
 
 T = TypeVar("T")
@@ -20,16 +20,16 @@ MAX_REPEATS = 1024
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Bundle(Generic[T]):
     """A packet with the newest messages."""
 
-    first: int
+    first: Annotated[int, within(0, 2**63)]
     """Sequence number of the first message in it, ≥ 0."""
     messages: tuple[T, ...]
     """The messages first, first + 1, …; 1 to 1024."""
 
     def __post_init__(self) -> None:
-        integer_in("first", self.first, 0, 2**63)
         if not isinstance(self.messages, tuple) or not 1 <= len(self.messages) <= MAX_REPEATS:
             raise InvalidValueError("messages", self.messages, f"a tuple of 1 to {MAX_REPEATS}")
 

@@ -10,10 +10,10 @@ import enum
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from interfaces.link.quantiles import LARGEST, MAX_CAPACITY, SlidingQuantiles
-from vrs.checks import finite, integer_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 
 SEQUENCE_NUMBERS = 1 << 16
@@ -116,10 +116,11 @@ class EchoRefusal(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class WindowConfig:
     """What statistics of delays look back on."""
 
-    capacity: int = 1000
+    capacity: Annotated[int, within(1, MAX_CAPACITY)] = 1000
     """Most delays kept, in [1, 100,000]."""
     horizon: float = 60.0
     """Age at which a delay is forgotten [s], > 0; infinite for never."""
@@ -127,7 +128,6 @@ class WindowConfig:
     """Time constant of the jitter [messages], ≥ 1; RFC 3550 has 16."""
 
     def __post_init__(self) -> None:
-        integer_in("capacity", self.capacity, 1, MAX_CAPACITY)
         if not self.horizon > 0:
             raise InvalidValueError("horizon", self.horizon, "seconds > 0")
         if not 1 <= self.smoothing < math.inf:
@@ -135,6 +135,7 @@ class WindowConfig:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ProbeConfig:
     """How a link is probed."""
 
@@ -142,7 +143,7 @@ class ProbeConfig:
     """Time between probes [s], > 0."""
     timeout: float = 5.0
     """Time after which a probe counts as lost [s], > 0; a later echo is refused."""
-    most_in_flight: int = 256
+    most_in_flight: Annotated[int, within(1, SEQUENCE_NUMBERS // 2)] = 256
     """Most probes that wait for their echo, in [1, 32768]; no more are sent meanwhile."""
     window: WindowConfig = field(default_factory=WindowConfig)
     """What the statistics look back on."""
@@ -151,7 +152,6 @@ class ProbeConfig:
         for name in ("period", "timeout"):
             if not 0 < getattr(self, name) < math.inf:
                 raise InvalidValueError(name, getattr(self, name), "finite seconds > 0")
-        integer_in("most_in_flight", self.most_in_flight, 1, SEQUENCE_NUMBERS // 2)
 
 
 @dataclass(frozen=True, slots=True)

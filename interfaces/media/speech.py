@@ -9,12 +9,12 @@ import shutil
 import unicodedata
 import wave
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import FormatError, InvalidValueError, VrsError
 
 PROGRAM: Final = "espeak-ng"
@@ -37,22 +37,21 @@ class SpeechError(VrsError):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class SpeechConfig:
     """How the robot speaks."""
 
     language: str = "en"
     """Of the program's voice, as `espeak-ng --voices` lists them: letters, digits and hyphens, 1 to 32."""
-    pace: int = 150
+    pace: Annotated[int, within(80, 450, "words a minute")] = 150
     """Words a minute, 80 to 450."""
-    pitch: int = 45
+    pitch: Annotated[int, within(0, 99)] = 45
     """0 to 99."""
 
     def __post_init__(self) -> None:
         word = self.language.replace("-", "a")
         if not (word.isascii() and word.isalnum() and 1 <= len(word) <= 32) or self.language.startswith("-"):
             raise InvalidValueError("language", self.language, "a voice's name, as en or en-us")
-        number_in("pace", self.pace, 80, 450, unit=" words a minute")
-        number_in("pitch", self.pitch, 0, 99)
 
 
 def cleaned(text: str) -> str:

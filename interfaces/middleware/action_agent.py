@@ -7,25 +7,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from interfaces.link.round_trip import Echo, Probe
 from interfaces.middleware.messages import DriveFeedback, DriveSetpoint
 from robots.onboard.driving import STAND, Drive, Posture
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ActionAgentConfig:
     """How the robot's end works."""
 
-    period: float = 0.01
+    period: Annotated[float, within(1e-4, 1.0, "s")] = 0.01
     """T: between two sampling times [s], in [1e-4, 1]."""
-    starved: float = 0.5
+    starved: Annotated[float, within(1e-3, 60.0, "s")] = 0.5
     """How long a command holds when no other comes [s], in [1e-3, 60]."""
-
-    def __post_init__(self) -> None:
-        number_in("period", self.period, 1e-4, 1.0, unit=" s")
-        number_in("starved", self.starved, 1e-3, 60.0, unit=" s")
 
 
 class ActionAgent:

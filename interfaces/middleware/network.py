@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
 import numpy as np
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from interfaces.files import read_within
 from interfaces.middleware.performance import tolerance
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
 
@@ -41,19 +41,18 @@ class Formulation(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Ranges:
     """What a network is trained on."""
 
-    A_max: float = 300.0
+    A_max: Annotated[float, within(1e-3, 1e6)] = 300.0
     """Largest |A| [1/m], in [1e-3, 1e6]."""
-    tau_low: float = 0.1
+    tau_low: Annotated[float, within(1e-4, 100.0, "s")] = 0.1
     """Smallest delay [s], in [1e-4, 100]."""
     tau_high: float = 0.8
     """Largest delay [s], above tau_low, at most 1000."""
 
     def __post_init__(self) -> None:
-        number_in("A_max", self.A_max, 1e-3, 1e6)
-        number_in("tau_low", self.tau_low, 1e-4, 100.0, unit=" s")
         if not self.tau_low < finite("tau_high", self.tau_high) <= 1000.0:
             raise InvalidValueError("tau_high", self.tau_high, f"in ({self.tau_low:g}, 1000] s")
 

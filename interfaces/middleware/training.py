@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from interfaces.middleware.network import Formulation, GainNetwork, Ranges, inputs
 from interfaces.middleware.performance import optimal_ways, tolerance
-from vrs.checks import integer_in, number_in
+from vrs.checks import integer_in, validated, within
 from vrs.model import Array
 
 _LEAST_DAMPING, _MOST_DAMPING = 1e-12, 1e10
@@ -23,32 +23,28 @@ _DAMPING_STEP = 10.0
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class TrainingConfig:
     """How a network is trained."""
 
     epsilon: float = 0.25
     """Tolerance ε of J, in [1e-6, 3]."""
-    neurons: int = 20
+    neurons: Annotated[int, within(1, 1000)] = 20
     """Hidden ones, 1 to 1000."""
     formulation: Formulation = Formulation.LOGARITHMIC
     ranges: Ranges = field(default_factory=Ranges)
-    goal: float = 1e-11
+    goal: Annotated[float, within(0.0, 1.0)] = 1e-11
     """Mean squared error of the output, scaled to [−1, 1], that ends training, in [0, 1]; the paper's is 1e-6."""
-    epochs: int = 2000
+    epochs: Annotated[int, within(1, 100_000)] = 2000
     """Most steps, 1 to 100,000."""
-    factors: int = 121
+    factors: Annotated[int, within(3, 10_000)] = 121
     """How many quadratic factors A are learned, 3 to 10,000."""
-    delays: int = 17
+    delays: Annotated[int, within(2, 1000)] = 17
     """At how many delays τ each, 2 to 1000."""
 
     def __post_init__(self) -> None:
         tolerance(self.epsilon)
         object.__setattr__(self, "formulation", Formulation(self.formulation))
-        number_in("goal", self.goal, 0.0, 1.0)
-        for name, low, high in (
-            ("neurons", 1, 1000), ("epochs", 1, 100_000), ("factors", 3, 10_000), ("delays", 2, 1000),
-        ):  # fmt: skip
-            integer_in(name, getattr(self, name), low, high)
 
 
 class Errors(NamedTuple):

@@ -9,7 +9,7 @@ import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Annotated, Final
 
 from interfaces.rsp import handshake, header
 from interfaces.rsp.errors import PacketError, RspError
@@ -26,7 +26,7 @@ from interfaces.rsp.round_trip import PacketRoundTrip
 from interfaces.rsp.security import TAG, Keyring, Opener, Rank, Sealer
 from interfaces.rsp.session import SLACK, DropReason, PacketDropped, SessionNumbers, milliseconds
 from interfaces.rsp.streams import StreamOutbox
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 
 MOST_PATIENCE: Final = 600.0
@@ -43,28 +43,22 @@ class LocalState(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class LocalConfig:
     """How a local system sends."""
 
     period: PeriodConfig = field(default_factory=PeriodConfig)
     """T, and how it's fitted."""
-    retry: float = 0.25
+    retry: Annotated[float, within(0.01, 10.0, "s")] = 0.25
     """How often it asks for a session, or for its end [s], in [0.01, 10]."""
-    patience: float = 5.0
+    patience: Annotated[float, within(0.1, MOST_PATIENCE, "s")] = 5.0
     """After so long without an answer it gives up asking [s], in [0.1, 600]."""
-    lifetime: float = 60.0
+    lifetime: Annotated[float, within(1.0, 120.0, "s")] = 60.0
     """A session in which nothing came for so long is lost [s], in [1, 120]: numbers mustn't go round in a
     silence."""
-    timeout: float = 0.1
+    timeout: Annotated[float, within(1e-3, 10.0, "s")] = 0.1
     """Least time before a memory command is sent again [s], in [0.001, 10]; twice the round trip where that's
     more."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("retry", 0.01, 10.0), ("patience", 0.1, MOST_PATIENCE), ("lifetime", 1.0, 120.0),
-            ("timeout", 1e-3, 10.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high, unit=" s")
 
 
 @dataclass(slots=True)

@@ -15,10 +15,11 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 from interfaces.rsp.model.elements import Effector, Filling
 from interfaces.rsp.model.robot_model import RobotModel
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 Values = tuple[float, ...]
 _MOST = 64
@@ -26,17 +27,14 @@ _MOST = 64
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class MotionFilterConfig:
     """How the filter plays."""
 
-    playout: float = 0.02
+    playout: Annotated[float, within(0.0, 1.0, "s")] = 0.02
     """How much later than the fastest packet it plays [s], in [0, 1]: what may be filled in between, and delay."""
-    window: float = 10.0
+    window: Annotated[float, within(0.1, 600.0, "s")] = 10.0
     """Over how long the fastest packet is looked for [s], in [0.1, 600]."""
-
-    def __post_init__(self) -> None:
-        number_in("playout", self.playout, 0.0, 1.0, unit=" s")
-        number_in("window", self.window, 0.1, 600.0, unit=" s")
 
 
 class Fastest:

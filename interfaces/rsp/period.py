@@ -11,44 +11,40 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from interfaces.rsp.motion_filter import Fastest
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PeriodConfig:
     """Within what T is chosen."""
 
-    least: float = 0.02
+    least: Annotated[float, within(1e-3, 1.0)] = 0.02
     """T on a good link [s], in [0.001, 1]."""
-    most: float = 0.2
+    most: Annotated[float, within(1e-3, 1.0)] = 0.2
     """T at most [s], from `least` to 1."""
     adaptive: bool = True
     """Whether it's fitted at all."""
-    window: float = 0.5
+    window: Annotated[float, within(0.1, 60.0)] = 0.5
     """Over how long a least round trip is taken [s], in [0.1, 60]."""
-    base: float = 60.0
+    base: Annotated[float, within(1.0, 3600.0)] = 60.0
     """Over how long the link's own is looked for [s], in [1, 3600]."""
-    queue: float = 0.05
+    queue: Annotated[float, within(1e-3, 10.0)] = 0.05
     """Standing queue that is too long [s], in [0.001, 10]."""
-    longer: float = 1.5
+    longer: Annotated[float, within(1.0, 4.0)] = 1.5
     """What T is multiplied by then, in (1, 4]."""
-    shorter: float = 0.9
+    shorter: Annotated[float, within(0.1, 1.0)] = 0.9
     """And otherwise, in [0.1, 1)."""
-    steps: int = 8
+    steps: Annotated[int, within(1, 20)] = 8
     """Windows at the longest T in which the queue must have fallen, 1 to 20."""
-    rest: float = 20.0
+    rest: Annotated[float, within(0.0, 3600.0)] = 20.0
     """How long T is left at its least after it hadn't [s], in [0, 3600]."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("least", 1e-3, 1.0), ("most", 1e-3, 1.0), ("window", 0.1, 60.0), ("base", 1.0, 3600.0),
-            ("queue", 1e-3, 10.0), ("longer", 1.0, 4.0), ("shorter", 0.1, 1.0), ("rest", 0.0, 3600.0),
-            ("steps", 1, 20),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
         if self.most < self.least:
             raise InvalidValueError("most", self.most, f"at least {self.least:g} s, the least period")
 

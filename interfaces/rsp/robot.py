@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from interfaces.rsp import header
 from interfaces.rsp.door import SessionClaim, SessionDoor
@@ -42,39 +43,33 @@ from interfaces.rsp.security import Keyring
 from interfaces.rsp.session import SLACK, DropReason, PacketDropped
 from interfaces.rsp.streams import StreamInbox
 from interfaces.rsp.telling import Telling
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class RobotConfig:
     """How a robot's side works."""
 
-    loss: float = 0.5
+    loss: Annotated[float, within(0.1, 2.0)] = 0.5
     """T_loss [s], in [0.1, 2]: after so long without a packet what rests on loss does so."""
-    idle: float = 2.0
+    idle: Annotated[float, within(0.1, 60.0)] = 2.0
     """After so long without a packet anybody may open a session instead [s], in [0.1, 60]."""
-    lifetime: float = 60.0
+    lifetime: Annotated[float, within(1.0, 120.0)] = 60.0
     """A session in which nothing came for so long ends [s], in [1, 120]."""
-    period: float = 0.02
+    period: Annotated[float, within(1e-3, 1.0)] = 0.02
     """Between its packets until it knows the local system's T, which it then keeps to [s], in [0.001, 1]."""
-    longest: float = 1.0
+    longest: Annotated[float, within(1e-3, 10.0)] = 1.0
     """T that it follows at most [s], in [0.001, 10]."""
-    repeats: int = 3
+    repeats: Annotated[int, within(1, 100)] = 3
     """Packets that tell of an event, 1 to 100: nobody acknowledges it."""
-    timeout: float = 0.1
+    timeout: Annotated[float, within(1e-3, 10.0)] = 0.1
     """Least time before a memory event is sent again [s], in [0.001, 10]; twice the round trip where that's
     more."""
     takeover: bool = True
     """Whether anybody may take over by force where there are no keys; with keys only an admin may."""
     filter: MotionFilterConfig = field(default_factory=MotionFilterConfig)
     """How motion is played."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("loss", 0.1, 2.0), ("idle", 0.1, 60.0), ("lifetime", 1.0, 120.0), ("period", 1e-3, 1.0),
-            ("longest", 1e-3, 10.0), ("repeats", 1, 100), ("timeout", 1e-3, 10.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class RobotCore:

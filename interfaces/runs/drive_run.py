@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from typing import Annotated, Protocol, TypeAlias
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from robots.bullet.rooms import Room
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import IPR_LIMITS, Posture
-from vrs.checks import number_in, one_of
+from vrs.checks import one_of, validated, within
 from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array
 
@@ -31,6 +31,7 @@ DriveLink: TypeAlias = Link[ArcPacket, ArchitectureReport]
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class DriveCase:
     """What is run."""
 
@@ -42,7 +43,7 @@ class DriveCase:
     """`ipr`, `micro` (PyBullet) or `bare`."""
     operator: str = "mixed"
     seed: int = 0
-    length: float = 120.0
+    length: Annotated[float, within(1.0, 3600.0, "s")] = 120.0
     """For how long the operator drives [s], in [1, 3600]."""
     constants: Constants = field(default_factory=Constants)
     reality: MobileReality | None = None
@@ -64,7 +65,6 @@ class DriveCase:
         one_of("position", self.position, POSITIONS)
         if isinstance(self.room, str):
             one_of("room", self.room, ("", *PLACES))
-        number_in("length", self.length, 1.0, 3600.0, unit=" s")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self, TypeAlias
+from typing import Annotated, Self, TypeAlias
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from interfaces.runtime.physics_messages import (
     encode,
 )
 from interfaces.teleop import JointReference
-from vrs.checks import number_in
+from vrs.checks import number_in, validated, within
 from vrs.clock import WallClock
 from vrs.commands import finite_array
 from vrs.errors import InvalidValueError, VrsError
@@ -61,6 +61,7 @@ _READS_MOST = 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+@validated
 class PhysicsConfig:
     """Which body, and where it stands."""
 
@@ -72,7 +73,7 @@ class PhysicsConfig:
     """Which one."""
     friction: bool = True
     """Whether its joints have friction."""
-    every: int = 10
+    every: Annotated[int, within(1, 1000)] = 10
     """Ticks from one report to the next, in [1, 1000]."""
 
     def __post_init__(self) -> None:
@@ -83,7 +84,6 @@ class PhysicsConfig:
         object.__setattr__(self, "body", BodyKind(self.body))
         if isinstance(self.every, bool) or not isinstance(self.every, int):
             raise InvalidValueError("every", self.every, "a whole number in [1, 1000]")
-        number_in("every", self.every, 1, 1000)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import secrets
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -18,7 +18,7 @@ from interfaces.stream.kept_files import HEADERS, POLICY
 from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
 from interfaces.stream.strangers import Strangers
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 SOCKET: Final = "/_nicegui_ws/"
 """Where NiceGUI's own messages go, by WebSocket only."""
@@ -28,36 +28,25 @@ _POLICY_VIOLATION: Final = 1008
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class BoundsConfig:
     """How much NiceGUI is asked to do."""
 
-    visitors: int = 256
+    visitors: Annotated[int, within(1, 1e4)] = 256
     """Pages that it keeps at once, 1 to 10,000; those that opened no socket give way to new ones, the oldest first,
     and so do sockets."""
-    pages: float = 20.0
+    pages: Annotated[float, within(1, 1e3)] = 20.0
     """Pages that it makes a second, for long, 1 to 1000; each takes the loop some milliseconds."""
-    pages_burst: float = 20.0
+    pages_burst: Annotated[float, within(1, 1e3)] = 20.0
     """Pages that it makes at once, 1 to 1000."""
-    pages_waiting: int = 64
+    pages_waiting: Annotated[int, within(1, 1e4)] = 64
     """Pages that may be waited for, 1 to 10,000. The newest comes first; the oldest is refused."""
-    rate: float = 40.0
+    rate: Annotated[float, within(1, 1e4)] = 40.0
     """Messages a second that a page may send for long, 1 to 10,000."""
-    burst: float = 200.0
+    burst: Annotated[float, within(1, 1e4)] = 200.0
     """Messages that it may send at once, 1 to 10,000."""
-    blocked: float = 2.0
+    blocked: Annotated[float, within(0.1, 60)] = 2.0
     """A page is cut off when a message has waited so long to be sent [s], 0.1 to 60."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("visitors", 1, 1e4),
-            ("pages", 1, 1e3),
-            ("pages_burst", 1, 1e3),
-            ("pages_waiting", 1, 1e4),
-            ("rate", 1, 1e4),
-            ("burst", 1, 1e4),
-            ("blocked", 0.1, 60),
-        ):
-            number_in(name, getattr(self, name), low, high)
 
 
 class RequestBounds:

@@ -3,67 +3,48 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ClientLimits:
     """Bounds of one client, and of all."""
 
-    clients: int = 1024
+    clients: Annotated[int, within(1, 100_000)] = 1024
     """Most clients at once, 1 to 100,000."""
-    size: int = 65536
+    size: Annotated[int, within(256, 1 << 20)] = 65536
     """Largest message of a client [bytes], 256 to 1,048,576."""
-    rate: float = 500.0
+    rate: Annotated[float, within(1, 1e5)] = 500.0
     """Messages a second that a client may send for long, 1 to 100,000."""
-    burst: float = 1000.0
+    burst: Annotated[float, within(1, 1e5)] = 1000.0
     """Messages that it may send at once, 1 to 100,000."""
-    excess: float = 100.0
+    excess: Annotated[float, within(1, 1e5)] = 100.0
     """Messages beyond that, passed over, before it's closed, 1 to 100,000; a tenth is forgiven a second."""
-    bad: float = 20.0
+    bad: Annotated[float, within(1, 1000)] = 20.0
     """Messages that can't be taken before it's closed, 1 to 1000; one a second is forgiven."""
-    hello: float = 2.0
+    hello: Annotated[float, within(0.1, 60)] = 2.0
     """Time for the first message [s], 0.1 to 60."""
-    waiting: int = 131072
+    waiting: Annotated[int, within(1024, 1 << 24)] = 131072
     """Bytes that may wait for a client before what's for it is dropped, 1024 to 16,777,216."""
-    absence: float = 30.0
+    absence: Annotated[float, within(0, 3600)] = 30.0
     """How long after its connection was lost an operator's session can be continued [s], 0 to 3600."""
-    sharers: int = 8
+    sharers: Annotated[int, within(0, 1000)] = 8
     """Most sessions that share one lease with its holder, 0 to 1000."""
-    absent: int = 64
+    absent: Annotated[int, within(0, 100_000)] = 64
     """Most sessions that are kept so; the oldest goes first, 0 to 100,000."""
-    work: float = 0.03
+    work: Annotated[float, within(1e-3, 1)] = 0.03
     """Share of the processor's time that a client's messages may take for long, 0.001 to 1."""
-    volume: float = 4e6
+    volume: Annotated[float, within(1e4, 1e9)] = 4e6
     """Bytes a second that it may be answered for long, 1e4 to 1e9."""
-    address: float = 8.0
+    address: Annotated[float, within(1, 1000)] = 8.0
     """So many times as much may all clients of an address take that don't command, 1 to 1000."""
-    others: float = 10.0
+    others: Annotated[float, within(1, 1000)] = 10.0
     """The same of all clients that don't command, 1 to 1000."""
-    commands: float = 15.0
+    commands: Annotated[float, within(1, 1000)] = 15.0
     """The same of each client that commands, 1 to 1000."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("clients", 1, 100_000),
-            ("size", 256, 1 << 20),
-            ("rate", 1, 1e5),
-            ("burst", 1, 1e5),
-            ("excess", 1, 1e5),
-            ("bad", 1, 1000),
-            ("hello", 0.1, 60),
-            ("waiting", 1024, 1 << 24),
-            ("sharers", 0, 1000),
-            ("absence", 0, 3600),
-            ("absent", 0, 100_000),
-            ("work", 1e-3, 1),
-            ("volume", 1e4, 1e9),
-            ("address", 1, 1000),
-            ("others", 1, 1000),
-            ("commands", 1, 1000),
-        ):
-            number_in(name, getattr(self, name), low, high)
 
 
 class Bucket:

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import uvicorn
 from starlette.types import Scope
@@ -24,7 +24,7 @@ from websockets.http11 import Request
 
 from interfaces.stream.limits import Bucket
 from interfaces.stream.strangers import Strangers
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -64,25 +64,21 @@ _GRACE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class SocketLimits:
     """Deadlines of every phase of a connection, and how many there may be that haven't shown who they are."""
 
-    strangers: int = 512
+    strangers: Annotated[int, within(1, 100_000)] = 512
     """Most unauthenticated connections, 1 to 100,000; the oldest gives way to a new one. They never take more than
     a quarter of the files that may be open."""
-    request: float = 5.0
+    request: Annotated[float, within(0.01, 60, "s")] = 5.0
     """Time for a request's header, from the connection's beginning or the answer before [s], 0.01 to 60."""
-    body: float = 5.0
+    body: Annotated[float, within(0.01, 60, "s")] = 5.0
     """Time for a request's body [s], 0.01 to 60."""
-    hello: float = 5.0
+    hello: Annotated[float, within(0.01, 60, "s")] = 5.0
     """Time for a WebSocket to show who it is, from its upgrade [s], 0.01 to 60."""
-    blocked: float = 10.0
+    blocked: Annotated[float, within(0.01, 60, "s")] = 10.0
     """A connection is cut off when it hasn't taken HIGH − LOW bytes for so long [s], 0.01 to 60."""
-
-    def __post_init__(self) -> None:
-        number_in("strangers", self.strangers, 1, 100_000)
-        for name in ("request", "body", "hello", "blocked"):
-            number_in(name, getattr(self, name), 0.01, 60, unit=" s")
 
 
 class _Phase(Enum):

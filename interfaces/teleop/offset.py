@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from interfaces.link.delay import share_of
 from interfaces.link.round_trip import RelativeDelays, WindowConfig
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class OffsetConfig:
     """How much delay is hidden."""
 
     share: float = 0.95
     """Share of the messages that come early enough, in (0, 1)."""
-    margin: float = 0.05
+    margin: Annotated[float, within(0.0, 60.0)] = 0.05
     """Added to the quantile [s], in [0, 60]: for what the window hasn't seen."""
-    window: int = 2000
+    window: Annotated[int, within(10, 100_000)] = 2000
     """Messages that count, in [10, 100000]."""
-    horizon: float = 120.0
+    horizon: Annotated[float, within(1.0, 86_400.0)] = 120.0
     """Age at which a message counts no more [s], in [1, 86400]."""
 
     def __post_init__(self) -> None:
         share_of(self.share)
-        for name, low, high in (("margin", 0.0, 60.0), ("window", 10, 100_000), ("horizon", 1.0, 86_400.0)):
-            number_in(name, getattr(self, name), low, high)
 
 
 class AdaptiveOffset:

@@ -6,6 +6,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from interfaces.teleop.measured import Gathering, Sample
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.observers import CommandRecord, Correction, SiteObserver
 from interfaces.wire.commands import check_crosses
-from vrs.checks import number_in
+from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
 from vrs.commands import Command, Lateness, Position
 from vrs.engine import Engine
@@ -41,19 +42,16 @@ _UNDER_WAY_MOST = 4096
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class OperatorSiteConfig:
     """How the operator's site sends."""
 
-    beat: float = 0.05
+    beat: Annotated[float, within(1e-3, 10.0)] = 0.05
     """Longest time between two messages [s], in [0.001, 10]."""
-    repeat: int = 3
+    repeat: Annotated[int, within(0, 64)] = 3
     """Entries sent before that each message repeats, in [0, 64]."""
-    resent: int = 32
+    resent: Annotated[int, within(1, 1000)] = 32
     """Most entries sent again in one message because they seem to be lost, in [1, 1000]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (("beat", 1e-3, 10.0), ("repeat", 0, 64), ("resent", 1, 1000)):
-            number_in(name, getattr(self, name), low, high)
 
 
 class OperatorSite:

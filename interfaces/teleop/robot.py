@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import chain, islice
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, 
 from robots.onboard.stamps import Stamp, Verdict
 from robots.onboard.stops import from_commanded
 from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.clock import ManualClock
 from vrs.commands import Profile, finite
 from vrs.engine import Engine
@@ -61,6 +61,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class RobotSiteConfig:
     """How the robot's site behaves."""
 
@@ -70,9 +71,9 @@ class RobotSiteConfig:
     """How much delay an adaptive offset hides."""
     playout: PlayoutConfig = field(default_factory=PlayoutConfig)
     """How play follows it."""
-    beat: float = 0.1
+    beat: Annotated[float, within(1e-3, 10.0)] = 0.1
     """Time between two reports [s], in [0.001, 10]."""
-    tolerance: float = 0.1
+    tolerance: Annotated[float, within(1e-6, 10.0)] = 0.1
     """Following error of a joint above which the robot stops [rad], in [1e-6, 10]."""
     watchdog: WatchdogConfig | None = None
     """When the link counts as lost, and the robot halts; None holds: it goes on when messages come again."""
@@ -80,8 +81,6 @@ class RobotSiteConfig:
     def __post_init__(self) -> None:
         if self.fixed_offset is not None:
             finite("fixed_offset", self.fixed_offset, "None or finite seconds")
-        for name, low, high in (("beat", 1e-3, 10.0), ("tolerance", 1e-6, 10.0)):
-            number_in(name, getattr(self, name), low, high)
 
 
 class JointReference(NamedTuple):

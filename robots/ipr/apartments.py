@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.floor_plan import CELL, Ways
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 
 WALL = 0.1
@@ -31,6 +32,7 @@ _TRIES = 60
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ApartmentConfig:
     """What is made."""
 
@@ -38,9 +40,9 @@ class ApartmentConfig:
     """How many, 1 to 8; 0 draws 1 to 5."""
     people: int = 0
     """Who walk about, 0 to 16."""
-    furniture: float = 1.0
+    furniture: Annotated[float, within(0.0, 3.0)] = 1.0
     """How much of it, in [0, 3]; 1 is some four pieces a room."""
-    known: float = 0.4
+    known: Annotated[float, within(0.0, 1.0)] = 0.4
     """Share of the furniture that the map has, in [0, 1]."""
 
     def __post_init__(self) -> None:
@@ -48,8 +50,6 @@ class ApartmentConfig:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= high:
                 raise InvalidValueError(name, value, f"an integer in [0, {high}]")
-        number_in("furniture", self.furniture, 0.0, 3.0)
-        number_in("known", self.known, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

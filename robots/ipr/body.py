@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from robots.bullet.world import World
 from robots.ipr.chassis import Chassis
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import MobileRobot
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 
@@ -210,27 +210,21 @@ _GAP = 0.002
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Cargo:
     """A box that can be put on a robot."""
 
     name: str = "book"
-    length: float = 0.24
+    length: Annotated[float, within(0.01, 2.0)] = 0.24
     """[m], in [0.01, 2]."""
-    width: float = 0.17
+    width: Annotated[float, within(0.01, 2.0)] = 0.17
     """[m], in [0.01, 2]."""
-    height: float = 0.03
+    height: Annotated[float, within(0.005, 2.0)] = 0.03
     """[m], in [0.005, 2]."""
-    mass: float = 0.9
+    mass: Annotated[float, within(0.01, 100.0)] = 0.9
     """[kg], in [0.01, 100]."""
-    friction: float = 0.5
+    friction: Annotated[float, within(0.0, 2.0)] = 0.5
     """Of its sides, in [0, 2]; the robot's top has 0.5, and PyBullet takes the product of both."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("length", 0.01, 2.0), ("width", 0.01, 2.0), ("height", 0.005, 2.0), ("mass", 0.01, 100.0),
-            ("friction", 0.0, 2.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class CargoBody:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.parameters import IPR_AXLE_OFFSET
 from robots.ipr.shapes import GROUND, box, door_shape, headless, person_shape, room_shapes, upright
 from robots.solids import Builder, LinkShape
-from vrs.checks import finite, number_in
+from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.insertion import piece
 from vrs.model import Array, Limits, frozen_array
@@ -34,6 +34,7 @@ REACH: Final = 0.066
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Lens:
     """What the camera sees of what is before it."""
 
@@ -41,11 +42,11 @@ class Lens:
     """Pixels across, a multiple of 16, 64 to 1920."""
     height: int = 264
     """Pixels down, a multiple of 2, 48 to 1080."""
-    view: float = math.radians(65.0)
+    view: Annotated[float, within(0.2, 2.4)] = math.radians(65.0)
     """Horizontal angle of view [rad], 0.2 to 2.4; an assumption: a usual wide lens of such cameras."""
-    near: float = 0.03
+    near: Annotated[float, within(0.001, 1.0)] = 0.03
     """Nothing nearer is seen [m], 0.001 to 1."""
-    far: float = 60.0
+    far: Annotated[float, within(2.0, 1000.0)] = 60.0
     """Nothing farther is seen [m], 2 to 1000."""
 
     def __post_init__(self) -> None:
@@ -53,8 +54,6 @@ class Lens:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high or value % step:
                 raise InvalidValueError(name, value, f"a multiple of {step} in [{low}, {high}]")
-        for name, least, most in (("view", 0.2, 2.4), ("near", 0.001, 1.0), ("far", 2.0, 1000.0)):
-            number_in(name, getattr(self, name), least, most)
 
 
 @dataclass(frozen=True, slots=True)

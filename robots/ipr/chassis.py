@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from robots.ipr import parameters as p
 from robots.ipr.model import Kind
 from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
 from robots.onboard.laser import LaserModel
-from vrs.checks import number_in, one_of
+from vrs.checks import one_of, validated, within
 from vrs.mobile import DriveLimits
 from vrs.model import Array, frozen_array
 
@@ -267,52 +267,41 @@ def chassis(kind: str) -> Chassis:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class SonarModel:
     """How the sonars see. A Polaroid sensor's cone, thinned to a few rays."""
 
-    rate: float = 10.0
+    rate: Annotated[float, within(0.1, 100.0)] = 10.0
     """Scans a second [Hz], in [0.1, 100]."""
-    rays: int = 5
+    rays: Annotated[int, within(1, 31)] = 5
     """Rays a cone, in [1, 31]."""
-    half_angle: float = math.radians(12.5)
+    half_angle: Annotated[float, within(0.0, 0.8)] = math.radians(12.5)
     """Half the cone's opening [rad], in [0, 0.8]."""
-    noise: float = 0.005
+    noise: Annotated[float, within(0.0, 1.0)] = 0.005
     """Standard deviation of every range [m], in [0, 1]."""
-    noise_share: float = 0.005
+    noise_share: Annotated[float, within(0.0, 0.2)] = 0.005
     """Standard deviation that grows with the range, as a share of it, in [0, 0.2]."""
-    misses: float = 0.01
+    misses: Annotated[float, within(0.0, 1.0)] = 0.01
     """Probability that an echo is lost, in [0, 1]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("rate", 0.1, 100.0), ("half_angle", 0.0, 0.8), ("noise", 0.0, 1.0), ("noise_share", 0.0, 0.2),
-            ("misses", 0.0, 1.0),
-        ):  # fmt: skip
-            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
-        object.__setattr__(self, "rays", int(number_in("rays", self.rays, 1, 31)))
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class CameraModel:
     """The overhead camera of section 4.2. Source: NTSC frames; noise and latency chosen."""
 
-    rate: float = 30.0
+    rate: Annotated[float, within(0.1, 240.0)] = 30.0
     """Frames a second [Hz], in [0.1, 240]."""
-    latency: float = 0.08
+    latency: Annotated[float, within(0.0, 2.0)] = 0.08
     """From the picture to the posture [s], in [0, 2]."""
-    noise: float = 0.003
+    noise: Annotated[float, within(0.0, 1.0)] = 0.003
     """Standard deviation of x and of y [m], in [0, 1]."""
-    noise_angle: float = math.radians(0.5)
+    noise_angle: Annotated[float, within(0.0, 1.0)] = math.radians(0.5)
     """Standard deviation of the heading [rad], in [0, 1]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("rate", 0.1, 240.0), ("latency", 0.0, 2.0), ("noise", 0.0, 1.0), ("noise_angle", 0.0, 1.0),
-        ):  # fmt: skip
-            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Senses:
     """All that a body senses with."""
 
@@ -322,8 +311,5 @@ class Senses:
     """None switches the camera off."""
     laser: LaserModel | None = None
     """None, which it is unless given, is a robot without a laser scanner."""
-    encoder_rate: float = 20.0
+    encoder_rate: Annotated[float, within(1.0, 240.0)] = 20.0
     """How often encoders are read [Hz], in [1, 240]."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "encoder_rate", number_in("encoder_rate", self.encoder_rate, 1.0, 240.0))

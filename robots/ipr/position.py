@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import Annotated
 
 from robots.ipr.floor_plan import plan_map
 from robots.ipr.robot import MobileRobot
@@ -18,7 +19,7 @@ from robots.onboard.gsp_map import GspMap
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig
 from robots.onboard.localizer import Localizer, LocalizerConfig
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
 
@@ -27,17 +28,14 @@ _KEPT = 2.0
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class FusionConfig:
     """How much a picture counts."""
 
-    share: float = 0.1
+    share: Annotated[float, within(0.0, 1.0)] = 0.1
     """Share of a difference in position that one picture takes away, in [0, 1]."""
-    turn_share: float = 0.05
+    turn_share: Annotated[float, within(0.0, 1.0)] = 0.05
     """The same of the heading, whose noise moves what is ahead, in [0, 1]."""
-
-    def __post_init__(self) -> None:
-        for name in ("share", "turn_share"):
-            number_in(name, getattr(self, name), 0.0, 1.0)
 
 
 class TruePosition:

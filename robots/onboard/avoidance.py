@@ -18,12 +18,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
 from vrs.mobile.kinematics import all_wrapped
@@ -38,19 +39,16 @@ ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Outline:
     """A rectangle round the robot, seen from the middle of its driving axle."""
 
-    front: float
+    front: Annotated[float, within(0.005, 5.0)]
     """[m], in [0.005, 5]."""
-    rear: float
+    rear: Annotated[float, within(0.005, 5.0)]
     """[m], in [0.005, 5]."""
-    half_width: float
+    half_width: Annotated[float, within(0.005, 5.0)]
     """[m], in [0.005, 5]."""
-
-    def __post_init__(self) -> None:
-        for name in ("front", "rear", "half_width"):
-            number_in(name, getattr(self, name), 0.005, 5.0)
 
 
 def free_ways(points: Array, curvatures: Array, outline: Outline, clearance: float, sense: int = 1) -> Array:
@@ -133,31 +131,32 @@ class SonarMount:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class AvoidanceConfig:
     """What the robot is, and how careful."""
 
     outline: Outline
     mounts: tuple[SonarMount, ...]
     """As many as there are readings, 1 to 64."""
-    half_cone: float = math.radians(12.5)
+    half_cone: Annotated[float, within(0.0, 0.8)] = math.radians(12.5)
     """Half the sonar's cone [rad], in [0, 0.8]."""
-    range_min: float = 0.1
+    range_min: Annotated[float, within(0.0, 1.0)] = 0.1
     """Least reading [m], in [0, 1]; what is nearer reads as this."""
-    range_max: float = 3.0
+    range_max: Annotated[float, within(0.2, 20.0)] = 3.0
     """Readings from here on are of nothing [m], in [0.2, 20]."""
-    clearance: float = 0.06
+    clearance: Annotated[float, within(0.0, 1.0)] = 0.06
     """Least distance between outline and readings [m], in [0, 1]."""
-    lookahead: float = 1.2
+    lookahead: Annotated[float, within(0.1, 5.0)] = 1.2
     """A free way of this much needn't be left [m], in [0.1, 5]."""
-    detour: float = 0.2
+    detour: Annotated[float, within(0.0, 10.0)] = 0.2
     """Speed at which it goes round what is in the way, if it's wanted slower [m/s], in [0, 10]."""
-    memory: float = 1.5
+    memory: Annotated[float, within(0.0, 60.0)] = 1.5
     """How long a reading counts [s], in [0, 60]: some readings miss."""
-    noise: float = 0.05
+    noise: Annotated[float, within(0.0, 1.0)] = 0.05
     """A reading looks through a point if it's longer by this [m], in [0, 1]."""
-    period: float = 0.05
+    period: Annotated[float, within(1e-3, 1.0)] = 0.05
     """Between two calls [s], in [1e-3, 1]."""
-    lag: float = 0.15
+    lag: Annotated[float, within(0.0, 1.0)] = 0.15
     """Of the motors and of the sonar, the longest to be expected [s], in [0, 1]."""
     limits: DriveLimits = IPR_LIMITS
     """Of the robot."""
@@ -165,12 +164,6 @@ class AvoidanceConfig:
     def __post_init__(self) -> None:
         if not 1 <= len(self.mounts) <= 64:
             raise InvalidValueError("mounts", len(self.mounts), "1 to 64")
-        for name, low, high in (
-            ("half_cone", 0.0, 0.8), ("range_min", 0.0, 1.0), ("range_max", 0.2, 20.0), ("clearance", 0.0, 1.0),
-            ("lookahead", 0.1, 5.0), ("detour", 0.0, 10.0), ("memory", 0.0, 60.0), ("noise", 0.0, 1.0), ("period",
-            1e-3, 1.0), ("lag", 0.0, 1.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class ObstacleAvoidance:

@@ -15,25 +15,25 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import Annotated, Generic, NamedTuple, TypeVar
 
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 
 Command = TypeVar("Command")
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class CommandFilterConfig:
     """How a command filter works."""
 
-    interval: float = 0.1
+    interval: Annotated[float, within(1e-6, 60.0, "s")] = 0.1
     """Time advance of the busy generator [s]: T, or T_p where it's modified, in [1e-6, 60]."""
     capacity: int = 36_000
     """Most commands in the filter, in [1, 10⁷]: queued, in the generator, or given out and not yet fetched."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "interval", number_in("interval", self.interval, 1e-6, 60.0, unit=" s"))
         if isinstance(self.capacity, bool) or not isinstance(self.capacity, int) or not 1 <= self.capacity <= 10**7:
             raise InvalidValueError("capacity", self.capacity, "an integer from 1 to 10⁷")
 

@@ -12,12 +12,13 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, expected_ranges, judged, matched
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import wrapped
 from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array, frozen_array
@@ -34,58 +35,48 @@ class Answer(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class SearchConfig:
     """How places are looked for and judged."""
 
-    lines: int = 14
+    lines: Annotated[int, within(2, 100)] = 14
     """Longest lines around the robot that vote, in [2, 100]."""
-    shortest: float = 0.4
+    shortest: Annotated[float, within(0.1, 10.0)] = 0.4
     """Shorter ones don't [m], in [0.1, 10]."""
-    crossing: float = 0.5
+    crossing: Annotated[float, within(0.1, 1.5)] = 0.5
     """Two lines that cross at a smaller angle don't make a guess [rad], in [0.1, 1.5]."""
-    agree: float = 0.09
+    agree: Annotated[float, within(0.01, 0.5)] = 0.09
     """Their angle may differ from the map's by so much [rad], in [0.01, 0.5]."""
-    inside: float = 0.75
+    inside: Annotated[float, within(0.0, 1.0)] = 0.75
     """Share of a seen line that must lie on the map's, in [0, 1]."""
-    slack: float = 0.2
+    slack: Annotated[float, within(0.0, 2.0)] = 0.2
     """By how much the ends of lines may be off [m], in [0, 2]."""
-    cell: float = 0.3
+    cell: Annotated[float, within(0.05, 2.0)] = 0.3
     """Guesses so near each other are one [m], in [0.05, 2]; the headings within 10 deg."""
-    refined: int = 60
+    refined: Annotated[int, within(2, 1000)] = 60
     """Places that are looked at closely, in [2, 1000]."""
-    beams: int = 360
+    beams: Annotated[int, within(20, 5000)] = 360
     """Beams that they are held against, in [20, 5000]."""
-    apart: float = 0.5
+    apart: Annotated[float, within(0.05, 10.0)] = 0.5
     """Places this far apart are different [m], in [0.05, 10]."""
-    apart_turn: float = math.radians(15)
+    apart_turn: Annotated[float, within(0.01, 1.0)] = math.radians(15)
     """Or turned by so much [rad], in [0.01, 1]."""
-    worth: float = 40.0
+    worth: Annotated[float, within(1.0, 1000.0)] = 40.0
     """How many independent beams all of them are worth, in [1, 1000]: neighbours see the same things."""
-    odds: float = 100.0
+    odds: Annotated[float, within(1.0, 1e9)] = 100.0
     """A place is the only one if it's so many times likelier than any other, in [1, 1e9]."""
-    explained: float = 0.4
+    explained: Annotated[float, within(0.0, 1.0)] = 0.4
     """Least share of beams that must be explained, in [0, 1]."""
-    blank: float = 0.1
+    blank: Annotated[float, within(0.0, 1.0)] = 0.1
     """Largest share of beams that may look where the map has nothing, in [0, 1]."""
-    through: float = 0.06
+    through: Annotated[float, within(0.0, 1.0)] = 0.06
     """Largest share of beams that may go through walls, in [0, 1]."""
-    place_doubt: float = 0.15
+    place_doubt: Annotated[float, within(0.01, 2.0)] = 0.15
     """Standard deviation of a guess before it's refined [m], in [0.01, 2]."""
-    turn_doubt: float = 0.06
+    turn_doubt: Annotated[float, within(0.01, 1.0)] = 0.06
     """And of its heading [rad], in [0.01, 1]."""
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     """Which lines are the same when places are refined."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("lines", 2, 100), ("shortest", 0.1, 10.0), ("crossing", 0.1, 1.5), ("agree", 0.01, 0.5),
-            ("inside", 0.0, 1.0), ("slack", 0.0, 2.0), ("cell", 0.05, 2.0), ("refined", 2, 1000),
-            ("beams", 20, 5000), ("apart", 0.05, 10.0), ("apart_turn", 0.01, 1.0), ("worth", 1.0, 1000.0),
-            ("odds", 1.0, 1e9), ("explained", 0.0, 1.0), ("through", 0.0, 1.0), ("blank", 0.0, 1.0),
-            ("place_doubt", 0.01, 2.0),
-            ("turn_doubt", 0.01, 1.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +25,7 @@ from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import Arc, MovingPath
 from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
 from robots.onboard.routes import NoRoute, Point, Route, RouteMap
-from vrs.checks import finite, number_in
+from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
 
@@ -116,19 +117,18 @@ _AWAY = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Goal:
     """Where the robot is to go."""
 
-    x: float
+    x: Annotated[float, within(-1000.0, 1000.0, "m")]
     """[m]."""
-    y: float
+    y: Annotated[float, within(-1000.0, 1000.0, "m")]
     """[m]."""
     heading: float | None = None
     """In which it's to end [rad]; None for any."""
 
     def __post_init__(self) -> None:
-        for name in ("x", "y"):
-            object.__setattr__(self, name, number_in(name, getattr(self, name), -1000.0, 1000.0, unit=" m"))
         if self.heading is not None:
             object.__setattr__(self, "heading", number_in("heading", self.heading, -1000.0, 1000.0, unit=" rad"))
 
@@ -153,39 +153,34 @@ GOING = frozenset({JourneyState.DRIVING, JourneyState.WAITING})
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class JourneyConfig:
     """How it drives, and how long it tries."""
 
     following: PathFollowingConfig = field(default_factory=lambda: PathFollowingConfig(arrival_angle=0.01))
     """Of the controller."""
-    look: float = 0.25
+    look: Annotated[float, within(0.05, 10.0)] = 0.25
     """Between two looks at what stands on the way [s], in [0.05, 10]."""
-    again: float = 2.5
+    again: Annotated[float, within(0.05, 60.0)] = 2.5
     """Between two searches for a way while every one is blocked [s], in [0.05, 60]."""
-    patience: float = 30.0
+    patience: Annotated[float, within(0.0, 3600.0)] = 30.0
     """So long it waits where every way is blocked [s], in [0, 3600]."""
-    stuck: float = 6.0
+    stuck: Annotated[float, within(1.0, 600.0)] = 6.0
     """Without getting on for so long it looks for another way [s], in [1, 600]."""
-    nearer: float = 0.03
+    nearer: Annotated[float, within(1e-3, 1.0)] = 0.03
     """What counts as getting on [m of way], in [1e-3, 1]."""
-    aside: float = 0.15
+    aside: Annotated[float, within(0.01, 10.0)] = 0.15
     """So far from its way it looks for another one [m], in [0.01, 10]."""
-    near: float = 0.03
+    near: Annotated[float, within(1e-3, 1.0)] = 0.03
     """So near to the goal it has arrived [m], in [1e-3, 1]."""
-    near_angle: float = math.radians(1.2)
+    near_angle: Annotated[float, within(1e-3, 1.0)] = math.radians(1.2)
     """And turned so near to its heading [rad], in [1e-3, 1]."""
     tries: int = 12
     """So often in a row it may be stuck, or arrive beside the goal, before it gives up, 1 to 1000."""
-    longest: float = 900.0
+    longest: Annotated[float, within(1.0, 86400.0)] = 900.0
     """After so long it gives up [s], in [1, 86400]."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("look", 0.05, 10.0), ("again", 0.05, 60.0), ("patience", 0.0, 3600.0), ("stuck", 1.0, 600.0),
-            ("nearer", 1e-3, 1.0), ("aside", 0.01, 10.0), ("near", 1e-3, 1.0), ("near_angle", 1e-3, 1.0),
-            ("longest", 1.0, 86400.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
         if isinstance(self.tries, bool) or not isinstance(self.tries, int) or not 1 <= self.tries <= 1000:
             raise InvalidValueError("tries", self.tries, "1 to 1000")
 

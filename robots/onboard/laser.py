@@ -31,12 +31,12 @@ import struct
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.checks import finite, number_in
+from vrs.checks import finite, number_in, validated, within
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
@@ -48,6 +48,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class LaserModel:
     """How the scanner sees, and where it sits."""
 
@@ -55,28 +56,23 @@ class LaserModel:
     """Scans a second [Hz], 5 or 25."""
     step_deg: float = 0.5
     """Between two beams [deg], 0.25, 0.5 or 1."""
-    reach: float = 8.0
+    reach: Annotated[float, within(0.5, 8.0)] = 8.0
     """Farthest that it sees [m], in [0.5, 8]: a frame has 13 bits for millimetres."""
-    noise: float = 0.01
+    noise: Annotated[float, within(0.0, 0.2)] = 0.01
     """Standard deviation of a range [m], in [0, 0.2]."""
-    dropouts: float = 0.005
+    dropouts: Annotated[float, within(0.0, 1.0)] = 0.005
     """Probability that a beam brings nothing, in [0, 1]."""
-    sweep: float = 0.027
+    sweep: Annotated[float, within(0.0, 0.2)] = 0.027
     """From the first beam to the last [s], in [0, 0.2], not longer than between two scans."""
-    forward: float = 0.1
+    forward: Annotated[float, within(-2.0, 2.0)] = 0.1
     """How far the scanner is ahead of the driving axle [m], in [-2, 2]."""
-    height: float = 0.3
+    height: Annotated[float, within(0.01, 2.0)] = 0.3
     """Of its plane above the floor [m], in [0.01, 2]."""
 
     def __post_init__(self) -> None:
         for name, allowed in (("rate", RATES), ("step_deg", STEPS_DEG)):
             if getattr(self, name) not in allowed:
                 raise InvalidValueError(name, getattr(self, name), f"one of {', '.join(f'{a:g}' for a in allowed)}")
-        for name, low, high in (
-            ("reach", 0.5, 8.0), ("noise", 0.0, 0.2), ("dropouts", 0.0, 1.0), ("sweep", 0.0, 0.2),
-            ("forward", -2.0, 2.0), ("height", 0.01, 2.0),
-        ):  # fmt: skip
-            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
         number_in("sweep", self.sweep, 0.0, 1 / self.rate, unit=f" s at {self.rate:g} Hz")
 
     @property

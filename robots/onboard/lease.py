@@ -12,10 +12,10 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from robots.onboard.stamps import LARGEST, whole
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 
 _NAME = 100
@@ -88,14 +88,12 @@ Answer: TypeAlias = Grant | Pending | LeaseRefusal
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class LeaseConfig:
     """How long a lease lasts."""
 
-    timeout: float = 2.0
+    timeout: Annotated[float, within(0.1, 60.0, "s")] = 2.0
     """It expires so long after its last heartbeat or command [s], 0.1 to 60."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "timeout", number_in("timeout", self.timeout, 0.1, 60.0, unit=" s"))
 
 
 class Lease:

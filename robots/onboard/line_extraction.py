@@ -15,14 +15,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.gsp_map import Lines
 from robots.onboard.laser import Points
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import wrapped
 from vrs.model import Array
 
@@ -41,30 +41,24 @@ _SAME = 9.2
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ExtractionConfig:
     """What counts as a line."""
 
-    noise: float = 0.015
+    noise: Annotated[float, within(1e-4, 0.2)] = 0.015
     """Standard deviation of a range to begin with [m], in [1e-4, 0.2]; then what the fits say."""
-    points: int = 8
+    points: Annotated[int, within(3, 1000)] = 8
     """Least number of points of a line, in [3, 1000]."""
-    length: float = 0.25
+    length: Annotated[float, within(0.05, 10.0)] = 0.25
     """Least length of a line [m], in [0.05, 10]."""
-    shallowest: float = math.radians(8)
+    shallowest: Annotated[float, within(0.02, 0.7)] = math.radians(8)
     """Least angle between a beam and the wall that it still follows [rad], in [0.02, 0.7]."""
-    bend: float = 0.015
+    bend: Annotated[float, within(1e-3, 1.0)] = 0.015
     """What a piece may bend by beside 1.7 deviations of the noise [m], in [1e-3, 1]."""
-    outliers: float = 3.0
+    outliers: Annotated[float, within(1.5, 10.0)] = 3.0
     """A point that's off by more deviations isn't of the line, in [1.5, 10]."""
-    rough: float = 2.0
+    rough: Annotated[float, within(1.1, 100.0)] = 2.0
     """A piece whose mean square is so many times that of the noise is no line, in [1.1, 100]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("noise", 1e-4, 0.2), ("points", 3, 1000), ("length", 0.05, 10.0), ("shallowest", 0.02, 0.7),
-            ("bend", 1e-3, 1.0), ("outliers", 1.5, 10.0), ("rough", 1.1, 100.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class Fit(NamedTuple):

@@ -24,14 +24,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.gsp_map import GspMap, Lines, cast_lines
 from robots.onboard.laser import Points
-from vrs.checks import finite_array, number_in
+from vrs.checks import finite_array, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
 from vrs.mobile.kinematics import all_wrapped, sinc
@@ -46,26 +46,20 @@ _ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class MotionConfig:
     """How far odometry is trusted."""
 
-    base: float = 0.4
+    base: Annotated[float, within(0.01, 5.0)] = 0.4
     """Nominal wheel base [m], in [0.01, 5]."""
-    wheel: float = 0.02
+    wheel: Annotated[float, within(0.0, 0.3)] = 0.02
     """Standard deviation of a wheel's relative error, wrong radius and slip together, in [0, 0.3]."""
-    wheel_time: float = 4.0
+    wheel_time: Annotated[float, within(0.1, 1e6)] = 4.0
     """How long it stays about the same [s], in [0.1, 1e6]."""
-    base_error: float = 0.01
+    base_error: Annotated[float, within(0.0, 0.3)] = 0.01
     """Standard deviation of the wheel base's relative error, in [0, 0.3]; it stays the same."""
-    rolling: float = 0.002
+    rolling: Annotated[float, within(0.0, 0.2)] = 0.002
     """Standard deviation of a wheel's way after 1 m, on top [m], growing as the square root; in [0, 0.2]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("base", 0.01, 5.0), ("wheel", 0.0, 0.3), ("wheel_time", 0.1, 1e6), ("base_error", 0.0, 0.3),
-            ("rolling", 0.0, 0.2),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class Sights(NamedTuple):
@@ -393,30 +387,24 @@ class LineFilter:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class MatchingConfig:
     """Gates."""
 
-    gate: float = 13.8
+    gate: Annotated[float, within(1.0, 100.0)] = 13.8
     """Largest squared Mahalanobis distance, two degrees of freedom, in [1, 100]; 13.8 lets 99.9 % pass."""
-    against: float = 14.0
+    against: Annotated[float, within(1.0, 100.0)] = 14.0
     """The same of a line against all others, in [1, 100]."""
-    overlap: float = 0.5
+    overlap: Annotated[float, within(0.0, 1.0)] = 0.5
     """Share of the seen line that lies on the map's, in [0, 1]."""
-    slack: float = 0.1
+    slack: Annotated[float, within(0.0, 1.0)] = 0.1
     """By how much the ends of the map's lines may be off [m], in [0, 1]."""
-    apart: float = 0.04
+    apart: Annotated[float, within(0.0, 1.0)] = 0.04
     """Two candidates this far apart across are different [m], in [0, 1]."""
-    turn: float = 0.35
+    turn: Annotated[float, within(0.01, 1.0)] = 0.35
     """Largest difference in direction that's looked at [rad], in [0.01, 1]."""
-    across: float = 1.0
+    across: Annotated[float, within(0.05, 10.0)] = 1.0
     """And across [m], in [0.05, 10]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("gate", 1.0, 100.0), ("against", 1.0, 100.0), ("overlap", 0.0, 1.0), ("slack", 0.0, 1.0),
-            ("apart", 0.0, 1.0), ("turn", 0.01, 1.0), ("across", 0.05, 10.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 def matched(filter_: LineFilter, seen: Lines, config: MatchingConfig, turned: float = 0.0) -> Sights:

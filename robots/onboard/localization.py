@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserScan, OdometryTrack, Points, deskewed
 from robots.onboard.line_extraction import Extraction, ExtractionConfig, extract
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, MotionConfig, Sights, evidence, matched
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import wrapped
 from vrs.mobile.kinematics import sinc
 from vrs.model import Array, frozen_array
@@ -29,6 +30,7 @@ _REMEMBERED = 100
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class LocalizationConfig:
     """Of everything that localizes."""
 
@@ -38,34 +40,26 @@ class LocalizationConfig:
     """How far odometry is trusted."""
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     """Which lines are the same."""
-    across_floor: float = 0.0005
+    across_floor: Annotated[float, within(0.0, 0.1)] = 0.0005
     """What a seen line is off across beside its noise [m], in [0, 0.1]: a sweep in motion, wrong cuts."""
-    turn_floor: float = 3e-4
+    turn_floor: Annotated[float, within(0.0, 0.1)] = 3e-4
     """And in direction [rad], in [0, 0.1]."""
-    fresh: float = 0.2
+    fresh: Annotated[float, within(0.0, 10.0)] = 0.2
     """What lines are off beside noise is another after so long a way [m], in [0, 10]; until then scans share it."""
-    fresh_turn: float = 0.15
+    fresh_turn: Annotated[float, within(0.0, 7.0)] = 0.15
     """Or after so much turning [rad], in [0, 7]."""
-    slip: float = 0.1
+    slip: Annotated[float, within(0.0, 1.0)] = 0.1
     """Standard deviation of a sudden slip that the motion doesn't allow for [m], in [0, 1]."""
-    slip_turn: float = 0.07
+    slip_turn: Annotated[float, within(0.0, 1.0)] = 0.07
     """And of the heading [rad], in [0, 1]."""
-    learning: float = 0.2
+    learning: Annotated[float, within(0.0, 1.0)] = 0.2
     """How fast it's learned that odometry is worse than was said, a scan, in [0, 1]."""
-    most_unrest: float = 25.0
+    most_unrest: Annotated[float, within(1.0, 1000.0)] = 25.0
     """Largest factor by which variances of the odometry grow so, in [1, 1000]."""
-    better: float = 0.1
+    better: Annotated[float, within(0.0, 1.0)] = 0.1
     """A slip is believed if this share of the beams is explained by it and not without, in [0, 1]."""
-    unknown: float = 0.1
+    unknown: Annotated[float, within(0.01, 10.0)] = 0.1
     """A standard deviation from lines alone above which a direction counts as unobservable [m], in [0.01, 10]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("across_floor", 0.0, 0.1), ("turn_floor", 0.0, 0.1), ("fresh", 0.0, 10.0), ("fresh_turn", 0.0, 7.0),
-            ("slip", 0.0, 1.0), ("slip_turn", 0.0, 1.0),
-            ("better", 0.0, 1.0), ("learning", 0.0, 1.0), ("most_unrest", 1.0, 1000.0), ("unknown", 0.01, 10.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ import enum
 import math
 from collections import deque
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from robots.onboard.laser import LaserScan, OdometryTrack
 from robots.onboard.line_filter import evidence
 from robots.onboard.localization import LocalizationConfig, Tracker
 from robots.onboard.map_building import Surveyor
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.model import Array, frozen_array
 
 UNKNOWN = frozen_array(np.diag([1e4, 1e4, 10.0]))
@@ -54,6 +54,7 @@ class Event(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class LocalizerConfig:
     """When it's lost, and when it searches."""
 
@@ -61,42 +62,32 @@ class LocalizerConfig:
     """Of tracking."""
     search: SearchConfig = field(default_factory=SearchConfig)
     """Of looking for its place."""
-    through: float = 0.1
+    through: Annotated[float, within(0.0, 1.0)] = 0.1
     """A scan contradicts if a larger share of its beams goes through walls, in [0, 1]."""
-    explained: float = 0.1
+    explained: Annotated[float, within(0.0, 1.0)] = 0.1
     """Or if a smaller one is explained by the map, in [0, 1]."""
-    contradicted: float = 1.4
+    contradicted: Annotated[float, within(0.1, 60.0)] = 1.4
     """It's lost if three of four scans contradicted for so long [s], in [0.1, 60]."""
-    unexplained: float = 2.4
+    unexplained: Annotated[float, within(0.1, 60.0)] = 2.4
     """The same where nothing goes through walls: people may stand around it [s], in [0.1, 60]."""
-    back: float = 0.6
+    back: Annotated[float, within(0.0, 1.0)] = 0.6
     """It wasn't carried off after all if such a share of the beams is explained, in [0, 1]."""
-    back_through: float = 0.02
+    back_through: Annotated[float, within(0.0, 1.0)] = 0.02
     """And no larger one goes through walls, in [0, 1]."""
-    back_scans: int = 5
+    back_scans: Annotated[int, within(1, 1000)] = 5
     """In so many scans one after the other, in [1, 1000]."""
-    every: float = 1.0
+    every: Annotated[float, within(0.05, 60.0)] = 1.0
     """It looks for its place each so many seconds, in [0.05, 60]."""
-    scans: int = 24
+    scans: Annotated[int, within(2, 120)] = 24
     """It looks after a turn on the spot, or after so many scans from different places, in [2, 120]."""
-    patience: float = 12.0
+    patience: Annotated[float, within(0.1, 600.0)] = 12.0
     """After so long it looks with whatever it has [s], in [0.1, 600]: perhaps the robot can't turn."""
-    confirmed: float = 0.25
+    confirmed: Annotated[float, within(0.0, 1.0)] = 0.25
     """A place counts if the last scan is explained there by this share, in [0, 1]."""
-    place_doubt: float = 0.02
+    place_doubt: Annotated[float, within(1e-4, 10.0)] = 0.02
     """Standard deviation of a posture to begin with, unless its covariance is given [m], in [1e-4, 10]."""
-    turn_doubt: float = math.radians(1)
+    turn_doubt: Annotated[float, within(1e-4, 3.0)] = math.radians(1)
     """And of its heading [rad], in [1e-4, 3]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("through", 0.0, 1.0), ("explained", 0.0, 1.0), ("contradicted", 0.1, 60.0),
-            ("back", 0.0, 1.0), ("back_through", 0.0, 1.0), ("back_scans", 1, 1000), ("unexplained", 0.1, 60.0),
-            ("every", 0.05, 60.0), ("scans", 2, 120), ("confirmed", 0.0, 1.0), ("patience", 0.1, 600.0),
-            ("place_doubt", 1e-4, 10.0),
-            ("turn_doubt", 1e-4, 3.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class Localizer:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserScan, Points
 from robots.onboard.line_filter import LineFilter, Sights
 from robots.onboard.localization import LocalizationConfig, Tracker
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import wrapped
 from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array, frozen_array
@@ -38,42 +39,35 @@ _WAITING = 400
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class BuildingConfig:
     """What comes into a map."""
 
     localization: LocalizationConfig = field(default_factory=LocalizationConfig)
     """Of the robot that builds it."""
-    shortest: float = 0.5
+    shortest: Annotated[float, within(0.1, 10.0)] = 0.5
     """Shorter lines stay out [m], in [0.1, 10]: a person is narrower."""
-    sightings: int = 3
+    sightings: Annotated[int, within(1, 100)] = 3
     """How often a line must have been seen, in [1, 100]."""
-    lasting: float = 0.7
+    lasting: Annotated[float, within(0.0, 60.0)] = 0.7
     """And over how long [s], in [0, 60]."""
-    memory: float = 5.0
+    memory: Annotated[float, within(0.1, 600.0)] = 5.0
     """A sighting counts for so long [s], in [0.1, 600]."""
-    turn: float = 0.06
+    turn: Annotated[float, within(1e-3, 1.0)] = 0.06
     """Two sightings of a new line differ by no more [rad], in [1e-3, 1]."""
-    across: float = 0.05
+    across: Annotated[float, within(1e-3, 1.0)] = 0.05
     """Nor by more across [m], in [1e-3, 1]."""
-    gap: float = 0.3
+    gap: Annotated[float, within(0.0, 5.0)] = 0.3
     """Lines are merged across a gap of so much [m], in [0, 5]."""
-    same: float = 9.2
+    same: Annotated[float, within(0.1, 100.0)] = 9.2
     """And if they differ by less than this, squared and in their own doubt, in [0.1, 100]."""
-    across_floor: float = 0.0005
+    across_floor: Annotated[float, within(0.0, 0.1)] = 0.0005
     """What a line of the map is off across beside what the estimate says [m], in [0, 0.1]: wrong cuts don't average
     out."""
-    turn_floor: float = 2e-4
+    turn_floor: Annotated[float, within(0.0, 0.1)] = 2e-4
     """And in direction [rad], in [0, 0.1]."""
-    most: int = 400
+    most: Annotated[int, within(1, 2000)] = 400
     """Lines of a map, 1 to 2000; then no new ones come."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("shortest", 0.1, 10.0), ("sightings", 1, 100), ("lasting", 0.0, 60.0), ("memory", 0.1, 600.0),
-            ("turn", 1e-3, 1.0), ("across", 1e-3, 1.0), ("gap", 0.0, 5.0), ("same", 0.1, 100.0), ("most", 1, 2000),
-            ("across_floor", 0.0, 0.1), ("turn_floor", 0.0, 0.1),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class MapBuilder(Tracker):

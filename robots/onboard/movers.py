@@ -19,60 +19,55 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from robots.onboard.avoidance import ObstacleAvoidance, Outline, SonarMount
 from robots.onboard.driving import IPR_LIMITS, Drive
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, wrapped
 from vrs.model import Array
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class MoversConfig:
     """How things are followed."""
 
     mounts: tuple[SonarMount, ...]
     """As many as there are readings, 1 to 64, in order around the robot."""
-    half_cone: float = math.radians(12.5)
+    half_cone: Annotated[float, within(0.0, 0.8)] = math.radians(12.5)
     """Half the sonar's cone [rad], in [0, 0.8]."""
-    radius: float = 0.25
+    radius: Annotated[float, within(0.0, 1.0)] = 0.25
     """Of whatever moves [m], in [0, 1]: a person's."""
-    together: float = 0.2
+    together: Annotated[float, within(0.0, 2.0)] = 0.2
     """Echoes of neighbours that differ by less are of one thing [m], in [0, 2]."""
-    range_noise: float = 0.06
+    range_noise: Annotated[float, within(1e-3, 1.0)] = 0.06
     """Standard deviation along the line of sight [m], in [1e-3, 1]: shapes, more than the sonar."""
-    bearing_noise: float = 0.12
+    bearing_noise: Annotated[float, within(1e-3, 1.0)] = 0.12
     """Across it [rad], in [1e-3, 1]: half a cone."""
-    agility: float = 0.3
+    agility: Annotated[float, within(0.0, 10.0)] = 0.3
     """Standard deviation of a thing's acceleration [m/s²], in [0, 10]."""
-    start_speed: float = 0.5
+    start_speed: Annotated[float, within(0.0, 10.0)] = 0.5
     """And of its speed when it's first seen [m/s], in [0, 10]."""
-    gate: float = 0.7
+    gate: Annotated[float, within(0.01, 5.0)] = 0.7
     """An echo further from where a thing is expected is another's [m], in [0.01, 5]."""
-    surprise: float = 3.0
+    surprise: Annotated[float, within(0.5, 100.0)] = 3.0
     """So is one that's off by more of the filter's own deviations, in [0.5, 100]."""
-    memory: float = 1.0
+    memory: Annotated[float, within(0.05, 10.0)] = 1.0
     """What wasn't seen for so long is given up [s], in [0.05, 10]."""
-    slowest: float = 0.12
+    slowest: Annotated[float, within(0.0, 10.0)] = 0.12
     """What is slower stands [m/s], in [0, 10]."""
-    doubt: float = 2.5
+    doubt: Annotated[float, within(0.0, 10.0)] = 2.5
     """It moves if its speed is so many deviations, in [0, 10]."""
-    least: float = 0.3
+    least: Annotated[float, within(0.0, 10.0)] = 0.3
     """Nothing is said of what was first seen a shorter time ago [s], in [0, 10]."""
     most: int = 16
     """Most things that are followed, 1 to 1000."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("half_cone", 0.0, 0.8), ("radius", 0.0, 1.0), ("together", 0.0, 2.0), ("range_noise", 1e-3, 1.0),
-            ("bearing_noise", 1e-3, 1.0), ("agility", 0.0, 10.0), ("start_speed", 0.0, 10.0), ("gate", 0.01, 5.0),
-            ("surprise", 0.5, 100.0), ("memory", 0.05, 10.0), ("slowest", 0.0, 10.0), ("doubt", 0.0, 10.0),
-            ("least", 0.0, 10.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
         for name, count, high in (("mounts", len(self.mounts), 64), ("most", self.most, 1000)):
             if not 1 <= count <= high:
                 raise InvalidValueError(name, count, f"1 to {high}")
@@ -257,29 +252,23 @@ _SOONER = 0.015
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class YieldingConfig:
     """What the robot is, and how far it looks ahead."""
 
     outline: Outline
-    radius: float = 0.25
+    radius: Annotated[float, within(0.0, 1.0)] = 0.25
     """Of whatever moves [m], in [0, 1]."""
-    space: float = 0.7
+    space: Annotated[float, within(0.0, 2.0)] = 0.7
     """Distance that it keeps from it [m], in [0, 2]."""
-    doubt: float = 1.5
+    doubt: Annotated[float, within(0.0, 10.0)] = 1.5
     """So many deviations to either side of its way it may go, in [0, 10]."""
-    horizon: float = 5.0
+    horizon: Annotated[float, within(0.2, 20.0)] = 5.0
     """How far ahead it looks [s], in [0.2, 20]."""
-    step: float = 0.2
+    step: Annotated[float, within(0.01, 1.0)] = 0.2
     """Between two places that are looked at [s], in [0.01, 1]."""
     limits: DriveLimits = IPR_LIMITS
     """Of the robot."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("radius", 0.0, 1.0), ("space", 0.0, 2.0), ("doubt", 0.0, 10.0), ("horizon", 0.2, 20.0),
-            ("step", 0.01, 1.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class Yielding:

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.laser import LaserScan, OdometryTrack, beam_angles, deskewed
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile.environment import Grid
 from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array
@@ -33,32 +34,26 @@ _MOST_MEAN = 20.0
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ObstacleMapConfig:
     """What is believed, and for how long."""
 
-    reach: float = 5.0
+    reach: Annotated[float, within(0.5, 20.0)] = 5.0
     """What is further from the robot isn't taken in [m], in [0.5, 20]."""
-    tolerance: float = 0.07
+    tolerance: Annotated[float, within(0.0, 1.0)] = 0.07
     """A beam that ends so near to a known thing ends at it [m], in [0, 1]: noise, and errors of the posture."""
-    behind: float = 0.06
+    behind: Annotated[float, within(0.0, 1.0)] = 0.06
     """A beam that goes on so far behind a cell has gone through it [m], in [0, 1]."""
-    settled: float = 2.5
+    settled: Annotated[float, within(0.0, 60.0)] = 2.5
     """What has been where it is for so long stands [s], in [0, 60]."""
-    fleeting: float = 1.5
+    fleeting: Annotated[float, within(0.0, 60.0)] = 1.5
     """What moves is remembered for so long [s], in [0, 60]."""
-    memory: float = 180.0
+    memory: Annotated[float, within(0.0, 86400.0)] = 180.0
     """And what stands, where it isn't looked at any more [s], in [0, 86400]."""
-    widest: float = 0.9
+    widest: Annotated[float, within(0.1, 5.0)] = 0.9
     """What moves and is wider isn't a person [m], in [0.1, 5]."""
-    thick: float = 0.14
+    thick: Annotated[float, within(0.0, 1.0)] = 0.14
     """The middle of somebody is so far behind the middle of what is seen of him [m], in [0, 1]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("reach", 0.5, 20.0), ("tolerance", 0.0, 1.0), ("behind", 0.0, 1.0), ("settled", 0.0, 60.0),
-            ("fleeting", 0.0, 60.0), ("memory", 0.0, 86400.0), ("widest", 0.1, 5.0), ("thick", 0.0, 1.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class ObstacleMap:

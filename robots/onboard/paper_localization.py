@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,30 +24,25 @@ from robots.onboard.gsp_map import GspMap, Lines, injection
 from robots.onboard.laser import LaserScan, OdometryTrack, deskewed
 from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.localization import step_between
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import advanced
 from vrs.mobile.kinematics import all_wrapped
 from vrs.model import Array
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PaperConfig:
     """What the paper leaves open."""
 
-    turn: float = 0.3
+    turn: Annotated[float, within(0.01, 1.5)] = 0.3
     """Lines correspond if they differ by no more [rad], in [0.01, 1.5]."""
-    across: float = 0.3
+    across: Annotated[float, within(0.01, 10.0)] = 0.3
     """Nor by more across [m], in [0.01, 10]."""
-    rounds: int = 20
+    rounds: Annotated[int, within(1, 1000)] = 20
     """Of eq. (9), at most, in [1, 1000]."""
-    enough: float = 1e-4
+    enough: Annotated[float, within(0.0, 1.0)] = 1e-4
     """A round that changes less ends it [m, rad], in [0, 1]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("turn", 0.01, 1.5), ("across", 0.01, 10.0), ("rounds", 1, 1000), ("enough", 0.0, 1.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 def differences(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array:

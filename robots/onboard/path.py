@@ -16,10 +16,10 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from robots.onboard.driving import Posture
-from vrs.checks import finite, number_in
+from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
 
@@ -284,16 +284,16 @@ def _nearest(piece: _Piece, at: float, x: float, y: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PathGeneratorConfig:
     """How commands become pieces of a path."""
 
-    period: float = 0.1
+    period: Annotated[float, within(1e-4, 60.0, "s")] = 0.1
     """T, how long each command was driven by the virtual robot [s], in [1e-4, 60]."""
     pivot_radius: float = 1e-3
     """Arcs of a smaller radius [m] are driven as turns on the spot, in [0, 0.1]; their ends stay exact."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "period", number_in("period", self.period, 1e-4, 60.0, unit=" s"))
         radius = number_in("pivot_radius", self.pivot_radius, 0.0, 0.1, unit=" m")
         object.__setattr__(self, "pivot_radius", radius)
 

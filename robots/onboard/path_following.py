@@ -24,10 +24,11 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from robots.onboard.path import MovingPath, Projection
-from vrs.checks import number_in
+from vrs.checks import number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
 
@@ -47,30 +48,31 @@ class FieldLaw(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PathFollowingConfig:
     """Constants of the field and of the loop. One set serves every path and every delay."""
 
-    g: float = 2.0
+    g: Annotated[float, within(1e-6, 100.0)] = 2.0
     """How steep the field is [1/m^(1/c)], in (0, 100]."""
     c: float = 1.5
     """Its exponent, 1 < c < 2: from 2 on the field asks for an angular speed without bound as l goes to 0."""
-    K_w: float = 2.0
+    K_w: Annotated[float, within(1e-6, 100.0)] = 2.0
     """K_ω [√rad/s], in (0, 100]."""
-    K_v: float = 1.0
+    K_v: Annotated[float, within(1e-6, 100.0)] = 1.0
     """[1/s], in (0, 100]; the robot lags 1/K_v behind the path's end, and brakes at K_v · v."""
-    l_floor: float = 0.005
+    l_floor: Annotated[float, within(1e-4, 0.1)] = 0.005
     """Least |l| in the gradient [m], in [1e-4, 0.1]."""
-    period: float = 0.05
+    period: Annotated[float, within(1e-3, 1.0)] = 0.05
     """Between two calls [s], in [1e-3, 1]."""
-    lag: float = 0.1
+    lag: Annotated[float, within(0.0, 1.0)] = 0.1
     """Of the motors, first order, the longest to be expected [s], in [0, 1]."""
-    cruise: float = 0.5
+    cruise: Annotated[float, within(1e-3, 10.0)] = 0.5
     """Speed not to exceed [m/s], in [1e-3, 10]; the limits hold, too."""
-    arrival: float = 0.005
+    arrival: Annotated[float, within(1e-4, 0.1)] = 0.005
     """Way left at which a stretch counts as driven [m], in [1e-4, 0.1]."""
-    arrival_angle: float = 0.02
+    arrival_angle: Annotated[float, within(1e-3, 0.5)] = 0.02
     """Turn left at which a pivot counts as driven [rad], in [1e-3, 0.5]."""
-    curve_share: float = 0.9
+    curve_share: Annotated[float, within(0.1, 1.0)] = 0.9
     """Capped: share of the largest ω that curves may take; the rest is for the field. In [0.1, 1]."""
     limits: DriveLimits = IPR_LIMITS
     """Of the robot."""
@@ -79,12 +81,6 @@ class PathFollowingConfig:
         if not 1.0 < number_in("c", self.c, 0.0, 100.0) < 2.0:
             allowed = "in (1, 2): from 2 on the field needs an angular speed without bound near the path"
             raise InvalidValueError("c", self.c, allowed)
-        for name, low, high in (
-            ("g", 1e-6, 100.0), ("K_w", 1e-6, 100.0), ("K_v", 1e-6, 100.0), ("l_floor", 1e-4, 0.1),
-            ("period", 1e-3, 1.0), ("lag", 0.0, 1.0), ("cruise", 1e-3, 10.0), ("arrival", 1e-4, 0.1),
-            ("arrival_angle", 1e-3, 0.5), ("curve_share", 0.1, 1.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
     @property
     def response(self) -> float:

@@ -7,33 +7,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from robots.onboard.curve import Curve
 from robots.onboard.driving import STAND, Drive
-from vrs.checks import number_in
+from vrs.checks import validated, within
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PurePursuitConfig:
     """Constants of pure pursuit."""
 
-    speed: float = 0.5
+    speed: Annotated[float, within(1e-3, 10.0)] = 0.5
     """[m/s], in [1e-3, 10]."""
-    ahead: float = 0.3
+    ahead: Annotated[float, within(1e-3, 10.0)] = 0.3
     """How far ahead the point is, along the path [m], in [1e-3, 10]."""
-    most_turning: float = math.radians(45.0)
+    most_turning: Annotated[float, within(1e-3, 100.0)] = math.radians(45.0)
     """Largest |ω| [rad/s], in [1e-3, 100]: where the arc needs more, the robot goes slower."""
-    arrival: float = 0.05
+    arrival: Annotated[float, within(0.0, 10.0)] = 0.05
     """Distance from the path's end at which the robot stands [m], in [0, 10]."""
-    window: float = 1.0
+    window: Annotated[float, within(1e-2, 1e9)] = 1.0
     """How far from where it was on the path the nearest point is looked for [m], in [1e-2, 1e9]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("speed", 1e-3, 10.0), ("ahead", 1e-3, 10.0), ("most_turning", 1e-3, 100.0), ("arrival", 0.0, 10.0),
-            ("window", 1e-2, 1e9),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class PurePursuit:

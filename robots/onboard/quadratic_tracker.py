@@ -18,10 +18,11 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from robots.onboard.curve import Curve
 from robots.onboard.driving import STAND, Drive
-from vrs.checks import number_in, one_of
+from vrs.checks import number_in, one_of, validated, within
 from vrs.mobile import wheel_speeds
 from vrs.mobile.model import Wheels
 
@@ -36,16 +37,17 @@ class Backwards(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class QuadraticTrackerConfig:
     """Constants of the tracker."""
 
-    alpha: float = 2.0
+    alpha: Annotated[float, within(1e-3, 10.0)] = 2.0
     """α, speed on a straight line [m/s], in [1e-3, 10]."""
-    s_max: float = 0.3
+    s_max: Annotated[float, within(1e-3, 10.0)] = 0.3
     """How far ahead the reference point is at most, along the path [m], in [1e-3, 10]."""
-    beta: float = 0.1
+    beta: Annotated[float, within(0.0, 100.0)] = 0.1
     """β, how much nearer it comes where the path bends [m], in [0, 100]."""
-    arrival: float = 0.05
+    arrival: Annotated[float, within(0.0, 10.0)] = 0.05
     """Distance from the path's end at which the robot stands [m], in [0, 10]."""
     window: float = 1.0
     """How far from where it was on the path the nearest point is looked for [m], in [1e-2, inf]; the paper looks
@@ -54,10 +56,6 @@ class QuadraticTrackerConfig:
     """How it turns in reverse."""
 
     def __post_init__(self) -> None:
-        number_in("alpha", self.alpha, 1e-3, 10.0)
-        number_in("s_max", self.s_max, 1e-3, 10.0)
-        number_in("beta", self.beta, 0.0, 100.0)
-        number_in("arrival", self.arrival, 0.0, 10.0)
         if self.window != math.inf:
             number_in("window", self.window, 1e-2, 1e9)
         object.__setattr__(self, "backwards", Backwards(one_of("backwards", self.backwards, list(Backwards))))

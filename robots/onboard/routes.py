@@ -14,13 +14,13 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.onboard.path import Arc, PathPiece, Pivot
-from vrs.checks import finite_array, number_in
+from vrs.checks import finite_array, number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
 from vrs.model import Array
@@ -47,23 +47,22 @@ _MOST_POINTS = 4000
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class RouteConfig:
     """What room the robot needs."""
 
-    turning: float
+    turning: Annotated[float, within(0.005, 10.0, "m")]
     """Radius of the circle about the driving axle's middle that a turn on the spot takes [m], in [0.005, 10]."""
     half_width: float
     """Half of what driving straight takes [m], in [0.005, turning]."""
-    margin: float = 0.06
+    margin: Annotated[float, within(0.0, 5.0, "m")] = 0.06
     """To be kept free beside both [m], in [0, 5]: for what localization, control and the map are off by."""
     least: float = 0.03
     """So much must stay free where it sets out, where it's to stand, and on the way that it drives already [m], in
     [0, margin]."""
 
     def __post_init__(self) -> None:
-        number_in("turning", self.turning, 0.005, 10.0, unit=" m")
         number_in("half_width", self.half_width, 0.005, self.turning, unit=" m")
-        number_in("margin", self.margin, 0.0, 5.0, unit=" m")
         number_in("least", self.least, 0.0, self.margin, unit=" m")
 
 

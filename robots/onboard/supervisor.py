@@ -17,13 +17,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.avoidance import SonarMount
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile.environment import Grid
 from vrs.model import Array
@@ -43,35 +43,36 @@ class CellChange(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class SupervisorConfig:
     """What the sonars are, and what is believed."""
 
     mounts: tuple[SonarMount, ...]
     """As many as there are readings, 1 to 64."""
-    half_cone: float = math.radians(12.5)
+    half_cone: Annotated[float, within(0.01, 0.8)] = math.radians(12.5)
     """Half the sonar's cone [rad], in [0.01, 0.8]."""
-    range_min: float = 0.1
+    range_min: Annotated[float, within(0.0, 1.0)] = 0.1
     """Least reading [m], in [0, 1]: what is nearer reads as this."""
-    range_max: float = 3.0
+    range_max: Annotated[float, within(0.2, 20.0)] = 3.0
     """Readings from here on are of nothing [m], in [0.2, 20]."""
-    tolerance: float = 0.08
+    tolerance: Annotated[float, within(0.0, 1.0)] = 0.08
     """How far from a known wall an echo may be and still be the wall's [m], in [0, 1]: position and noise."""
-    tolerance_share: float = 0.025
+    tolerance_share: Annotated[float, within(0.0, 0.5)] = 0.025
     """And the share of the range that is added, in [0, 0.5]: five deviations of the noise that grows with it."""
-    heading_error: float = math.radians(2.0)
+    heading_error: Annotated[float, within(0.0, 0.5)] = math.radians(2.0)
     """By so much the cone is widened where known walls are looked for [rad], in [0, 0.5]."""
-    depth: float = 0.15
+    depth: Annotated[float, within(0.0, 1.0)] = 0.15
     """How deep behind the arc cells are occupied [m], in [0, 1]: above √2 cells no cell is alone, which would die
     at once by eq. (17)."""
-    clear_cone: float = 0.8
+    clear_cone: Annotated[float, within(0.0, 1.0)] = 0.8
     """Share of the cone that is looked through, in [0, 1]: its edges are its neighbours', too."""
     silence: int = 3
     """So many scans one after the other without an echo look clearly through as well, 1 to 1000."""
-    refresh: float = 0.5
+    refresh: Annotated[float, within(0.05, 60.0)] = 0.5
     """Least time between two tellings of one cell [s], in [0.05, 60]."""
     repeats: int = 3
     """How often it's told that a cell is free, 1 to 100."""
-    memory: float = 16.0
+    memory: Annotated[float, within(0.0, 600.0)] = 16.0
     """For so long what was seen is kept [s], in [0, 600]: as long as a cell can live."""
     most: int = 64
     """Most changes in a report, 1 to 4096."""
@@ -79,12 +80,6 @@ class SupervisorConfig:
     """Most cells that are kept, 1 to 100,000; there, those that were seen longest ago go first."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("half_cone", 0.01, 0.8), ("range_min", 0.0, 1.0), ("range_max", 0.2, 20.0), ("tolerance", 0.0, 1.0),
-            ("tolerance_share", 0.0, 0.5), ("heading_error", 0.0, 0.5), ("depth", 0.0, 1.0),
-            ("clear_cone", 0.0, 1.0), ("refresh", 0.05, 60.0), ("memory", 0.0, 600.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
         for name, count, high in (
             ("mounts", len(self.mounts), 64), ("silence", self.silence, 1000), ("repeats", self.repeats, 100),
             ("most", self.most, 4096), ("most_kept", self.most_kept, 100_000),

@@ -22,10 +22,10 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture, kept
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, advanced, clipped, wrapped
 from vrs.mobile.kinematics import sinc
@@ -175,53 +175,45 @@ _STILL = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class TrackingConfig:
     """How a trajectory is played and tracked. One set serves every delay."""
 
-    period: float = 0.05
+    period: Annotated[float, within(1e-3, 1.0)] = 0.05
     """Between two calls [s], in [1e-3, 1]."""
-    lag: float = 0.05
+    lag: Annotated[float, within(0.0, 1.0)] = 0.05
     """Of the motors, first order [s], in [0, 1]: by this, and half a period, the feed-forward is ahead of the
     play."""
-    damping: float = 0.8
+    damping: Annotated[float, within(0.1, 5.0)] = 0.8
     """ζ of the feedback, in [0.1, 5]."""
-    stiffness: float = 50.0
+    stiffness: Annotated[float, within(0.1, 1000.0)] = 50.0
     """b: the feedback's natural frequency is √(ω² + b v²) [1/m²], in [0.1, 1000]."""
-    least_gain: float = 2.0
+    least_gain: Annotated[float, within(0.0, 20.0)] = 2.0
     """Least gain of the errors along the way and of heading [1/s], so that they also vanish at rest, in [0, 20]."""
-    most_gain: float = 3.0
+    most_gain: Annotated[float, within(0.1, 50.0)] = 3.0
     """Largest such gain [1/s], in [0.1, 50]: what a loop of this period and lag follows without ringing."""
-    v_feedback: float = 0.15
+    v_feedback: Annotated[float, within(0.0, 10.0)] = 0.15
     """Largest part of v that is feedback [m/s], in [0, 10]."""
-    w_feedback: float = 0.6
+    w_feedback: Annotated[float, within(0.0, 20.0)] = 0.6
     """Largest part of ω that is feedback [rad/s], in [0, 20]."""
-    leash: float = 0.15
+    leash: Annotated[float, within(0.01, 10.0)] = 0.15
     """Distance between robot and reference from which play slows down [m], in [0.01, 10]; at twice it, play
     waits."""
-    catch_up: float = 1.0
+    catch_up: Annotated[float, within(0.0, 20.0)] = 1.0
     """Pace above 1 for each second behind [1/s], in [0, 20]; as much is taken from it ahead."""
-    most_pace: float = 10.0
+    most_pace: Annotated[float, within(1.0, 100.0)] = 10.0
     """Largest pace, in [1, 100]: of what was driven slowly, the limits allow any."""
-    tolerance: float = 0.01
+    tolerance: Annotated[float, within(0.0, 10.0)] = 0.01
     """Deviation from the offset that isn't corrected [s], in [0, 10]."""
-    share: float = 0.85
+    share: Annotated[float, within(0.1, 1.0)] = 0.85
     """Share of the limits that play takes at a pace above 1, in [0.1, 1]: the feedback needs the rest."""
-    venture: float = 0.0
+    venture: Annotated[float, within(0.0, 10.0)] = 0.0
     """How far beyond what is complete play may go, on the braking tail [s], in [0, 10]. With 0 nothing of the
     operator's path is missed: the robot slows down before it must know more."""
-    capacity: int = 36_000
+    capacity: Annotated[int, within(10, 10**7)] = 36_000
     """Most arcs kept, in [10, 10⁷]."""
     limits: DriveLimits = IPR_LIMITS
     """Of the robot."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("period", 1e-3, 1.0), ("lag", 0.0, 1.0), ("damping", 0.1, 5.0), ("stiffness", 0.1, 1000.0),
-            ("least_gain", 0.0, 20.0), ("most_gain", 0.1, 50.0), ("v_feedback", 0.0, 10.0),
-            ("w_feedback", 0.0, 20.0), ("leash", 0.01, 10.0), ("catch_up", 0.0, 20.0), ("most_pace", 1.0, 100.0),
-            ("tolerance", 0.0, 10.0), ("share", 0.1, 1.0), ("venture", 0.0, 10.0), ("capacity", 10, 10**7),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
 
 
 class Reference(NamedTuple):

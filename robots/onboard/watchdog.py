@@ -13,10 +13,10 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from robots.onboard.stamps import LARGEST, Kind, SequenceWindow, Stamp, Verdict, whole
-from vrs.checks import finite, number_in
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 
 _ROUNDING = 1e-6
@@ -106,23 +106,22 @@ Action: TypeAlias = BeginStop | GoOn
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class WatchdogConfig:
     """When the link counts as lost, and what happens then."""
 
-    timeout: float = 0.5
+    timeout: Annotated[float, within(0.1, 2.0, "s")] = 0.5
     """T_loss [s], 0.1 to 2: so long after the last message that counted the stop begins."""
     policy: LossPolicy = LossPolicy.HALT
     future: AcceptedFuture = AcceptedFuture.STOP
-    max_age: float = 0.5
+    max_age: Annotated[float, within(0.01, 2.0, "s")] = 0.5
     """Oldest message that counts under `halt` [s], 0.01 to 2."""
-    max_uncertainty: float = 0.1
+    max_uncertainty: Annotated[float, within(0.0, 1.0, "s")] = 0.1
     """Largest uncertainty of the clocks that the age gate works with [s], 0 to 1."""
     window: int = 4096
     """How far a message may be overtaken and still count [messages], 1 to 1,000,000."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (("timeout", 0.1, 2.0), ("max_age", 0.01, 2.0), ("max_uncertainty", 0.0, 1.0)):
-            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high, unit=" s"))
         for name, words in (("policy", LossPolicy), ("future", AcceptedFuture)):
             try:
                 object.__setattr__(self, name, words(getattr(self, name)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from robots.ipr.chassis import Senses
 from robots.ipr.position import FusedPosition
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import MobileRobot
-from vrs.checks import number_in, one_of
+from vrs.checks import one_of, validated, within
 from vrs.comparison import match_paths
 from vrs.mobile import clipped, wrapped
 from vrs.model import Array
@@ -53,16 +53,17 @@ BODIES: Final = ("cubo", "bare")
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class FollowingCase:
     """What is run."""
 
     scheme: str = "rsp"
     delay: str = "none"
     """Profile of either direction, as the command line spells it."""
-    loss: float = 0.0
+    loss: Annotated[float, within(0.0, 0.999)] = 0.0
     """Share of packets lost either way, in [0, 1)."""
     seed: int = 0
-    length: float = 30.0
+    length: Annotated[float, within(2.0, 3600.0, "s")] = 30.0
     """For how long the path is [s], in [2, 3600]."""
     body: str = "cubo"
     bandwidth: float = math.inf
@@ -73,8 +74,6 @@ class FollowingCase:
     def __post_init__(self) -> None:
         scheme(self.scheme)
         one_of("body", self.body, BODIES)
-        number_in("loss", self.loss, 0.0, 0.999)
-        number_in("length", self.length, 2.0, 3600.0, unit=" s")
 
 
 class Followed(NamedTuple):

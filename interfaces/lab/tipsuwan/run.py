@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Annotated, Final, Protocol
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from robots.ipr.robot import MobileRobot
 from robots.onboard.curve import Curve
 from robots.onboard.driving import Posture
 from robots.onboard.quadratic_tracker import QuadraticCurveTracker, QuadraticTrackerConfig
-from vrs.checks import number_in, one_of
+from vrs.checks import number_in, one_of, validated, within
 from vrs.mobile import DriveLimits, clipped
 from vrs.model import Array
 
@@ -91,6 +91,7 @@ class Agent(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class NetworkRunSetting:
     """What runs have in common."""
 
@@ -102,11 +103,8 @@ class NetworkRunSetting:
     """ε = 0.25, T_p = 5 ms, N = 10."""
     agent: ActionAgentConfig = field(default_factory=ActionAgentConfig)
     """T = 10 ms."""
-    length: float = LENGTH
+    length: Annotated[float, within(0.1, 3600.0, "s")] = LENGTH
     """Of a run [s], in [0.1, 3600]."""
-
-    def __post_init__(self) -> None:
-        number_in("length", self.length, 0.1, 3600.0, unit=" s")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import socket
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from interfaces.link.proxy.address import Address
 from interfaces.link.proxy.tcp import ProxyDirection, TcpProxy
 from interfaces.link.proxy.udp import Parcel, UdpProxy
 from interfaces.timer import TimerLateness
-from vrs.checks import integer_in, number_in
+from vrs.checks import number_in, validated, within
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError
 
@@ -27,6 +27,7 @@ BIND_TRIES = 20
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ProxySettings:
     """Where the proxy listens, whom it talks to, and what the link between does."""
 
@@ -38,7 +39,7 @@ class ProxySettings:
     """Forward from client to server. TCP gets in-order service, UDP datagrams, whatever is set here."""
     tcp: bool = True
     udp: bool = True
-    most_clients: int = 64
+    most_clients: Annotated[int, within(1, 1000)] = 64
     """Most TCP connections, and most UDP clients, at once; 1 to 1000."""
     udp_idle: float = 60.0
     """A UDP client is forgotten after so long without a datagram [s], in [0.01, 86400]."""
@@ -50,7 +51,6 @@ class ProxySettings:
             raise InvalidValueError("--to", str(self.to), "an address with a port other than 0")
         if self.listen == self.to:
             raise InvalidValueError("--to", str(self.to), "another address than --listen")
-        integer_in("most_clients", self.most_clients, 1, 1000)
         number_in("udp_idle", self.udp_idle, 0.01, 86_400.0, "seconds")
 
 

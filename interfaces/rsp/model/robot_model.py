@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 from interfaces.rsp.model.elements import (
     KINDS,
@@ -19,7 +19,7 @@ from interfaces.rsp.model.elements import (
     Sensor,
     check_name,
 )
-from vrs.checks import integer_in
+from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 
 MOST_ELEMENTS: Final = 1024
@@ -29,22 +29,21 @@ REQUESTED: Final = (Sensor, Monitor, Event)
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class RobotModel:
     """The devices and capabilities of a robot."""
 
     name: str
     """As an element's."""
-    id: int
+    id: Annotated[int, within(0, 65_535)]
     """Model ID, 0 to 65535; a packet of another model is dropped."""
     elements: tuple[Element, ...]
     """In the order of their device bits, 1 to 1024."""
-    buffers: int = 16
+    buffers: Annotated[int, within(1, 255)] = 16
     """Fragments of a stream that the robot holds, 1 to 255."""
 
     def __post_init__(self) -> None:
         check_name(self.name)
-        integer_in("id", self.id, 0, 65_535)
-        integer_in("buffers", self.buffers, 1, 255)
         object.__setattr__(self, "elements", tuple(self.elements))
         if not 1 <= len(self.elements) <= MOST_ELEMENTS:
             raise InvalidValueError("elements", len(self.elements), f"1 to {MOST_ELEMENTS}")

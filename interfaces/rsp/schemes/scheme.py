@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 from interfaces.link.conditions import Service
 from interfaces.rsp.local import LocalConfig
@@ -15,7 +15,7 @@ from interfaces.rsp.robot import RobotConfig
 from interfaces.rsp.schemes.ends import LocalEnd, RobotEnd
 from interfaces.rsp.schemes.plain import FIXED_DOWN, FIXED_UP, PlainLocal, PlainRobot
 from interfaces.rsp.schemes.simulacrum import RspLocal, RspRobot
-from vrs.checks import number_in, one_of
+from vrs.checks import one_of, validated, within
 
 UDP_HEADER: Final = 28
 """IPv4 and UDP [byte]."""
@@ -24,22 +24,18 @@ TCP_HEADER: Final = 40
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class SchemeConfig:
     """What all schemes share."""
 
-    period: float = 0.02
+    period: Annotated[float, within(1e-3, 1.0, "s")] = 0.02
     """T [s], in [0.001, 1]; the paper's 20 ms."""
-    loss: float = 0.5
+    loss: Annotated[float, within(0.1, 2.0, "s")] = 0.5
     """T_loss [s], in [0.1, 2]."""
-    repeat: int = 8
+    repeat: Annotated[int, within(1, 255)] = 8
     """How often inputs are sent where they're repeated, 1 to 255."""
     adaptive: bool = False
     """Whether RSP fits T to the link."""
-
-    def __post_init__(self) -> None:
-        number_in("period", self.period, 1e-3, 1.0, unit=" s")
-        number_in("loss", self.loss, 0.1, 2.0, unit=" s")
-        number_in("repeat", self.repeat, 1, 255)
 
 
 @dataclass(frozen=True, slots=True)

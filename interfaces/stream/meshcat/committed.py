@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import ArcTimeline
 from vrs.model import Array
 from vrs.timeline import Timeline
@@ -36,16 +36,14 @@ class Kinematics(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+@validated
 class Committed:
     """What the real robot is committed to."""
 
     timeline: Timeline | ArcTimeline
     """The operator's."""
-    play: float
+    play: Annotated[float, within(-1e9, 1e9)]
     """The time of that timeline at which the real robot is [s], within ±1e9."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "play", number_in("play", self.play, -1e9, 1e9))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
 from interfaces.plugin import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
@@ -17,14 +17,15 @@ from interfaces.teleop.architectures.controllers import (
 )
 from robots.onboard.driving import Posture
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
-from vrs.checks import number_in, one_of
+from vrs.checks import number_in, one_of, validated, within
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Constants:
     """Of all architectures; none is chosen by the network."""
 
-    period: float = 0.1
+    period: Annotated[float, within(0.01, 1.0, "s")] = 0.1
     """T: between the operator's commands [s]."""
     processing: float = 0.01
     """T_p: to make a piece of the path of one command [s], shorter than T."""
@@ -34,7 +35,6 @@ class Constants:
     """Of the `timeline` architecture."""
 
     def __post_init__(self) -> None:
-        number_in("period", self.period, 0.01, 1.0, unit=" s")
         number_in("processing", self.processing, 1e-4, self.period, unit=" s")
 
 

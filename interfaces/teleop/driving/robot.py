@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
@@ -14,7 +15,7 @@ from interfaces.teleop.tasks import Doing, Errand, SensedPoints, TaskReport, sto
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.sensor_watch import SoundPosition
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.mobile import DriveLimits
 from vrs.mobile.model import braking
 
@@ -27,28 +28,20 @@ TOLD = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class DrivenConfig:
     """How a mobile robot's site behaves."""
 
-    period: float = 0.05
+    period: Annotated[float, within(1e-3, 1.0)] = 0.05
     """Between two drives [s], in [0.001, 1]."""
-    beat: float = 0.05
+    beat: Annotated[float, within(1e-3, 10.0)] = 0.05
     """Between two reports [s], in [0.001, 10]."""
-    begin_within: float = 0.3
+    begin_within: Annotated[float, within(0.0, 100.0)] = 0.3
     """So near to where it takes itself to be a drive must begin [m], in [0, 100]."""
     watchdog: WatchdogConfig | None = None
     """When the link counts as lost, and messages as too old; None: it holds, and no message is too old."""
-    lost_after: float = 2.0
+    lost_after: Annotated[float, within(0.1, 60.0)] = 2.0
     """Without a watchdog, the operator is lost to what the robot does by itself after so long [s], in [0.1, 60]."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("period", 1e-3, 1.0),
-            ("beat", 1e-3, 10.0),
-            ("begin_within", 0.0, 100.0),
-            ("lost_after", 0.1, 60.0),
-        ):
-            number_in(name, getattr(self, name), low, high)
 
 
 class DrivenRobot:

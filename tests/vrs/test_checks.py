@@ -1,0 +1,74 @@
+"""Ranges stand in annotations; one validator holds the fields to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+import pytest
+
+from vrs.checks import validated, within
+from vrs.errors import InvalidValueError
+
+
+@dataclass(frozen=True, slots=True)
+@validated
+class Pace:
+    period: Annotated[float, within(0.1, 10.0, "s")] = 1.0
+    count: Annotated[int, within(1, 5)] = 1
+    limit: Annotated[float, within(0.0, 1.0)] | None = None
+    smooth: bool = True
+    name: str = ""
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self):
+        self.notes.append("own check ran")
+
+
+@dataclass(frozen=True, slots=True)
+class Hurry(Pace):
+    factor: Annotated[float, within(1.0, 2.0)] = 1.0
+
+
+def test_what_is_in_range_is_kept_numbers_as_floats():
+    pace = Pace(period=3, count=5, limit=1, smooth=False)
+    assert (pace.period, pace.count, pace.limit) == (3.0, 5, 1.0)
+    assert type(pace.period) is float
+    assert type(pace.limit) is float
+    assert type(Pace(period=np.float32(0.5)).period) is float
+    assert pace.notes == ["own check ran"]
+    assert Pace(period=0.1).period == 0.1
+    assert Pace(period=10.0).period == 10.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("period", 0.0999, r"in \[0.1, 10\] s"),
+        ("period", 10.001, r"in \[0.1, 10\] s"),
+        ("period", math.nan, r"in \[0.1, 10\] s"),
+        ("period", None, r"in \[0.1, 10\] s"),
+        ("period", True, r"in \[0.1, 10\] s"),
+        ("period", "1", r"in \[0.1, 10\] s"),
+        ("count", 0, r"an integer in \[1, 5\]"),
+        ("count", 6, r"an integer in \[1, 5\]"),
+        ("count", 2.0, r"an integer in \[1, 5\]"),
+        ("count", True, r"an integer in \[1, 5\]"),
+        ("limit", -0.1, r"a number in \[0, 1\]"),
+        ("smooth", 1, "True or False"),
+        ("smooth", None, "True or False"),
+    ],
+)
+def test_what_is_not_is_refused_with_what_is_allowed(name, value, allowed):
+    with pytest.raises(InvalidValueError, match=f"{name}.*{allowed}"):
+        Pace(**{name: value})
+
+
+def test_a_subclass_is_held_to_its_own_ranges_too():
+    assert Hurry(factor=2).factor == 2.0
+    with pytest.raises(InvalidValueError, match="factor"):
+        Hurry(factor=2.5)
+    with pytest.raises(InvalidValueError, match="period"):
+        Hurry(period=0.0)
