@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final, Protocol
 
+from typing_extensions import override
+
 SYLLABLE: Final = 0.065
 """So long a character takes to be spoken, about 170 words a minute [s]."""
 BREATH: Final = 0.3
@@ -49,7 +51,7 @@ class ArmControl(Protocol):
         """What became of the program: None while it runs, empty if it came to its end, else why not."""
 
 
-class SilentSpeaker:
+class SilentSpeaker(Speaker):
     """Says nothing, and takes as long as saying it would: where there's no loudspeaker."""
 
     def __init__(self) -> None:
@@ -58,43 +60,44 @@ class SilentSpeaker:
         """What is being said."""
         self._until = -math.inf
 
+    @override
     def speak(self, text: str, *, now: float) -> None:
-        """See `Speaker`."""
         self.text, self._until = text, now + speaking_time(text)
 
+    @override
     def hush(self) -> None:
-        """See `Speaker`."""
         self.text, self._until = "", -math.inf
 
+    @override
     def is_speaking(self, *, now: float) -> bool:
-        """See `Speaker`."""
         if now >= self._until:
             self.text = ""
         return now < self._until
 
 
-class TextScreen:
+class TextScreen(Screen):
     """Keeps what is shown, for others to read."""
 
     def __init__(self) -> None:
         """Show nothing."""
         self.text = ""
 
+    @override
     def show(self, text: str) -> None:
-        """See `Screen`."""
         self.text = text
 
 
-class NoArm:
+class NoArm(ArmControl):
     """There's no arm here."""
 
-    def run(self, program: str, source: str, *, now: float) -> str:  # noqa: ARG002 - it's an ArmControl's
-        """See `ArmControl`."""
+    @override
+    def run(self, program: str, source: str, *, now: float) -> str:
         return "there's no arm here that could carry out a program"
 
+    @override
     def end(self, *, now: float) -> None:
-        """See `ArmControl`."""
+        pass
 
-    def outcome(self, *, now: float) -> str | None:  # noqa: ARG002 - the same
-        """See `ArmControl`."""
+    @override
+    def outcome(self, *, now: float) -> str | None:
         return ""

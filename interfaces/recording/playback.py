@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol, TypeVar
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.playhead import LiveEdge, Mode, PlayHead
 from interfaces.recording.driving.pursuit import Pursuit
@@ -93,14 +94,14 @@ class Follower(Protocol):
         """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
 
 
-class _AtEqualTime:
+class _AtEqualTime(Follower):
     """Compares with the virtual robot at equal timeline time."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
 
+    @override
     def play(self, t: float) -> float | None:
-        """See `Follower`."""
         return float(self._recording.play(t))
 
     def error(self, t: float, q_real: Array, play: float) -> float | None:  # noqa: ARG002 - play says it all

@@ -11,6 +11,7 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from typing_extensions import override
 
 from interfaces.recording.damage import Damage
 from interfaces.recording.driving.messages import CellsEntry, RoomEntry
@@ -64,8 +65,8 @@ class Recording:
     What is missing stands in `damage`; nothing is made up for it.
     """
 
+    @override
     def __init__(self, path: Path) -> None:
-        """See `open_recording`."""
         self.path = path
         self._source = FileSource(path)
         try:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from typing_extensions import override
+
 from interfaces.recording.driving.stage import DriveStage
 from interfaces.recording.engines import mobile_model
 from interfaces.recording.kinds import ARM
@@ -25,15 +27,15 @@ class Stage(Protocol):
         """Show a frame whose virtual robot is known."""
 
 
-class ArmStage:
+class ArmStage(Stage):
     """Two arms."""
 
     def __init__(self, recording: Recording) -> None:
         self._model = recording.model
         self.scene: MeshcatScene = MeshcatScene(recording.model)
 
+    @override
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
-        """See `Stage`."""
         links = self._model.links
         assert frame.q_virtual is not None
         real = None if frame.q_real is None else links(frame.q_real)

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar, cast
 
+from typing_extensions import override
+
 from interfaces.rsp.errors import DeadlineError
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model.elements import Command, Effector, Event, Monitor, Sensor
@@ -61,8 +63,8 @@ class Requested(Device):
 class EffectorDevice(Device, Generic[V]):
     """Something that moves or shows: Fig. 4."""
 
+    @override
     def __init__(self, middleware: Middleware, name: str) -> None:
-        """See `Device`."""
         super().__init__(middleware, name)
         element = middleware.model.elements[self._index]
         assert isinstance(element, Effector)
@@ -167,8 +169,8 @@ class StreamDevice(Device):
 class SensorDevice(Requested, Generic[V]):
     """A sensor or a monitor."""
 
+    @override
     def __init__(self, middleware: Middleware, name: str) -> None:
-        """See `Device`."""
         super().__init__(middleware, name)
         element = middleware.model.elements[self._index]
         if isinstance(element, Monitor):

@@ -205,7 +205,7 @@ class SharedEncoder:
         self._known: OrderedDict[tuple[int, Encoding], tuple[Value, bytes]] = OrderedDict()
 
     def encode(self, message: Value, encoding: Encoding) -> bytes:
-        """See `encode`."""
+        """Return the bytes of a message, the same object for all who get it."""
         if isinstance(message, FOR_ONE):
             return encode(message, encoding)
         key = id(message), encoding

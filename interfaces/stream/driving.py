@@ -67,7 +67,7 @@ class DriveSite:
         """There are no frames to be made."""
 
     def next_deadline(self) -> float | None:
-        """See `advance`."""
+        """Return None: it waits for nothing of its own."""
         return None
 
     def welcome(self, greeting: Greeting) -> MobileWelcome:

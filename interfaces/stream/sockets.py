@@ -354,7 +354,7 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         self._begin_phase(FAREWELL)
 
     def let_stay(self, *, known: bool) -> None:
-        """See `let_stay`."""
+        """Give the connection the sizes that who is known may send, and hold its deadlines off."""
         if known:
             self.conn.max_message_size = self.config.ws_max_size
             self._state.strangers.know(self)

@@ -12,6 +12,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from typing_extensions import override
+
+from interfaces.jobs.carrying import ArmControl
 from interfaces.jobs.values import ArmJob
 from vrs.model import Array
 
@@ -70,7 +73,7 @@ def at_once(task: Task) -> Future[Rehearsal | str]:
     return done
 
 
-class ValArm:
+class ValArm(ArmControl):
     """Carries programs out on a virtual PUMA 560, see `ArmControl`."""
 
     def __init__(self, programs: Mapping[str, str] | None = None, beside: Beside = at_once) -> None:
@@ -88,8 +91,8 @@ class ValArm:
         self._ends: float | None = None
         """When the program that it carries out does, by the timeline [s]; None while there's none."""
 
+    @override
     def run(self, program: str, source: str, *, now: float) -> str:
-        """See `ArmControl`."""
         known, start = self._programs, self.joints(now)
         self._planned = self._beside(lambda: rehearsed(program, source, known, start))
         return ""
@@ -107,8 +110,8 @@ class ValArm:
         engine.stop()
         self._timeline, self._ends = engine.timeline, None
 
+    @override
     def outcome(self, *, now: float) -> str | None:
-        """See `ArmControl`."""
         if self._planned is not None:
             if not self._planned.done():
                 return None

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 import msgspec
 import numpy as np
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.wire.fields import (
     MOST_NAMES,
@@ -73,9 +74,9 @@ TargetWire: TypeAlias = JointsWire | PoseWire
 class AimedWire(Message, frozen=True, omit_defaults=True, gc=False):
     """A command with a target."""
 
+    @override
     @classmethod
     def of(cls, value: Any, packed: bool) -> AimedWire:
-        """See `Message.of`."""
         return cls(*[_field(getattr(value, name), packed) for name in cls.__struct_fields__])
 
 
@@ -103,9 +104,9 @@ class MoveWire(AimedWire, frozen=True, omit_defaults=True, gc=False, tag="move")
     acceleration: Annotated[float, Meta(ge=1e-2, le=1)] = 1.0
     tool: _Pose | None = None
 
+    @override
     @classmethod
     def of(cls, value: Any, packed: bool) -> MoveWire:
-        """See `Message.of`."""
         fields = {name: _field(getattr(value, name), packed) for name in cls.__struct_fields__}
         # Defaults are left out where they're the very same object, which a float seldom is.
         return cls(**{name: field for name, field in fields.items() if name not in _PLAIN or field != 1.0})

@@ -90,7 +90,7 @@ class StyledOperator:
         self._begun = 0.0
 
     def drive(self, t: float, posture: Posture, before: Drive) -> Drive:
-        """See `Operator`."""
+        """Return what is driven for the next period, as `Operator` says."""
         wanted = self._wanted(t, posture)
         while wanted is None:
             self._leg, self._at, self._begun = next(self._legs), 0, t

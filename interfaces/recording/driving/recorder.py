@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.link import PacketRecord
 from interfaces.recording.channels import Message
@@ -23,7 +24,7 @@ from interfaces.recording.messages import Begin, CommandEntry, End, EventEntry, 
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, placed_pose
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
-from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.software import software
 from interfaces.teleop import CommandRecord
 from interfaces.teleop.architectures import ArchitectureOperatorSite
@@ -42,7 +43,7 @@ LONGEST_WORD = 200
 """Characters of an operator's name that are kept."""
 
 
-class DriveRecorder:
+class DriveRecorder(Witness):
     """A `Witness` that writes a run into a file. What it costs a run is a note a command and a packet."""
 
     def __init__(self, path: Path) -> None:
@@ -54,10 +55,10 @@ class DriveRecorder:
         self._sent: dict[str, list[tuple[float, int]]] = {"forward": [], "backward": []}
         self._settled: dict[str, list[PacketRecord]] = {"forward": [], "backward": []}
 
+    @override
     def begun(
         self, case: DriveCase, start: Posture, body: MobileRobot, site: ArchitectureOperatorSite, link: DriveLink
     ) -> None:
-        """See `Witness`."""
         self._case, self._start, self._site = case, start, site
         self._place = () if body.room is EMPTY else (room_entry(body.room),)
         self._grid: Grid | None = None if site.surroundings is None else grid_of(body.room, start)
@@ -66,8 +67,8 @@ class DriveRecorder:
         for direction, lane in (("forward", link.forward), ("backward", link.backward)):
             lane.log.told = partial(self._settle, direction)
 
+    @override
     def sent(self, direction: str, now: float, size: int) -> None:
-        """See `Witness`."""
         self._sent[direction].append((now, size))
 
     def finish(self, drive: DriveRun) -> None:

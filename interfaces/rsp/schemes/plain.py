@@ -10,10 +10,12 @@ import struct
 from collections import deque
 from typing import Final
 
+from typing_extensions import override
+
 from interfaces.rsp.model.elements import Effector
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig
-from interfaces.rsp.schemes.ends import ReportedPosition, Rims
+from interfaces.rsp.schemes.ends import LocalEnd, ReportedPosition, Rims, RobotEnd
 from interfaces.rsp.session import SLACK
 
 _HEAD: Final = struct.Struct("!IIB")
@@ -28,7 +30,7 @@ FIXED_UP: Final = 96
 """And from it [byte]: all of CUBO's sensors."""
 
 
-class PlainLocal:
+class PlainLocal(LocalEnd):
     """The local system's end."""
 
     def __init__(self, period: float, repeat: int, size: int) -> None:
@@ -48,12 +50,12 @@ class PlainLocal:
         self._next = 0.0
         self._newest = -1
 
-    def write(self, rims: Rims, *, now: float) -> None:  # noqa: ARG002 - as other ends
-        """See `LocalEnd`."""
+    @override
+    def write(self, rims: Rims, *, now: float) -> None:
         self._rims = rims
 
-    def fire(self, *, now: float) -> None:  # noqa: ARG002 - as other ends
-        """See `LocalEnd`."""
+    @override
+    def fire(self, *, now: float) -> None:
         self._fires.append(self._count)
         self._count += 1
 
@@ -63,8 +65,8 @@ class PlainLocal:
         if number > self._newest:
             self._newest, self.seen = number, ReportedPosition(x, y, theta)
 
+    @override
     def to_send(self, *, now: float) -> list[bytes]:
-        """See `LocalEnd`."""
         if now < self._next - SLACK:
             return []
         self._next = max(self._next + self._T, now + 0.5 * self._T)
@@ -74,7 +76,7 @@ class PlainLocal:
         return [(head + b"".join(self._recent)).ljust(self._size, b"\0")]
 
 
-class PlainRobot:
+class PlainRobot(RobotEnd):
     """The robot's end."""
 
     def __init__(
@@ -114,25 +116,25 @@ class PlainRobot:
             self._filter.receive(1e-3 * stamp - (number - k) * self._T, told, now=now, fresh=k == number)
         self._newest, self._heard = number, now
 
+    @override
     def drive(self, *, now: float) -> Rims:
-        """See `RobotEnd`."""
         self._filter.play(now)
         if self._heard is None or now - self._heard >= self._loss:
             return 0, 0
         left, right = (self._filter.given(index)[0] for index in (self._left, self._right))
         return int(left), int(right)
 
+    @override
     def fired(self) -> list[int]:
-        """See `RobotEnd`."""
         found, self._commands = self._commands, []
         return found
 
+    @override
     def measure(self, position: ReportedPosition) -> None:
-        """See `RobotEnd`."""
         self._position = position
 
+    @override
     def to_send(self, *, now: float) -> list[bytes]:
-        """See `RobotEnd`."""
         if self._heard is None or now < self._next - SLACK:
             return []
         self._next = max(self._next + self._T, now + 0.5 * self._T)
@@ -140,6 +142,6 @@ class PlainRobot:
         return [_UP.pack(self._number, *self._position).ljust(self._size, b"\0")]
 
     @property
+    @override
     def stamp(self) -> float | None:
-        """See `RobotEnd`."""
         return self._filter.playing

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from typing_extensions import override
+
 from interfaces.rsp.local import LocalConfig, LocalCore, LocalState
 from interfaces.rsp.model.elements import Sensor
 from interfaces.rsp.model.robot_model import RobotModel
 from interfaces.rsp.outputs import Commanded, Told
 from interfaces.rsp.robot import RobotConfig, RobotCore
-from interfaces.rsp.schemes.ends import ReportedPosition, Rims
+from interfaces.rsp.schemes.ends import LocalEnd, ReportedPosition, Rims, RobotEnd
 
 _ADDRESS: Final = b"local"
 
 
-class RspLocal:
+class RspLocal(LocalEnd):
     """The local system's end."""
 
     def __init__(self, model: RobotModel, random_bytes: Callable[[int], bytes], config: LocalConfig) -> None:
@@ -32,8 +34,8 @@ class RspLocal:
         self._number = 0
         self._waiting: list[bytes] = []
 
-    def write(self, rims: Rims, *, now: float) -> None:  # noqa: ARG002 - as other ends
-        """See `LocalEnd`."""
+    @override
+    def write(self, rims: Rims, *, now: float) -> None:
         for index, rim in zip((self._left, self._right), rims, strict=True):
             self.core.write(index, rim.to_bytes(2, "big", signed=True))
 
@@ -42,8 +44,8 @@ class RspLocal:
         self._waiting.append(bytes([self._number % 256]))
         self._number += 1
 
+    @override
     def receive(self, data: bytes, *, now: float) -> None:
-        """See `LocalEnd`."""
         self.core.receive(data, now=now)
         for output in self.core.take():
             if isinstance(output, Told) and output.index == self._position:
@@ -51,8 +53,8 @@ class RspLocal:
                 x, y, theta = self._sensor.format.unpack(output.payload)
                 self.seen = ReportedPosition(scale * x, scale * y, scale * theta)
 
+    @override
     def to_send(self, *, now: float) -> list[bytes]:
-        """See `LocalEnd`."""
         if self.core.state is LocalState.OPEN:
             for values in self._waiting:
                 self.core.command(self._fire, values)
@@ -60,7 +62,7 @@ class RspLocal:
         return self.core.to_send(now=now)
 
 
-class RspRobot:
+class RspRobot(RobotEnd):
     """The robot's end."""
 
     def __init__(self, model: RobotModel, random_bytes: Callable[[int], bytes], config: RobotConfig) -> None:
@@ -73,29 +75,29 @@ class RspRobot:
         self._sensor = sensor
         self._commands: list[int] = []
 
+    @override
     def receive(self, data: bytes, *, now: float) -> None:
-        """See `RobotEnd`."""
         self.core.receive(data, _ADDRESS, now=now)
 
+    @override
     def drive(self, *, now: float) -> Rims:
-        """See `RobotEnd`."""
         self.core.effectors(now=now)
         self._commands += [output.id for output in self.core.take() if isinstance(output, Commanded)]
         left, right = (self.core.motion.given(index)[0] for index in (self._left, self._right))
         return int(left), int(right)
 
+    @override
     def fired(self) -> list[int]:
-        """See `RobotEnd`."""
         found, self._commands = self._commands, []
         return found
 
+    @override
     def measure(self, position: ReportedPosition) -> None:
-        """See `RobotEnd`."""
         raw = (round(value / self._sensor.scale) for value in position)
         self.core.measure(self._position, self._sensor.format.pack(*raw))
 
+    @override
     def to_send(self, *, now: float) -> list[bytes]:
-        """See `RobotEnd`."""
         return [data for data, _ in self.core.to_send(now=now)]
 
     @property

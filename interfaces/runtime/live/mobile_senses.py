@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.teleop.architectures import PositionSource
 from interfaces.teleop.driving import JourneyPilot
@@ -36,12 +37,12 @@ class NavigatorPilot(JourneyPilot):
         self._ahead = BodyNavigator(body, period)
         super().__init__(self._ahead.navigator.journey, lambda: body.time)
 
+    @override
     def go(self, goal: Goal, posture: Posture) -> None:
-        """See `Pilot`."""
         self._ahead.navigator.go(goal, posture, now=self._clock())
 
+    @override
     def drive(self, posture: Posture, before: Drive) -> Drive:
-        """See `Pilot`."""
         drive = self._ahead.drive(posture, v_before=before.v)
         return drive if self.state in GOING else STAND
 

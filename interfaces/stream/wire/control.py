@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control
@@ -65,9 +66,9 @@ class LeaseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="lease")
     ended: LeaseEnd | None = None
     shared: bool = False
 
+    @override
     @classmethod
-    def of(cls, value: control.Lease, packed: bool) -> LeaseWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: control.Lease, packed: bool) -> LeaseWire:
         number = None if value.epoch is None else str(value.epoch)
         return cls(value.state, number, value.holder, value.yours, value.answers, value.ended, value.shared)
 
@@ -117,9 +118,9 @@ class WelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="welco
     instance: Word = ""
     server: Word = ""
 
+    @override
     @classmethod
     def of(cls, value: control.Welcome, packed: bool) -> WelcomeWire:
-        """See `Message.of`."""
         return cls(
             value.protocol,
             value.session,
@@ -243,9 +244,9 @@ class HoldersWire(Message, frozen=True, omit_defaults=True, gc=False):
     number: Number
     epoch: Epoch
 
+    @override
     @classmethod
-    def of(cls, value: control.Release | control.Resume, packed: bool) -> HoldersWire:  # noqa: ARG003 - see there
-        """See `Message.of`."""
+    def of(cls, value: control.Release | control.Resume, packed: bool) -> HoldersWire:
         return cls(value.number, str(value.epoch))
 
 
@@ -270,9 +271,9 @@ class BeatWire(Message, frozen=True, omit_defaults=True, gc=False, tag="beat"):
 
     epoch: Epoch
 
+    @override
     @classmethod
-    def of(cls, value: control.Beat, packed: bool) -> BeatWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: control.Beat, packed: bool) -> BeatWire:
         return cls(str(value.epoch))
 
     def read(self) -> control.Beat:
@@ -288,9 +289,9 @@ class ProblemWire(Message, frozen=True, omit_defaults=True, gc=False, tag="probl
     number: Number | None = None
     fatal: bool = False
 
+    @override
     @classmethod
-    def of(cls, value: control.Problem, packed: bool) -> ProblemWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: control.Problem, packed: bool) -> ProblemWire:
         return cls(value.code, text(value.text), value.number, value.fatal)
 
     def read(self) -> control.Problem:
@@ -317,9 +318,9 @@ class StateWire(Message, frozen=True, omit_defaults=True, gc=False, tag="state")
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
     late: Annotated[tuple[tuple[Time, Joints], ...], Meta(max_length=MOST_LATE)] = ()
 
+    @override
     @classmethod
-    def of(cls, value: control.State, packed: bool) -> StateWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: control.State, packed: bool) -> StateWire:
         where = value.play, value.pace, value.D, value.following_error
         rest = digits(value.epoch), value.connected, text(value.halted), value.corrections
         reference = None if value.reference is None else numbers(value.reference)

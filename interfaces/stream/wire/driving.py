@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.stream import mobile
 from interfaces.stream.control import Role
@@ -88,9 +89,9 @@ class MobileWelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag=
     server: Word = ""
     room: Word = ""
 
+    @override
     @classmethod
     def of(cls, value: mobile.MobileWelcome, packed: bool) -> MobileWelcomeWire:
-        """See `Message.of`."""
         return cls(
             value.protocol, value.session, value.role, value.robot, DriveLimitsWire.of(value.limits), value.period,
             value.holds, value.now, LeaseWire.of(value.lease, packed), value.lease_timeout, value.resumed,
@@ -128,9 +129,9 @@ class PosturesWire(Message, frozen=True, omit_defaults=True, gc=False, tag="post
     round_trip: Value | None = None
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
 
+    @override
     @classmethod
-    def of(cls, value: mobile.Postures, packed: bool) -> PosturesWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: mobile.Postures, packed: bool) -> PosturesWire:
         return cls(
             value.number, value.now, value.virtual, value.command, value.estimate, value.t, value.real, value.drive,
             value.D, value.starved, value.path_error, value.time_difference, digits(value.epoch), value.connected,
@@ -161,9 +162,9 @@ class DriveOrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
     tail: Arcs = ()
     errands: Annotated[tuple[ErrandForm, ...], Meta(max_length=16)] = ()
 
+    @override
     @classmethod
-    def of(cls, value: DriveOrders, packed: bool) -> DriveOrdersWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: DriveOrders, packed: bool) -> DriveOrdersWire:
         packet = value.packet
         runs = tuple((first, _rows(arcs)) for first, arcs in packet.runs)
         errands = tuple(ErrandForm.of(errand) for errand in value.errands)
@@ -229,9 +230,9 @@ class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="d
     tasks: TaskReportForm | None = None
     sight: SightForm | None = None
 
+    @override
     @classmethod
-    def of(cls, value: DriveReport, packed: bool) -> DriveReportWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: DriveReport, packed: bool) -> DriveReportWire:
         report = None if value.report is None else FollowedWire.of(value.report)
         where = value.sent_at, value.measured_at, value.posture, value.drive, value.echo
         why = text(value.halted), text(value.refused)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.link.gauge import LinkFigures
 from interfaces.stream import network
@@ -49,9 +50,9 @@ class ImpairWire(Message, frozen=True, omit_defaults=True, gc=False, tag="impair
     forward: WayWire | None = None
     backward: WayWire | None = None
 
+    @override
     @classmethod
-    def of(cls, value: network.Impair, packed: bool) -> ImpairWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: network.Impair, packed: bool) -> ImpairWire:
         there, back = (None if way is None else WayWire.of(way) for way in (value.forward, value.backward))
         return cls(value.number, str(value.epoch), there, back)
 
@@ -101,9 +102,9 @@ class NetworkWire(Message, frozen=True, omit_defaults=True, gc=False, tag="netwo
     advice: Text = ""
     answers: Number | None = None
 
+    @override
     @classmethod
-    def of(cls, value: network.Network, packed: bool) -> NetworkWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: network.Network, packed: bool) -> NetworkWire:
         there, back, trip = (MeasuredWire.of(found) for found in (value.there, value.back, value.round_trip))
         return cls(
             WayWire.of(value.forward), WayWire.of(value.backward), there, back, trip, value.seed, value.changed_at,

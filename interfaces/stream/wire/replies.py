@@ -6,6 +6,7 @@ import math
 from typing import Annotated, Generic
 
 from msgspec import UNSET, Meta, UnsetType
+from typing_extensions import override
 
 from interfaces.messages import (
     Answer,
@@ -34,9 +35,9 @@ class OutcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="outco
     refusal: Text = ""
     revision: Count = 0
 
+    @override
     @classmethod
-    def of(cls, value: Outcome, packed: bool) -> OutcomeWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: Outcome, packed: bool) -> OutcomeWire:
         receipt = None if value.receipt is None else ReceiptWire.of(value.receipt)
         return cls(value.number, value.made_at, receipt, text(value.refusal), value.revision)
 
@@ -57,9 +58,9 @@ class AnswerWire(Message, frozen=True, omit_defaults=True, gc=False, tag="answer
     now: Time
     falsified_by: CommandId | None = None
 
+    @override
     @classmethod
-    def of(cls, value: Answer, packed: bool) -> AnswerWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: Answer, packed: bool) -> AnswerWire:
         frame = value.frame
         q, status = numbers(frame.q), frame.status
         return cls(frame.number, frame.t, frame.made_at, q, status, value.now, frame.falsified_by)
@@ -86,9 +87,9 @@ class BroadcastWire(Message, frozen=True, omit_defaults=True, gc=False, tag="bro
     falsified_by: CommandId | None = None
     falsified: Annotated[tuple[Range, ...], Meta(max_length=256)] = ()
 
+    @override
     @classmethod
-    def of(cls, value: Broadcast, packed: bool) -> BroadcastWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: Broadcast, packed: bool) -> BroadcastWire:
         frame, verdicts = value.frame, value.verdicts
         return cls(
             frame.number,
@@ -136,9 +137,9 @@ class HistoryWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False
     start: Time = 0.0
     segments: Segments[C] = ()
 
+    @override
     @classmethod
     def of(cls, value: History, packed: bool) -> HistoryWire[C]:
-        """See `Message.of`."""
         return cls(value.edit, value.index, *rows(value.segments, packed))
 
     def read(self) -> History:
@@ -160,9 +161,9 @@ class ChangeWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
     start: Time = 0.0
     segments: Segments[C] = ()
 
+    @override
     @classmethod
     def of(cls, value: Change, packed: bool) -> ChangeWire[C]:
-        """See `Message.of`."""
         base = None if value.base == value.edit - 1 else value.base
         tail_start = None if value.tail_start == value.end else value.tail_start
         known = value.edit, value.first, value.end, value.command_id, base, value.tail, tail_start
@@ -183,9 +184,9 @@ class PulseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="pulse")
     now: Time
     past: Time | UnsetType | None = UNSET
 
+    @override
     @classmethod
-    def of(cls, value: Pulse, packed: bool) -> PulseWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: Pulse, packed: bool) -> PulseWire:
         past = UNSET if value.past == value.now else None if value.past == -math.inf else value.past
         return cls(value.edit, value.now, past)
 

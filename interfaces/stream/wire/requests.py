@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.messages import Ask, Follow, Order, ViewForm, Want
 from interfaces.wire.commands import CommandWire, command_wire
@@ -20,9 +21,9 @@ class OrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="order")
     command: CommandWire | None = None
     epoch: Epoch | None = None
 
+    @override
     @classmethod
     def of(cls, value: Order, packed: bool) -> OrderWire:
-        """See `Message.of`."""
         return cls(value.number, command_wire(value.command, packed), digits(value.epoch))
 
     def read(self) -> Order:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Generic
 
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
 from interfaces.teleop.measured import AGAIN, NEW, RANGES, Sample
@@ -65,9 +66,9 @@ class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders
     wanted: Annotated[tuple[tuple[Number, Number], ...], Meta(max_length=RANGES)] = ()
     halted: Text = ""
 
+    @override
     @classmethod
     def of(cls, value: Orders, packed: bool) -> OrdersWire:
-        """See `Message.of`."""
         times = value.newest, value.complete_until, value.epoch_began
         entries = tuple(EntryWire.of(entry, packed) for entry in value.entries)
         own, halted = (str(value.epoch), value.number, value.sent_at), text(value.halted)
@@ -144,9 +145,9 @@ class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
     samples: Annotated[tuple[SampleWire, ...], Meta(max_length=NEW + AGAIN)] = ()
     oldest: Count = 0
 
+    @override
     @classmethod
     def of(cls, value: Report, packed: bool) -> ReportWire[C]:
-        """See `Message.of`."""
         return cls(
             str(value.epoch),
             value.number,

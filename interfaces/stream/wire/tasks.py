@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from msgspec import Meta
+from typing_extensions import override
 
 from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.forms import GoalForm, JobListForm, ProgressForm
@@ -155,9 +156,9 @@ class TaskOrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="tas
     task: TaskForm
     epoch: Epoch | None = None
 
+    @override
     @classmethod
-    def of(cls, value: tasks.TaskOrder, packed: bool) -> TaskOrderWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: tasks.TaskOrder, packed: bool) -> TaskOrderWire:
         return cls(value.number, TaskForm.of(value.wanted), digits(value.epoch))
 
     def read(self) -> tasks.TaskOrder:
@@ -204,9 +205,9 @@ class TasksWire(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks")
     problem: Text = ""
     answers: Count | None = None
 
+    @override
     @classmethod
-    def of(cls, value: tasks.Tasks, packed: bool) -> TasksWire:  # noqa: ARG003 - the same in both encodings
-        """See `Message.of`."""
+    def of(cls, value: tasks.Tasks, packed: bool) -> TasksWire:
         goal = None if value.goal is None else GoalForm.of(value.goal)
         way = text(value.reason), goal, value.route[:MOST_POINTS], value.left or None
         forms = None

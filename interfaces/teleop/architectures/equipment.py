@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.teleop.architectures.controllers import DriveController, FollowingController
 from interfaces.teleop.architectures.sites import PositionSource
-from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings, Sonar
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
@@ -40,15 +41,15 @@ MARGIN = 0.02
 """Of the virtual robot's circle round the real one's outline [m]."""
 
 
-class BodySonar:
+class BodySonar(Sonar):
     """A real robot's sonars."""
 
     def __init__(self, body: MobileRobot, since: float = 0.0) -> None:
         """Take the robot; times count from `since` [s] of its own."""
         self._body, self._since = body, since
 
+    @override
     def scan(self) -> tuple[float, Sequence[float]] | None:
-        """See `interfaces.teleop.architectures.surroundings.Sonar`."""
         scan = self._body.sonar
         return None if scan is None else (scan.time - self._since, scan.ranges.tolist())
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from typing_extensions import override
+
 from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
 from robots.onboard.routes import Point
@@ -43,7 +45,7 @@ class Pilot(Protocol):
         """What to drive in the next period, after what was driven before."""
 
 
-class JourneyPilot:
+class JourneyPilot(Pilot):
     """A journey by the map alone."""
 
     def __init__(self, journey: Journey, clock: Callable[[], float]) -> None:
@@ -56,40 +58,40 @@ class JourneyPilot:
         self._journey, self._clock = journey, clock
 
     @property
+    @override
     def state(self) -> JourneyState:
-        """See `Pilot`."""
         return self._journey.state
 
     @property
+    @override
     def reason(self) -> str:
-        """See `Pilot`."""
         return self._journey.reason
 
     @property
+    @override
     def goal(self) -> Goal | None:
-        """See `Pilot`."""
         return self._journey.goal
 
     @property
+    @override
     def route(self) -> tuple[Point, ...]:
-        """See `Pilot`."""
         route = self._journey.route
         return () if route is None else route.points
 
     @property
+    @override
     def left(self) -> float:
-        """See `Pilot`."""
         return self._journey.way_left
 
+    @override
     def go(self, goal: Goal, posture: Posture) -> None:
-        """See `Pilot`."""
         self._journey.go(goal, posture, now=self._clock())
 
+    @override
     def end(self) -> None:
-        """See `Pilot`."""
         self._journey.end()
 
+    @override
     def drive(self, posture: Posture, before: Drive) -> Drive:
-        """See `Pilot`."""
         drive = self._journey.control(posture, now=self._clock(), v_before=before.v)
         return drive if self.state in GOING else STAND
