@@ -299,7 +299,7 @@ def private_uses(home):
 
 def test_tests_use_no_more_private_names_than_before():
     found = list(private_uses(HOME))
-    assert len(found) == PRIVATE_USES, "\n".join(found)
+    assert len(found) <= PRIVATE_USES, "\n".join(found)
 
 
 @pytest.mark.parametrize(
