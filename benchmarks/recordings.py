@@ -23,7 +23,6 @@ import numpy as np
 import uvloop
 
 from interfaces import connect
-from interfaces.children import module_process
 from interfaces.recording.recording import open_recording
 from interfaces.recording.track import REAL
 from interfaces.runtime.feeder import Feeder
@@ -35,6 +34,7 @@ from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.control import Role
 from interfaces.stream.server import application
+from interfaces.system import module_process
 from interfaces.teleop import RobotHostConfig, RobotSiteConfig
 from robots import puma560
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand

@@ -19,7 +19,7 @@ import numpy as np
 import psutil
 import uvloop
 
-from interfaces.site import Site
+from interfaces.engine_server.site import Site
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.limits import ClientLimits

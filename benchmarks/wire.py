@@ -14,9 +14,9 @@ import umsgpack
 from benchmarks.moves import MODEL
 from benchmarks.results import Bar, Cost, Part, Result
 from interfaces import messages as m
-from interfaces.mirror import Mirror
-from interfaces.ports import RemotePort
-from interfaces.site import Site
+from interfaces.clients.ports import RemotePort
+from interfaces.clients.viewer_sources import Mirror
+from interfaces.engine_server.site import Site
 from interfaces.stream import Encoding, decode, encode
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, PolynomialSegment
 from vrs.model import Array

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from interfaces import Supervisor, Viewer
+from interfaces.clients.ports import MemoryTransport, RemotePort
+from interfaces.engine_server.site import Site, drive
 from interfaces.link import Channel, ConstantDelay
 from interfaces.messages import FrameStatus, ViewForm
-from interfaces.ports import MemoryTransport, RemotePort
-from interfaces.site import Site, drive
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 

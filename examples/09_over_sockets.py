@@ -9,8 +9,8 @@ from queue import Queue
 import numpy as np
 
 from interfaces import connect
+from interfaces.engine_server.site import Site
 from interfaces.messages import ViewForm
-from interfaces.site import Site
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.hub import Hub
 from interfaces.stream.server import HubServer, application

@@ -1,9 +1,9 @@
 """Everything that joins a person or a machine to a robot."""
 
+from interfaces.clients.designer import Designer
+from interfaces.clients.observer import Observer
+from interfaces.clients.supervisor import Supervisor
+from interfaces.clients.viewer import Viewer
 from interfaces.connecting import connect, connect_mobile
-from interfaces.designer import Designer
-from interfaces.observer import Observer
-from interfaces.supervisor import Supervisor
-from interfaces.viewer import Viewer
 
 __all__ = ["Designer", "Observer", "Supervisor", "Viewer", "connect", "connect_mobile"]

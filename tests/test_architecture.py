@@ -23,17 +23,11 @@ ORDER = (
     "robots.solids", "robots.text_files", "robots.bullet", "robots.onboard",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
-    "interfaces.files", "interfaces.software", "interfaces.children", "interfaces.timer", "interfaces.plugin",
-    "interfaces.playhead", "interfaces.messages", "interfaces.wire",
+    "interfaces.system", "interfaces.timer", "interfaces.messages", "interfaces.wire",
     # The network; what is asked of a personal robot.
     "interfaces.link", "interfaces.middleware", "interfaces.jobs",
-    # What an engine's clients reach it through; both sites; what a run is.
-    "interfaces.changes", "interfaces.journal", "interfaces.forecasts", "interfaces.broadcast",
-    "interfaces.ordering", "interfaces.resending", "interfaces.servlet", "interfaces.site", "interfaces.ports",
-    "interfaces.teleop", "interfaces.runs",
-    # The clients.
-    "interfaces.designer", "interfaces.observer", "interfaces.supervisor", "interfaces.mirror",
-    "interfaces.sources", "interfaces.viewer", "interfaces.view_parts",
+    # What serves an engine, and its clients; both sites; what a run is.
+    "interfaces.engine_server", "interfaces.clients", "interfaces.teleop", "interfaces.runs",
     # Server and protocols; recordings; both drivers, and the door.
     "interfaces.stream", "interfaces.rsp", "interfaces.recording", "interfaces.media", "interfaces.runtime",
     "interfaces.connecting", "interfaces",

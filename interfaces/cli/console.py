@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.software import software
+from interfaces.system import software
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:

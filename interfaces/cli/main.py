@@ -27,7 +27,7 @@ from interfaces.cli.robot import robot
 from interfaces.cli.rsp import rsp
 from interfaces.cli.run import run
 from interfaces.cli.serve import serve
-from interfaces.software import software
+from interfaces.system import software
 from vrs.errors import VrsError
 
 # Typer exports only one of its usage errors; the class above it is the root of all of them.

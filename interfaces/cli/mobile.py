@@ -24,7 +24,7 @@ from interfaces.cli.doors import (
     saying_policy,
     start_robot,
 )
-from interfaces.software import software
+from interfaces.system import software
 from vrs.checks import number_in, one_of
 from vrs.errors import FormatError, InvalidValueError
 

@@ -33,7 +33,7 @@ from interfaces.cli.mobile import (
     run_mobile,
     without,
 )
-from interfaces.software import software
+from interfaces.system import software
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 

@@ -21,7 +21,7 @@ from interfaces.cli.demo import (
     write,
 )
 from interfaces.cli.options import Delay, Offset, Order, Out
-from interfaces.files import read_within
+from interfaces.system import read_within
 
 if TYPE_CHECKING:
     from interfaces.val2.source import SourceFile

@@ -44,7 +44,7 @@ from interfaces.cli.mobile import (
     without,
 )
 from interfaces.cli.options import PROFILES, Host, Port
-from interfaces.software import software
+from interfaces.system import software
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 

@@ -8,10 +8,10 @@ from typing import Final, Literal
 
 import msgspec
 
-from interfaces.files import read_within, write_whole
 from interfaces.jobs.forms import JobListForm, ProgressForm
 from interfaces.jobs.progress import Progress
 from interfaces.jobs.values import JobList
+from interfaces.system import read_within, write_whole
 from vrs.errors import FormatError, InvalidValueError
 
 SCHEMA: Final = "vrs.jobs"

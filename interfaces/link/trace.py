@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from interfaces.files import read_within
 from interfaces.link.delay import MAX_DELAY, DelaySource, share_of
+from interfaces.system import read_within
 from vrs.checks import number_in
 from vrs.errors import FormatError, InvalidValueError
 

@@ -10,8 +10,8 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.children import module_process
 from interfaces.media.messages import HEAD, News, Order, Ready, Setup, Shot, Taken, decode_news, encode, size_of
+from interfaces.system import module_process
 from robots.bullet.rooms import Room
 from robots.ipr.camera import Lens, PanTilt, PanTiltConfig
 from vrs.checks import number_in

@@ -18,8 +18,8 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.files import read_within
 from interfaces.middleware.performance import tolerance
+from interfaces.system import read_within
 from vrs.checks import finite, validated, within
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array

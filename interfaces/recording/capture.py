@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from interfaces.changes import difference
+from interfaces.engine_server.journal import difference
 from interfaces.link import PacketRecord
 from interfaces.recording.channels import Message
 from interfaces.recording.messages import (

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
-from interfaces.playhead import Mode
+from interfaces.clients.playhead import Mode
 from interfaces.recording.marks import Mark
 from interfaces.recording.playback import Playback, PlaybackFrame, PlaybackMoment
 from vrs.clock import Clock

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from interfaces.changes import changed
+from interfaces.engine_server.journal import changed
 from interfaces.messages import Change
 from interfaces.recording.driving import arcs
 from interfaces.recording.driving.messages import ArcChange, ArcHistory

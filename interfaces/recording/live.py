@@ -18,7 +18,7 @@ from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transfo
 from interfaces.recording.recorder import Recorder
 from interfaces.recording.sink import Sink
 from interfaces.runs.events import correction_events
-from interfaces.software import software
+from interfaces.system import software
 from interfaces.teleop import CommandRecord, Correction, Report, RobotLine, Sample
 from interfaces.teleop.measured import PERIOD
 from interfaces.wire import fields

@@ -14,7 +14,7 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
-from interfaces.playhead import Mode
+from interfaces.clients.playhead import Mode
 from interfaces.recording.kinds import shows
 from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack

@@ -11,7 +11,7 @@ from typing import Final, Protocol, TypeVar
 import numpy as np
 from typing_extensions import override
 
-from interfaces.playhead import LiveEdge, Mode, PlayHead
+from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
 from interfaces.recording.driving.pursuit import Pursuit
 from interfaces.recording.kinds import ARM
 from interfaces.recording.marks import Mark, MarkReader

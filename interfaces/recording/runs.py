@@ -20,7 +20,7 @@ from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.attribution import CAUSES, Attribution, Measures, OffsetOutcome
 from interfaces.runs.keeper import RunFacts, Turn
 from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun
-from interfaces.software import software
+from interfaces.system import software
 from interfaces.teleop import OperatorSite
 from interfaces.wire.fields import text
 from vrs.commands import Lateness

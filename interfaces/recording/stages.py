@@ -6,6 +6,7 @@ from typing import Protocol
 
 from typing_extensions import override
 
+from interfaces.clients.appearance import link_shapes
 from interfaces.recording.driving.stage import DriveStage
 from interfaces.recording.engines import mobile_model
 from interfaces.recording.kinds import ARM
@@ -13,7 +14,6 @@ from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.twins import TwinScene
-from interfaces.view_parts import link_shapes
 
 
 class Stage(Protocol):

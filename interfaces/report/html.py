@@ -11,11 +11,11 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from interfaces.clients.appearance import viewer_bundle
 from interfaces.report.markup import card, figures, receipts, table, tiles, words
 from interfaces.report.plots import Plot, plots
 from interfaces.report.scene import scene
 from interfaces.runs.twin_run import TwinRun
-from interfaces.view_parts import viewer_bundle
 
 
 def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from interfaces.clients.appearance import link_shapes
 from interfaces.runs.twin_run import TwinRun
-from interfaces.view_parts import link_shapes
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 

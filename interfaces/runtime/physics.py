@@ -14,7 +14,6 @@ from typing import Annotated, Self, TypeAlias
 
 import numpy as np
 
-from interfaces.children import module_process
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     ROWS_MOST,
@@ -32,6 +31,7 @@ from interfaces.runtime.physics_messages import (
     decode_news,
     encode,
 )
+from interfaces.system import module_process
 from interfaces.teleop import JointReference
 from vrs.checks import number_in, validated, within
 from vrs.clock import WallClock

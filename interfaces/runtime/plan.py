@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 import msgspec
 import numpy as np
 
-from interfaces.files import read_within
+from interfaces.system import read_within
 from vrs.checks import one_of
 from vrs.commands import (
     Insertion,

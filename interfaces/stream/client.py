@@ -9,10 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias
 
+from interfaces.clients.ports import RemotePort
+from interfaces.engine_server.site import earliest
 from interfaces.link.clock_sync import ClockSync
 from interfaces.link.round_trip import Ping, Pong, RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request
-from interfaces.ports import RemotePort, earliest
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
 from interfaces.stream.control import Notice, ProblemCode, Role

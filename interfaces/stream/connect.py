@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from interfaces.clients.viewer import ShownFrame
 from interfaces.messages import ViewForm
 from interfaces.stream.client import ClientCore
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Role, State, Welcome
 from interfaces.stream.joining import RobotConnection
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
-from interfaces.viewer import ShownFrame
 
 
 class Connection(RobotConnection[ClientCore]):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
+from interfaces.link.delivery import OrderBook
 from interfaces.messages import Order, Outcome, Request
-from interfaces.ordering import OrderBook
 from interfaces.stream.codec import Value
 from interfaces.stream.control import Problem, ProblemCode
 from interfaces.stream.hosted import Greeting

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-from interfaces.broadcast import Broadcaster
+from interfaces.engine_server.broadcast import Broadcaster
+from interfaces.engine_server.site import Site
 from interfaces.messages import Order
-from interfaces.site import Site
 from interfaces.stream import control
 from interfaces.stream.session import Served, Welcome
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from interfaces.ports import earliest
+from interfaces.engine_server.site import earliest
 from interfaces.stream import control
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
+from interfaces.clients.ports import EnginePort
 from interfaces.link.clock_sync import ClockEstimate
-from interfaces.ports import EnginePort
 from interfaces.stream import control
 from interfaces.stream.client import Ask, ClientCore, Replied
 from interfaces.stream.codec import Encoding

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Protocol
 
-from interfaces.ports import earliest
+from interfaces.engine_server.site import earliest
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from interfaces.designer import Issued
+from interfaces.clients.designer import Issued
 from interfaces.jobs import Forecast, JobList, ListCommand, Load
 from interfaces.stream.client import Replied
 from interfaces.stream.codec import Encoding

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, TypeVar
 
-from interfaces.designer import Designer, Issued
+from interfaces.clients.designer import Designer, Issued
+from interfaces.clients.observer import Observation, Observer
+from interfaces.clients.playhead import Mode
+from interfaces.clients.ports import EnginePort
+from interfaces.clients.viewer import ShownFrame, Viewer
 from interfaces.messages import Scene, ViewForm
-from interfaces.observer import Observation, Observer
-from interfaces.playhead import Mode
-from interfaces.ports import EnginePort
-from interfaces.viewer import ShownFrame, Viewer
 from vrs.commands import Command
 from vrs.timeline import Timeline
 

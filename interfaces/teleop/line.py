@@ -8,10 +8,10 @@ from typing import Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
+from interfaces.engine_server.site import earliest
 from interfaces.link import Gauge, Link, LinkConditions
 from interfaces.link.packets import PacketRecord
 from interfaces.link.round_trip import Ping, Pong
-from interfaces.ports import earliest
 from interfaces.teleop.messages import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 

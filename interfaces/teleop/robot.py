@@ -17,7 +17,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from interfaces.site import engine_time
+from interfaces.engine_server.site import engine_time
 from interfaces.teleop.hosting import lost
 from interfaces.teleop.measured import SampleLog
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from interfaces.clients.ports import LocalPort, MemoryTransport
+from interfaces.engine_server.site import Site, drive
 from interfaces.link import BernoulliLoss, Channel, Conditions, ConstantDelay, GammaDelay, Service
-from interfaces.ports import LocalPort, MemoryTransport
-from interfaces.site import Site, drive
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 

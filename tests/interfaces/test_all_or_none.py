@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.engine_server.site import Site
 from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.link.delivery import FAILED
 from interfaces.messages import Order, Outcome
-from interfaces.ordering import FAILED
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.site import Site
 from interfaces.teleop import CommandRecord, Correction, OperatorSite, Report, RobotSite, Sample
 from robots import puma560
 from vrs import (
@@ -51,7 +51,7 @@ B = np.array([0.5, 0.6, -2.0, 0.3, 0.4, 0.6])
 ERRORS = {kind.__name__: kind for kind in (PlanningError, UnknownCommandError, UnreachablePoseError)}
 GUARD = {
     ("operator.py", "_inform"),
-    ("ordering.py", "_settle"),
+    ("delivery.py", "_settle"),
     ("receipt.py", "shifted"),
     ("receipt.py", "superseded"),
 }

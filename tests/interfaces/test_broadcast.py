@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from interfaces import Designer, Viewer
-from interfaces.broadcast import RANGES, Broadcaster, ranges, status_of
+from interfaces.engine_server.broadcast import RANGES, Broadcaster, ranges, status_of
 from interfaces.messages import FrameStatus, FrameVerdict, ViewForm
 from tests.interfaces.joined import HOME, MODEL, Joined, constant, to
 from vrs import Engine, ManualClock

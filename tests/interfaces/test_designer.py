@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from interfaces import Designer, Supervisor
+from interfaces.clients.ports import RemotePort
+from interfaces.engine_server.servlet import Servlet
+from interfaces.link.delivery import OVERTAKEN
 from interfaces.messages import Order, Outcome
-from interfaces.ordering import OVERTAKEN
-from interfaces.ports import RemotePort
-from interfaces.servlet import Servlet
 from tests.interfaces.joined import MODEL, Joined, bad, constant, place, to
 from vrs import (
     Cancel,

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
+from interfaces.engine_server.site import Site
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.messages import Order, Request
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.site import Site
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from robots import puma560

@@ -8,12 +8,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from interfaces import Designer, Observer, Supervisor
-from interfaces.forecasts import Forecasts
-from interfaces.journal import Journal
+from interfaces.clients.observer import PENDING
+from interfaces.clients.ports import RemotePort
+from interfaces.engine_server.forecasts import Forecasts
+from interfaces.engine_server.journal import Journal
+from interfaces.engine_server.site import Site, drive, engine_time
 from interfaces.messages import Answer, Frame, FrameStatus
-from interfaces.observer import PENDING
-from interfaces.ports import RemotePort
-from interfaces.site import Site, drive, engine_time
 from tests.interfaces.joined import HOME, MODEL, Joined, bad, constant, place, to
 from tests.memory import values_held
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Stop

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.playhead import LiveEdge, Mode, PlayHead
+from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
 from vrs.errors import InvalidValueError
 
 

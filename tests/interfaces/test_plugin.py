@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 from interfaces.cli.main import app
 from interfaces.lab.driving.operators import operator
 from interfaces.lab.driving.run import run
-from interfaces.plugin import is_own
 from interfaces.runs.drive_run import DriveCase
+from interfaces.system import is_own
 from interfaces.teleop.architectures import Constants, controller
 from robots.onboard.driving import STAND, Posture
 from vrs.errors import FormatError, InvalidValueError

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from interfaces.engine_server.site import Site
 from interfaces.messages import Order
-from interfaces.site import Site
 from interfaces.teleop import OperatorSite
 from robots import puma560
 from vrs import JointTarget, MotionCommand

@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from interfaces import Supervisor, Viewer
-from interfaces.changes import changed, difference
+from interfaces.clients.playhead import Mode
+from interfaces.clients.ports import LocalPort, MemoryTransport
+from interfaces.engine_server.journal import changed, difference
 from interfaces.link import Channel
 from interfaces.messages import FrameStatus, ViewForm
-from interfaces.playhead import Mode
-from interfaces.ports import LocalPort, MemoryTransport
 from tests.interfaces.joined import HOME, MODEL, Joined, bad, constant, to
 from vrs import (
     Cancel,

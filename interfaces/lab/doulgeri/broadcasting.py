@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces import Designer, Viewer
-from interfaces.broadcast import Broadcaster
+from interfaces.clients.ports import RemotePort
+from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, target
 from interfaces.lab.drawing import REAL, VIRTUAL, draw
 from interfaces.messages import Broadcast, Reply, ViewForm
-from interfaces.ports import RemotePort
 from vrs import Engine, ManualClock, MotionCommand, WallClock
 
 if TYPE_CHECKING:

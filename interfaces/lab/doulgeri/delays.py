@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 import numpy as np
 
 from interfaces import Designer, Viewer
+from interfaces.clients.ports import RemotePort
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import ScriptedSite, arrivals, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
 from interfaces.messages import Broadcast, FrameStatus, Outcome, Reply, ViewForm
-from interfaces.ports import RemotePort
 from vrs import MotionCommand
 from vrs.checks import one_of
 

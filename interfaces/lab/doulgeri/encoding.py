@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from interfaces.changes import changed
-from interfaces.journal import Journal
+from interfaces.engine_server.journal import Journal, changed
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, arrivals, target, tool
 from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw

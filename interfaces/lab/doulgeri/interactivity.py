@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from interfaces import Designer, Viewer
+from interfaces.clients.playhead import FASTEST, QUICKEST, Mode
+from interfaces.engine_server.site import SitePart
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
 from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.messages import ViewForm
-from interfaces.playhead import FASTEST, QUICKEST, Mode
-from interfaces.site import SitePart
 from vrs import JointTarget, MotionCommand, Timeline
 from vrs.commands import Cancel, Command, InsertVia, Resume, Retime, ScaleTime, Stop
 

@@ -6,10 +6,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from interfaces.clients.ports import MemoryTransport, RemotePort
+from interfaces.engine_server.site import Site, SitePart, drive
 from interfaces.link import Channel, ConstantDelay
-from interfaces.ports import MemoryTransport, RemotePort
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.site import Site, SitePart, drive
 from interfaces.teleop import JointReference
 from robots import puma560
 from robots.onboard.playout import PlayState

@@ -16,7 +16,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from interfaces.lab.driving.legs import GoalLeg, Leg, LineLeg, PauseLeg, TurnLeg, point_ahead, share_of, way_left
-from interfaces.plugin import checked, is_own, own
+from interfaces.system import checked, is_own, own
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import one_of
 from vrs.errors import FormatError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from interfaces.changes import SAME, first_unlike
+from interfaces.engine_server.journal import SAME, first_unlike
 from interfaces.recording.driving.messages import ArcChange, ArcEntry, ArcHistory
 from vrs.errors import InvalidValueError
 from vrs.mobile import ArcPiece, ArcTimeline, wrapped

@@ -25,7 +25,7 @@ from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, plac
 from interfaces.recording.sink import Sink
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
-from interfaces.software import software
+from interfaces.system import software
 from interfaces.teleop import CommandRecord
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.equipment import CONTROL, grid_of

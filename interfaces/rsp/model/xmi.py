@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any, Final
 from xml.parsers import expat
 
-from interfaces.files import read_within
 from interfaces.rsp.model.elements import KINDS, Effector, Element, Filling, Module, Monitor, OnLoss, Scalar
 from interfaces.rsp.model.robot_model import MOST_ELEMENTS, RobotModel
+from interfaces.system import read_within
 from vrs.errors import FormatError, InvalidValueError
 
 LARGEST: Final = 1_048_576

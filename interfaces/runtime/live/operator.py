@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from starlette.routing import BaseRoute
 
+from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN as RECORD
@@ -20,7 +21,6 @@ from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.runtime.live.warm import warm
-from interfaces.site import Site
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached, Role, State
 from interfaces.stream.hub import Hub, HubConfig

@@ -8,7 +8,7 @@ import signal
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable, Sequence
 
-from interfaces.children import module_process
+from interfaces.system import module_process
 from vrs.errors import VrsError
 
 READY = "vrs: robot listens on "

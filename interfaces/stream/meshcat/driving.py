@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from interfaces.clients.appearance import parts_at
 from interfaces.stream.meshcat.commands import set_transform
 from interfaces.stream.meshcat.committed import Committed
 from interfaces.stream.meshcat.meshes import Bodies, bodies, shaded
 from interfaces.stream.meshcat.twins import COLOURS, PATH_PERIOD, ROOT, TwinScene
-from interfaces.view_parts import parts_at
 from vrs.checks import finite_array, number_in
 from vrs.mobile import Grid, MobileModel
 from vrs.model import Array

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.view_parts import link_shapes
+from interfaces.clients.appearance import link_shapes
 from vrs.mobile import MobileModel
 from vrs.model import Array, RobotModel
 

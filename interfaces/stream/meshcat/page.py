@@ -11,10 +11,10 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
+from interfaces.clients.appearance import viewer_bundle
 from interfaces.stream.kept_files import KeptFile
 from interfaces.stream.meshcat.twins import TwinScene
 from interfaces.stream.meshcat.viewers import Viewers
-from interfaces.view_parts import viewer_bundle
 
 HEADERS: Final = {
     "Content-Security-Policy": (

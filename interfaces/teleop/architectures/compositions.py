@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Final, TypeAlias
 
-from interfaces.plugin import checked, is_own, own
+from interfaces.system import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
     DriveController,
     Filtered,

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from interfaces.files import write_whole
+from interfaces.system import write_whole
 from interfaces.val2.errors import ValError
 
 SUFFIX: Final = ".v2"

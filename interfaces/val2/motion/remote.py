@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.designer import Issued
+from interfaces.clients.designer import Issued
 from interfaces.val2.motion.engines import standing
 from interfaces.val2.motion.robot import CommandOutcome
 from vrs.commands import Command, MotionCommand

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from interfaces.changes import difference
+from interfaces.engine_server.journal import difference
 from interfaces.recording.messages import (
     Begin,
     ChangeEntry,

@@ -17,7 +17,7 @@ from interfaces.runs.twin_run import TwinRun
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins
-from interfaces.software import software
+from interfaces.system import software
 from interfaces.teleop import OperatorSite, PlanPart, Report
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand

@@ -18,7 +18,7 @@ from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import REAL
 from interfaces.recording.writer import RecordingWriter
-from interfaces.software import software
+from interfaces.system import software
 from tests.interfaces.live_rig import NOMINAL, READY, operator_here, robot_here, until
 from tests.interfaces.recording.taken import MODEL, Sitting
 from vrs import JointTarget, MotionCommand

@@ -13,7 +13,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from interfaces.playhead import Mode
+from interfaces.clients.playhead import Mode
 from interfaces.recording.page import CELLS, ReplayPage, grouped
 from interfaces.recording.playback import Playback
 from interfaces.recording.recording import open_recording

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.playhead import Mode
+from interfaces.clients.playhead import Mode
 from interfaces.recording.headless import PlaybackFrames
 from interfaces.recording.playback import LAG, Align, Playback
 from interfaces.recording.recording import Recording, open_recording

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from interfaces import messages as m
+from interfaces.engine_server.site import Site
 from interfaces.jobs import (
     ArmJob,
     Forecast,
@@ -32,7 +33,6 @@ from interfaces.jobs import (
 )
 from interfaces.link import ClockSync, LinkFigures, RoundTrip
 from interfaces.link.round_trip import Ping, Pong
-from interfaces.site import Site
 from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
-from interfaces.site import Site
+from interfaces.engine_server.site import Site
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.server import HubServer, application

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from interfaces.designer import Designer
+from interfaces.clients.designer import Designer
+from interfaces.clients.observer import Observer
+from interfaces.clients.viewer import Viewer
 from interfaces.link.round_trip import Pong
 from interfaces.messages import Order, ViewForm
-from interfaces.observer import Observer
 from interfaces.stream import control
 from interfaces.stream.client import FIRST_PONGS, KEPT, UNKNOWN, ClientCore, Phase
 from interfaces.stream.codec import Encoding, encode
 from interfaces.stream.control import ProblemCode, Role
-from interfaces.viewer import Viewer
 from tests.interfaces.joined import to
 from tests.interfaces.stream.joined import Joined
 from tests.interfaces.stream.served import ADMIN

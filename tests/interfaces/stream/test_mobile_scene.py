@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from interfaces.clients.appearance import parts_at
 from interfaces.stream.meshcat import Committed, MobileScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.screen import INK
-from interfaces.view_parts import parts_at
 from robots import ipr
 from robots.ipr.robot import place
 from robots.ipr.shapes import SCREEN_SIZE, screen_pose

@@ -96,7 +96,7 @@ def test_a_timeline_is_made_and_written_once_for_all_who_ask(monkeypatch: pytest
     scenes = [m for peer in viewers for m in peer.tell(Follow(1, ViewForm.SEGMENTS), now=3.0) if m.kind == "scene"]
     edit = scenes[0].edit
     made: list[int] = []
-    from interfaces import journal
+    from interfaces.engine_server import journal
 
     parts = journal.parts
     monkeypatch.setattr(journal, "parts", lambda *given: made.append(given[2]) or parts(*given))

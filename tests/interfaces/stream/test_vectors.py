@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import umsgpack
 
-from interfaces.mirror import Mirror
-from interfaces.ports import RemotePort
+from interfaces.clients.ports import RemotePort
+from interfaces.clients.viewer_sources import Mirror
 from interfaces.stream import Encoding, decode, encode
 from interfaces.stream.codec import TYPES, WIRES
 from tests.interfaces.stream import make_vectors

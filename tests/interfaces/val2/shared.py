@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from interfaces.designer import Designer
+from interfaces.clients.designer import Designer
+from interfaces.clients.viewer import Viewer
 from interfaces.stream import control
 from interfaces.stream.client import Phase
 from interfaces.stream.control import Role
@@ -15,7 +16,6 @@ from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.switchboard import Switchboard
 from interfaces.val2.motion import Arm
 from interfaces.val2.motion.remote import RemoteRobot
-from interfaces.viewer import Viewer
 from tests.interfaces.stream.joined import STEP, Joined
 from tests.interfaces.stream.served import MODEL
 

@@ -9,11 +9,12 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
-from interfaces.forecasts import WINDOW
+from interfaces.clients.playhead import Mode, PlayHead
+from interfaces.clients.ports import EnginePort, port_to
+from interfaces.clients.viewer_sources import FrameSource, SegmentSource
+from interfaces.engine_server.forecasts import WINDOW
+from interfaces.engine_server.site import earliest
 from interfaces.messages import FrameStatus, Reply, Scene, ViewForm
-from interfaces.playhead import Mode, PlayHead
-from interfaces.ports import EnginePort, earliest, port_to
-from interfaces.sources import FrameSource, SegmentSource
 from vrs.commands import finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError

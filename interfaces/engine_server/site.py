@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from interfaces.broadcast import Broadcaster
-from interfaces.journal import Journal
+from interfaces.engine_server.broadcast import Broadcaster
+from interfaces.engine_server.journal import Journal
+from interfaces.engine_server.servlet import Servlet
 from interfaces.messages import Order
-from interfaces.servlet import Servlet
 from vrs.clock import ManualClock
 from vrs.commands import finite
 from vrs.engine import Engine
@@ -27,6 +27,11 @@ class SitePart(Protocol):
 
     def next_deadline(self) -> float | None:
         """When it wants to be called next [s]; None for not before something arrives."""
+
+
+def earliest(*times: float | None) -> float | None:
+    """The earliest of some deadlines [s]; None where there's none."""
+    return min((t for t in times if t is not None), default=None)
 
 
 def engine_time(t_user: float, D: float) -> float:

@@ -10,10 +10,10 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from interfaces.broadcast import DUE, MOST_VIEWERS, Broadcaster, FrameSlot
-from interfaces.changes import MOST_CHANGED
-from interfaces.forecasts import Forecasts
-from interfaces.journal import Journal, portable
+from interfaces.engine_server.broadcast import DUE, MOST_VIEWERS, Broadcaster, FrameSlot
+from interfaces.engine_server.forecasts import Forecasts
+from interfaces.engine_server.journal import MOST_CHANGED, Journal, portable
+from interfaces.link.delivery import REMEMBERED, OrderBook
 from interfaces.messages import (
     Answer,
     Ask,
@@ -30,7 +30,6 @@ from interfaces.messages import (
     ViewForm,
     Want,
 )
-from interfaces.ordering import REMEMBERED, OrderBook
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import frozen_array

@@ -5,10 +5,11 @@ Source: Doulgeri, Zikos, Delopoulos, section III.
 
 from __future__ import annotations
 
-from interfaces.designer import Designer, Issued
+from interfaces.clients.designer import Designer, Issued
+from interfaces.clients.observer import Observation, Observer
+from interfaces.clients.ports import EnginePort, port_to
+from interfaces.engine_server.site import earliest
 from interfaces.messages import Reply
-from interfaces.observer import Observation, Observer
-from interfaces.ports import EnginePort, earliest, port_to
 from vrs.commands import Command
 from vrs.engine import Engine
 

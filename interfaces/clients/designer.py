@@ -9,9 +9,10 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
+from interfaces.clients.ports import EnginePort, port_to
+from interfaces.engine_server.site import earliest
+from interfaces.link.delivery import Resending
 from interfaces.messages import Order, Outcome, Reply
-from interfaces.ports import EnginePort, earliest, port_to
-from interfaces.resending import Resending
 from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop, finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError

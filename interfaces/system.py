@@ -1,15 +1,77 @@
-"""Parts of one's own, named on the command line as `module:name`, the way entry points are spelled."""
+"""What the machine provides: files, processes of our modules, our version, other people's modules by name."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import os
+import secrets
 import sys
 from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from vrs.errors import FormatError, InvalidValueError
+
+
+def read_within(path: Path, most: int) -> bytes:
+    """The bytes of a file.
+
+    Args:
+        path: Where it is.
+        most: How many it may have.
+
+    Raises:
+        FormatError: If it can't be read, or is longer.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+    except OSError as error:
+        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
+    if len(data) > most:
+        raise FormatError(str(path), f"is longer than the {most} bytes allowed")
+    return data
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file, whole or not at all: whoever reads it finds what was there before, or what is there now.
+
+    Args:
+        path: Where to.
+        data: What.
+
+    Raises:
+        OSError: If it can't be written.
+    """
+    draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        with draft.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(draft, path)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            draft.unlink()
+
+
+def software() -> str:
+    """Name and version of this program."""
+    return f"vrs-teleop {metadata.version('vrs-teleop')}"
+
+
+def module_process(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
+    """Command line and environment of a process that runs a module, and imports what this one would.
+
+    Args:
+        module: Its dotted name.
+        arguments: What it's given.
+    """
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    return [sys.executable, "-P", "-m", module, *arguments], os.environ | {"PYTHONPATH": path}
 
 
 def is_own(text: str) -> bool:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import Any, Protocol
 
+from interfaces.engine_server.site import Site, earliest
 from interfaces.messages import Reply, Request
-from interfaces.site import Site
 from vrs.engine import Engine
 
 OUTBOX = 1024
@@ -122,11 +122,6 @@ def port_to(engine: EnginePort | Engine) -> tuple[EnginePort, LocalPort | None]:
         own = LocalPort(engine)
         return own, own
     return engine, None
-
-
-def earliest(*times: float | None) -> float | None:
-    """The earliest of some deadlines [s]; None where there's none."""
-    return min((t for t in times if t is not None), default=None)
 
 
 class LinkDirection(Protocol):

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
-from interfaces.forecasts import WINDOW, Forecasts
-from interfaces.journal import Journal
+from interfaces.engine_server.forecasts import WINDOW, Forecasts
+from interfaces.engine_server.journal import Journal
 from interfaces.messages import Broadcast, Frame, FrameStatus, FrameVerdict, Verdicts
 from vrs.commands import finite
 from vrs.engine import Engine

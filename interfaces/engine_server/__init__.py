@@ -1,0 +1,1 @@
+"""What stands beside an engine and serves its clients: journal, broadcaster, servlet, site."""
