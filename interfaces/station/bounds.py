@@ -15,9 +15,8 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from interfaces.stream.kept_files import HEADERS, POLICY
-from interfaces.stream.limits import Bucket
+from interfaces.stream.limits import Bucket, Strangers
 from interfaces.stream.sockets import let_stay
-from interfaces.stream.strangers import Strangers
 from vrs.checks import validated, within
 
 SOCKET: Final = "/_nicegui_ws/"

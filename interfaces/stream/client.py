@@ -16,10 +16,8 @@ from interfaces.link.round_trip import Ping, Pong, RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
-from interfaces.stream.control import Notice, ProblemCode, Role
-from interfaces.stream.mobile import MobileWelcome
-from interfaces.stream.network import Impair, Network, Survey
-from interfaces.stream.tasks import TaskOrder, Tasks
+from interfaces.stream.control import Impair, Network, Notice, ProblemCode, Role, Survey
+from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 
 FROM_SERVER = 4 * LARGEST
 """Longest message of a server that is read [bytes]."""
@@ -336,3 +334,39 @@ class ClientCore:
         if self.phase in {Phase.LOST, Phase.CLOSED}:
             return None
         return earliest(self._ping_due, self._beat_due, self._heard + SILENCE)
+
+
+class MobileCore(ClientCore):
+    """See `ClientCore`; what it's told of the robot is kept here, the newest of each kind."""
+
+    coming: ClassVar[Any] = (
+        Outcome | control.Welcome | control.Lease | Ping | Pong | control.Problem | Network
+        | MobileWelcome | Postures | Tasks | Seen | Plan
+    )  # fmt: skip
+    postures: Postures | None = None
+    """Where both robots are."""
+    tasks: Tasks | None = None
+    """What the robot does by itself."""
+    seen: Seen | None = None
+    """What it sees."""
+    plan: Plan | None = None
+    """The known map."""
+
+    def _take(self, message: Value, now: float) -> None:
+        """Take what a server says."""
+        if isinstance(message, MobileWelcome):
+            self._begin(message, now)
+        elif isinstance(message, control.Welcome):
+            text = f"the arm {message.robot} is served here, not a mobile robot: use interfaces.connect"
+            self._complain(control.Problem(ProblemCode.REFUSED, text, fatal=True))
+        elif isinstance(message, Postures):
+            self.postures = message
+        elif isinstance(message, Tasks):
+            self.tasks = message
+            self._settle(message.answers, message)
+        elif isinstance(message, Seen):
+            self.seen = message
+        elif isinstance(message, Plan):
+            self.plan = message
+        else:
+            super()._take(message, now)

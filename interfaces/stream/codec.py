@@ -14,13 +14,12 @@ import msgspec
 from interfaces import messages
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.messages import Reply, Request
-from interfaces.stream import control, mobile, network, tasks
-from interfaces.stream.control import Notice, ProblemCode, Question
-from interfaces.stream.errors import ProtocolError
-from interfaces.stream.wire import control as controls
-from interfaces.stream.wire import driving, replies, requests, sites
-from interfaces.stream.wire import network as networks
-from interfaces.stream.wire import tasks as works
+from interfaces.stream import control, mobile
+from interfaces.stream.control import Notice, ProblemCode, ProtocolError, Question
+from interfaces.stream.wire import control as control_wires
+from interfaces.stream.wire import messages as message_wires
+from interfaces.stream.wire import mobile as mobile_wires
+from interfaces.stream.wire import sites
 from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
@@ -38,10 +37,10 @@ Value: TypeAlias = (
     | Notice
     | mobile.MobileWelcome
     | mobile.Postures
-    | tasks.TaskOrder
-    | tasks.Tasks
-    | tasks.Seen
-    | tasks.Plan
+    | mobile.TaskOrder
+    | mobile.Tasks
+    | mobile.Seen
+    | mobile.Plan
     | Orders
     | Report
     | DriveOrders
@@ -51,48 +50,48 @@ Value: TypeAlias = (
 T = TypeVar("T")
 
 WIRES: dict[type, type[Wire]] = {
-    messages.Order: requests.OrderWire,
-    messages.Ask: requests.AskWire,
-    messages.Follow: requests.FollowWire,
-    messages.Want: requests.WantWire,
-    messages.Outcome: replies.OutcomeWire,
-    messages.Answer: replies.AnswerWire,
-    messages.Broadcast: replies.BroadcastWire,
-    messages.Scene: replies.SceneWire,
-    messages.History: replies.HistoryWire,
-    messages.Change: replies.ChangeWire,
-    messages.Pulse: replies.PulseWire,
-    control.Hello: controls.HelloWire,
-    control.Welcome: controls.WelcomeWire,
-    control.Attached: controls.AttachedWire,
-    Ping: controls.PingWire,
-    Pong: controls.PongWire,
-    control.Acquire: controls.AcquireWire,
-    control.TakeOver: controls.TakeOverWire,
-    control.Share: controls.ShareWire,
-    control.Release: controls.ReleaseWire,
-    control.Resume: controls.ResumeWire,
-    control.Beat: controls.BeatWire,
-    control.Lease: controls.LeaseWire,
-    control.Problem: controls.ProblemWire,
-    control.State: controls.StateWire,
-    network.Survey: networks.SurveyWire,
-    network.Impair: networks.ImpairWire,
-    network.Network: networks.NetworkWire,
+    messages.Order: message_wires.OrderWire,
+    messages.Ask: message_wires.AskWire,
+    messages.Follow: message_wires.FollowWire,
+    messages.Want: message_wires.WantWire,
+    messages.Outcome: message_wires.OutcomeWire,
+    messages.Answer: message_wires.AnswerWire,
+    messages.Broadcast: message_wires.BroadcastWire,
+    messages.Scene: message_wires.SceneWire,
+    messages.History: message_wires.HistoryWire,
+    messages.Change: message_wires.ChangeWire,
+    messages.Pulse: message_wires.PulseWire,
+    control.Hello: control_wires.HelloWire,
+    control.Welcome: control_wires.WelcomeWire,
+    control.Attached: control_wires.AttachedWire,
+    Ping: control_wires.PingWire,
+    Pong: control_wires.PongWire,
+    control.Acquire: control_wires.AcquireWire,
+    control.TakeOver: control_wires.TakeOverWire,
+    control.Share: control_wires.ShareWire,
+    control.Release: control_wires.ReleaseWire,
+    control.Resume: control_wires.ResumeWire,
+    control.Beat: control_wires.BeatWire,
+    control.Lease: control_wires.LeaseWire,
+    control.Problem: control_wires.ProblemWire,
+    control.State: control_wires.StateWire,
+    control.Survey: control_wires.SurveyWire,
+    control.Impair: control_wires.ImpairWire,
+    control.Network: control_wires.NetworkWire,
     Orders: sites.OrdersWire,
     Report: sites.ReportWire,
-    mobile.MobileWelcome: driving.MobileWelcomeWire,
-    mobile.Postures: driving.PosturesWire,
-    tasks.TaskOrder: works.TaskOrderWire,
-    tasks.Tasks: works.TasksWire,
-    tasks.Seen: works.SeenWire,
-    tasks.Plan: works.PlanWire,
-    DriveOrders: driving.DriveOrdersWire,
-    DriveReport: driving.DriveReportWire,
+    mobile.MobileWelcome: mobile_wires.MobileWelcomeWire,
+    mobile.Postures: mobile_wires.PosturesWire,
+    mobile.TaskOrder: mobile_wires.TaskOrderWire,
+    mobile.Tasks: mobile_wires.TasksWire,
+    mobile.Seen: mobile_wires.SeenWire,
+    mobile.Plan: mobile_wires.PlanWire,
+    DriveOrders: mobile_wires.DriveOrdersWire,
+    DriveReport: mobile_wires.DriveReportWire,
 }
 """The wire form of each message."""
 ASKED = frozenset(
-    WIRES[kind] for kind in (*get_args(Request), *get_args(Question), tasks.TaskOrder, Pong, Orders, DriveOrders)
+    WIRES[kind] for kind in (*get_args(Request), *get_args(Question), mobile.TaskOrder, Pong, Orders, DriveOrders)
 )
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}

@@ -13,11 +13,11 @@ from interfaces.engine_server.site import earliest
 from interfaces.stream import control
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
-from interfaces.stream.control import PROTOCOL, Problem, ProblemCode, Role
+from interfaces.stream.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import LeasedRobot, Leasing
 from interfaces.stream.limits import Allowances, Bucket, ClientLimits
-from interfaces.stream.network import Impair, Network
+from interfaces.stream.mobile import TaskOrder, Tasks, Wanted
 from interfaces.stream.session import (
     POLICY,
     RESTART,
@@ -29,7 +29,6 @@ from interfaces.stream.session import (
     Welcome,
     Wish,
 )
-from interfaces.stream.tasks import TaskOrder, Tasks, Wanted
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
 

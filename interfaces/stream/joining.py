@@ -12,9 +12,17 @@ from interfaces.link.clock_sync import ClockEstimate
 from interfaces.stream import control
 from interfaces.stream.client import Ask, ClientCore, Replied
 from interfaces.stream.codec import Encoding
-from interfaces.stream.control import Lease, Problem, ProblemCode, Role
+from interfaces.stream.control import (
+    DirectionConditions,
+    Impair,
+    Lease,
+    Network,
+    Problem,
+    ProblemCode,
+    Role,
+    Survey,
+)
 from interfaces.stream.line import ClientPart, Line, UnreachableError, Worker
-from interfaces.stream.network import DirectionConditions, Impair, Network, Survey
 from vrs.clock import WallClock
 
 C = TypeVar("C", bound=ClientCore)

@@ -1,11 +1,15 @@
-"""How much a client may send, and how much may wait for it."""
+"""How much a client may send, how much may wait for it, and how many connections may stay unauthenticated."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Generic, TypeVar
 
-from vrs.checks import validated, within
+from interfaces.stream.codec import Encoding, Value
+from vrs.checks import number_in, validated, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,3 +157,164 @@ class Spending:
     def wait(self, *, commands: bool, now: float) -> float:
         """How long it has to wait before its next message is looked at [s]."""
         return max(allowance.wait(now=now) for allowance in self._counts(commands))
+
+
+C = TypeVar("C", bound=Hashable)
+
+
+class Strangers(Generic[C]):
+    """Connections of one door: which are still unauthenticated, and by when each must have done its next step.
+
+    A new connection always gets in: if there are too many strangers, one of them gives way, the oldest of those
+    whose address has at least its share of the room. Who is known (`know`) never gives way.
+    """
+
+    def __init__(self, most: int) -> None:
+        """Begin with nobody.
+
+        Args:
+            most: Most strangers at a time, 1 to 100,000.
+        """
+        self._most = int(number_in("most", most, 1, 100_000))
+        self._addresses: dict[C, str] = {}
+        """Of each stranger, the oldest first."""
+        self._each: Counter[str] = Counter()
+        self._until: dict[C, float] = {}
+        self.gave_way = 0
+        """Strangers that gave way to newer ones."""
+
+    def __iter__(self) -> Iterator[C]:
+        return iter(tuple(self._addresses))
+
+    def __len__(self) -> int:
+        return len(self._addresses)
+
+    def add(self, connection: C, address: str, *, until: float) -> C | None:
+        """Take a connection; the one that is to be cut off for it, if one is.
+
+        Args:
+            connection: A new one.
+            address: Where it comes from.
+            until: When its next step must be done [s].
+        """
+        gives_way = self._oldest(address) if len(self._addresses) >= self._most else None
+        if gives_way is not None:
+            self.gave_way += 1
+            self.discard(gives_way)
+        self._addresses[connection] = address
+        self._each[address] += 1
+        self._until[connection] = until
+        return gives_way
+
+    def _oldest(self, coming: str) -> C:
+        share = self._most / (len(self._each) + (coming not in self._each))
+        return next(one for one, address in self._addresses.items() if self._each[address] >= share)
+
+    def expect(self, connection: C, *, until: float = math.inf) -> None:
+        """Set when a connection's next step must be done [s]; infinity where nothing is waited for."""
+        if connection in self._until:
+            self._until[connection] = until
+
+    def renew(self, connection: C, *, until: float = math.inf) -> None:
+        """Count a stranger as the newest, for it has done a step; then as `expect`."""
+        address = self._addresses.pop(connection, None)
+        if address is not None:
+            self._addresses[connection] = address
+        self.expect(connection, until=until)
+
+    def know(self, connection: C) -> None:
+        """Note that a connection has shown who it is: it's no stranger any more, and nothing is waited for."""
+        self._forget(connection)
+        self.expect(connection)
+
+    def discard(self, connection: C) -> None:
+        """Note that a connection is gone."""
+        self._forget(connection)
+        self._until.pop(connection, None)
+
+    def _forget(self, connection: C) -> None:
+        address = self._addresses.pop(connection, None)
+        if address is not None:
+            self._each[address] -= 1
+            if not self._each[address]:
+                del self._each[address]
+
+    def overdue(self, now: float) -> list[C]:
+        """The connections that haven't done their step in time; they are to be cut off.
+
+        Args:
+            now: [s].
+        """
+        return [connection for connection, until in self._until.items() if until <= now]
+
+
+BATCH = 16384
+"""Bytes beyond which nothing more is taken at once."""
+
+
+class Outbox:
+    """Messages in their order, and behind them the newest of each kind of which only the newest counts.
+
+    What finds no room is dropped, and counted: the client asks for it again.
+    """
+
+    __slots__ = ("_encode", "_encoding", "_limit", "_newest", "_queue", "_waiting", "dropped", "total")
+
+    def __init__(self, encode: Callable[[Value, Encoding], bytes], encoding: Encoding, limit: int) -> None:
+        """Begin empty.
+
+        Args:
+            encode: Writes a message; that of a `SharedEncoder`, where many clients get the same.
+            encoding: The client's.
+            limit: Bytes that may wait, but for a message that waits alone.
+        """
+        self._encode, self._encoding, self._limit = encode, encoding, limit
+        self._queue: deque[bytes] = deque()
+        self._newest: dict[type[Value], Value] = {}
+        self._waiting = 0
+        self.dropped = 0
+        """Messages that found no room."""
+        self.total = 0
+        """Bytes that were put so far, without those of which only the newest counts."""
+
+    def __bool__(self) -> bool:
+        return bool(self._queue or self._newest)
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that wait, without those of which only the newest counts."""
+        return self._waiting
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there's no room for anything."""
+        return self._waiting >= self._limit
+
+    def put(self, message: Value) -> bool:
+        """Put a message behind those that wait; whether there was room. For one alone there always is."""
+        data = b"" if self.is_full else self._encode(message, self._encoding)
+        if self.is_full or (self._queue and self._waiting + len(data) > self._limit):
+            self.dropped += 1
+            return False
+        self._queue.append(data)
+        self._waiting += len(data)
+        self.total += len(data)
+        return True
+
+    def put_newest(self, message: Value) -> None:
+        """Put a message in the place of what's there of its kind."""
+        self._newest[type(message)] = message
+
+    def take(self) -> tuple[bytes, ...]:
+        """Take what is sent next: some 16 KiB of what waits, or if that's all, the newest too."""
+        found: list[bytes] = []
+        size = 0
+        while self._queue and size < BATCH:
+            data = self._queue.popleft()
+            size += len(data)
+            found.append(data)
+        self._waiting -= size
+        if not self._queue and self._newest:
+            found.extend(self._encode(message, self._encoding) for message in self._newest.values())
+            self._newest.clear()
+        return tuple(found)

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Protocol
 from interfaces.engine_server.site import earliest
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
-from interfaces.stream.control import Problem
+from interfaces.stream.control import Problem, ProtocolError
 from interfaces.stream.dialling import dial
-from interfaces.stream.errors import ProtocolError
 from vrs.clock import Clock
 from vrs.errors import VrsError
 

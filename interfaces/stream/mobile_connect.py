@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from interfaces.clients.designer import Issued
 from interfaces.jobs import Forecast, JobList, ListCommand, Load
-from interfaces.stream.client import Replied
+from interfaces.stream.client import MobileCore, Replied
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem, ProblemCode, Role
 from interfaces.stream.joining import ELSE, RobotConnection
-from interfaces.stream.mobile import MobileWelcome, Postures
-from interfaces.stream.mobile_client import MobileCore
+from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.stream.remote import RemoteDesigner
-from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.teleop.tasks import Doing, Go
 from robots.onboard.journey import Goal
 from vrs.commands import DriveCommand, Stop

@@ -9,13 +9,9 @@ from interfaces.link.round_trip import Ping, Pong
 from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want
 from interfaces.stream import control
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
-from interfaces.stream.control import Problem, ProblemCode, Role
-from interfaces.stream.errors import ProtocolError
-from interfaces.stream.limits import Bucket, ClientLimits, Spending
-from interfaces.stream.mobile import MobileWelcome, Postures
-from interfaces.stream.network import Impair, Network, Survey
-from interfaces.stream.outbox import Outbox
-from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks
+from interfaces.stream.control import Impair, Network, Problem, ProblemCode, ProtocolError, Role, Survey
+from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
+from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""

@@ -22,8 +22,7 @@ from uvicorn.server import ServerState
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
-from interfaces.stream.limits import Bucket
-from interfaces.stream.strangers import Strangers
+from interfaces.stream.limits import Bucket, Strangers
 from vrs.checks import validated, within
 from vrs.errors import FormatError
 

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import Final
 
-from interfaces.stream.strangers import Strangers
+from interfaces.stream.limits import Strangers
 from interfaces.timer import Turning
 from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.switchboard import Switchboard

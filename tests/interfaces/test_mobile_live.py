@@ -30,9 +30,9 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.control import Lease, Problem, Role
 from interfaces.stream.line import UnreachableError
+from interfaces.stream.mobile import Tasks
 from interfaces.stream.mobile_connect import MobileConnection
 from interfaces.stream.server import application
-from interfaces.stream.tasks import Tasks
 from interfaces.teleop.architectures.equipment import CONTROL
 from interfaces.teleop.driving import DrivenConfig
 from interfaces.teleop.tasks import Doing

@@ -10,8 +10,8 @@ import pytest
 from interfaces.jobs import JobFile, JobList, JobStage, ListCommand, Load, MessageJob, MoveJob, VoiceJob, WaitJob
 from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
+from interfaces.stream.mobile import Plan, Tasks, Trial
 from interfaces.stream.session import News
-from interfaces.stream.tasks import Plan, Tasks, Trial
 from interfaces.teleop.driving.operator import NOT_MET
 from interfaces.teleop.tasks import Doing, Go
 from robots.bullet.rooms import Place, Room

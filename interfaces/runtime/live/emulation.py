@@ -12,7 +12,7 @@ from interfaces.link.gauge import LinkFigures
 from interfaces.link.profiles import ALLOWED
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.runtime.staleness import late_often
-from interfaces.stream.network import DirectionConditions, Impair, Network
+from interfaces.stream.control import DirectionConditions, Impair, Network
 from interfaces.teleop.line import SiteLine
 from vrs.errors import InvalidValueError
 

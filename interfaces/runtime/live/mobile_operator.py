@@ -26,9 +26,8 @@ from interfaces.stream.control import Attached, Role
 from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.meshcat.page import routes as view_routes
-from interfaces.stream.mobile import Postures
+from interfaces.stream.mobile import Postures, Tasks, Wanted
 from interfaces.stream.server import HubServer
-from interfaces.stream.tasks import Tasks, Wanted
 from interfaces.teleop.architectures import DriveReport, OperatorSurroundings
 from interfaces.teleop.architectures.equipment import grid_of, operator_surroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator

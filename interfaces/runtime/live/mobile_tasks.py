@@ -25,8 +25,8 @@ from interfaces.jobs import (
 )
 from interfaces.jobs.runner import EMPTY, RUNS
 from interfaces.jobs.values import LONGEST_NAME, MOST_PLACES
+from interfaces.stream.mobile import Plan, Seen, Tasks, Trial, Wanted
 from interfaces.stream.session import News
-from interfaces.stream.tasks import Plan, Seen, Tasks, Trial, Wanted
 from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.driving.operator import NOT_MET
 from interfaces.teleop.tasks import Doing, Go, SensedPoints, TaskReport

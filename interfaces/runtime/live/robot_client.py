@@ -15,9 +15,8 @@ from websockets.exceptions import WebSocketException
 
 from interfaces.link.round_trip import Ping
 from interfaces.stream.codec import Encoding, Value, decode, encode
-from interfaces.stream.control import Attached, Hello, Problem, Role
+from interfaces.stream.control import Attached, Hello, Problem, ProtocolError, Role
 from interfaces.stream.dialling import dial
-from interfaces.stream.errors import ProtocolError
 from interfaces.teleop import Report
 from interfaces.teleop.line import SiteLine
 from robots.onboard import LossPolicy

@@ -15,8 +15,7 @@ from starlette.types import Receive, Scope, Send
 from interfaces.link.round_trip import Pong
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, Value, decode, encode
-from interfaces.stream.control import PROTOCOL, Attached, Hello, Problem, ProblemCode, Role
-from interfaces.stream.errors import ProtocolError
+from interfaces.stream.control import PROTOCOL, Attached, Hello, Problem, ProblemCode, ProtocolError, Role
 from interfaces.stream.server import Endpoint
 from interfaces.stream.sockets import let_stay
 from interfaces.teleop import Orders

@@ -25,7 +25,7 @@ from interfaces.recording.track import REAL
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
-from interfaces.stream.network import DirectionConditions, Impair
+from interfaces.stream.control import DirectionConditions, Impair
 from interfaces.stream.server import application
 from interfaces.teleop import OperatorSite, Report, RobotLine
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until

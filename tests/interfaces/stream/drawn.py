@@ -28,8 +28,6 @@ from interfaces.link import LinkFigures
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
-from interfaces.stream import network as n
-from interfaces.stream import tasks as w
 from interfaces.teleop.architectures import ArchitectureReport as Followed
 from interfaces.teleop.architectures import ArcPacket, CellChanges, DriveOrders, DriveReport
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
@@ -144,7 +142,7 @@ def welcomes(draw):
     return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(floats(0.1, 60)))
 
 
-ways = st.builds(n.DirectionConditions, words, words, words)
+ways = st.builds(c.DirectionConditions, words, words, words)
 spans = st.none() | floats(0, 1e9)
 measured = st.builds(LinkFigures, counts, st.none() | floats(0, 1), spans, spans)
 plans = st.builds(PlanPart, counts, times, arrays, runs())
@@ -199,7 +197,7 @@ forecasts = st.builds(
 wanted = st.one_of(
     st.builds(Go, goals),
     st.builds(Load, job_lists, st.none() | progress),
-    st.sampled_from([*ListCommand, *w.Trial]),
+    st.sampled_from([*ListCommand, *b.Trial]),
 )
 tasks = st.one_of(
     st.builds(Go, goals), st.builds(Halt, words), st.builds(Load, job_lists, st.none() | progress),
@@ -260,15 +258,15 @@ messages = {
         stamps, st.booleans(), st.none() | positive, st.none() | positive, st.integers(0, 2**64 - 1), st.booleans(),
         words, counts, st.none() | finite, st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
     ),
-    w.TaskOrder: st.builds(w.TaskOrder, numbers, st.integers(0, 2**64 - 1), wanted),
-    w.Tasks: st.builds(
-        w.Tasks, st.sampled_from(Doing), st.sampled_from(JourneyState), words, st.none() | goals, rows, positive,
+    b.TaskOrder: st.builds(b.TaskOrder, numbers, st.integers(0, 2**64 - 1), wanted),
+    b.Tasks: st.builds(
+        b.Tasks, st.sampled_from(Doing), st.sampled_from(JourneyState), words, st.none() | goals, rows, positive,
         job_lists, progress, st.none() | forecasts, st.none() | st.sampled_from(OperatorLoss), words, words, words,
         st.none() | numbers,
     ),
-    w.Seen: st.builds(w.Seen, times, rows, st.none() | doubts),
-    w.Plan: st.builds(
-        w.Plan, points, st.lists(rows, max_size=3).map(tuple), rows, st.tuples(positive, positive, positive)
+    b.Seen: st.builds(b.Seen, times, rows, st.none() | doubts),
+    b.Plan: st.builds(
+        b.Plan, points, st.lists(rows, max_size=3).map(tuple), rows, st.tuples(positive, positive, positive)
     ),
     DriveOrders: st.builds(
         DriveOrders, epochs, numbers, times, times, st.none() | postures, packets,
@@ -280,10 +278,10 @@ messages = {
         st.sampled_from(Doing), positive, st.none() | task_reports,
         st.none() | st.builds(SensedPoints, times, rows, st.none() | doubts),
     ),
-    n.Survey: st.builds(n.Survey, numbers),
-    n.Impair: st.builds(n.Impair, numbers, epochs, st.none() | ways, st.none() | ways),
-    n.Network: st.builds(
-        n.Network, ways, ways, measured, measured, measured, counts, stamps, words, words, words,
+    c.Survey: st.builds(c.Survey, numbers),
+    c.Impair: st.builds(c.Impair, numbers, epochs, st.none() | ways, st.none() | ways),
+    c.Network: st.builds(
+        c.Network, ways, ways, measured, measured, measured, counts, stamps, words, words, words,
         spans, words, spans, spans, stamps, words, st.none() | numbers,
     ),
 }  # fmt: skip

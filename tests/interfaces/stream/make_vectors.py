@@ -36,8 +36,6 @@ from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
-from interfaces.stream import network as n
-from interfaces.stream import tasks as w
 from interfaces.teleop.architectures import ArchitectureReport as Followed
 from interfaces.teleop.architectures import ArcPacket, CellChanges, DriveOrders, DriveReport
 from interfaces.teleop.measured import Sample
@@ -170,19 +168,19 @@ def values() -> dict[str, Any]:
             ),
             sight=SensedPoints(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
         ),
-        "task: a goal": w.TaskOrder(7, 7_730_941_132_801, Go(Goal(4.0, 1.5))),
-        "task: a list": w.TaskOrder(8, 7_730_941_132_801, Load(JOBS)),
-        "task: run it": w.TaskOrder(9, 7_730_941_132_801, ListCommand.RUN),
-        "task: try it": w.TaskOrder(10, 7_730_941_132_801, w.Trial.DRY_RUN),
-        "tasks": w.Tasks(
+        "task: a goal": b.TaskOrder(7, 7_730_941_132_801, Go(Goal(4.0, 1.5))),
+        "task: a list": b.TaskOrder(8, 7_730_941_132_801, Load(JOBS)),
+        "task: run it": b.TaskOrder(9, 7_730_941_132_801, ListCommand.RUN),
+        "task: try it": b.TaskOrder(10, 7_730_941_132_801, b.Trial.DRY_RUN),
+        "tasks": b.Tasks(
             Doing.JOBS, JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), 2.5, JOBS,
             PROGRESS,
             Forecast((JobForecast(1, 0.0, 8.25, ((1.5, 3.0), (4.0, 1.5))), JobForecast(2, 8.25, None))),
             OperatorLoss.STOP, "Look", "", answers=9,
         ),
-        "tasks before the robot is met": w.Tasks(problem="jobs.json: is no list of jobs"),
-        "seen": w.Seen(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
-        "plan": w.Plan(
+        "tasks before the robot is met": b.Tasks(problem="jobs.json: is no list of jobs"),
+        "seen": b.Seen(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
+        "plan": b.Plan(
             (6.0, 4.0), (((0.0, 0.0), (6.0, 0.0), (6.0, 0.1), (0.0, 0.1)),), ((3.0, 2.0),), (0.2, 0.32, 0.45),
         ),
         "drive report": DriveReport(
@@ -217,20 +215,20 @@ def values() -> dict[str, Any]:
         "state that tells late measurements": c.State(
             34, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7, late=((1.25, Q), (1.31, 1.001 * Q))
         ),
-        "survey": n.Survey(7),
-        "impair both ways": n.Impair(
-            8, 7_730_941_132_801, n.DirectionConditions("mon", "0.05"), n.DirectionConditions("constant:0.3")
+        "survey": c.Survey(7),
+        "impair both ways": c.Impair(
+            8, 7_730_941_132_801, c.DirectionConditions("mon", "0.05"), c.DirectionConditions("constant:0.3")
         ),
-        "impair one way": n.Impair(9, 7_730_941_132_801, n.DirectionConditions("none", "burst:0.1,3", "in-order")),
-        "network": n.Network(
-            n.DirectionConditions("mon", "0.05"), n.DirectionConditions("none"),
+        "impair one way": c.Impair(9, 7_730_941_132_801, c.DirectionConditions("none", "burst:0.1,3", "in-order")),
+        "network": c.Network(
+            c.DirectionConditions("mon", "0.05"), c.DirectionConditions("none"),
             LinkFigures(412, 0.05, 0.139, 1.9), LinkFigures(300, 0.0, 0.0, 0.0),
             LinkFigures(290, None, 0.141, 1.91), 7, 31.5, "Ada", "ws://127.0.0.1:41000/site", "", 0.002,
             "halt", 0.5,
             0.5, -0.5, "messages will often be old", 7,
         ),
-        "network without a robot": n.Network(
-            n.DirectionConditions("none"), n.DirectionConditions("none"),
+        "network without a robot": c.Network(
+            c.DirectionConditions("none"), c.DirectionConditions("none"),
             LinkFigures(0, None, None, None), LinkFigures(0, None, None, None),
             LinkFigures(0, None, None, None), problem="not connected yet",
         ),

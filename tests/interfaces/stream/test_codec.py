@@ -19,8 +19,7 @@ from interfaces import messages as m
 from interfaces.stream import LARGEST, Encoding, ProblemCode, ProtocolError, SharedEncoder, decode, encode
 from interfaces.stream import control as c
 from interfaces.stream.codec import TYPES, WIRES
-from interfaces.stream.mobile import MobileWelcome, Postures
-from interfaces.stream.tasks import Plan, Seen, TaskOrder, Tasks
+from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.teleop.architectures import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
 from interfaces.wire.commands import ReceiptWire

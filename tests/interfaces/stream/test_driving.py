@@ -15,9 +15,8 @@ from interfaces.stream.client import ClientCore, Phase
 from interfaces.stream.control import Problem
 from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
-from interfaces.stream.mobile import Postures
+from interfaces.stream.mobile import Postures, Seen, Tasks, Wanted
 from interfaces.stream.session import HubSession
-from interfaces.stream.tasks import Seen, Tasks, Wanted
 from interfaces.teleop.tasks import Go
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal

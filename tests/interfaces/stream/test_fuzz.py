@@ -12,7 +12,7 @@ import pytest
 
 from interfaces.stream import Encoding
 from interfaces.stream.codec import WIRES
-from interfaces.stream.wire import control, replies, requests, segments, sites
+from interfaces.stream.wire import control, messages, segments, sites
 from tests.interfaces.stream.fuzzer import Fuzzer
 from tests.interfaces.stream.make_vectors import PATH
 
@@ -64,7 +64,7 @@ def test_a_planted_fault_is_found(name: str, monkeypatch: pytest.MonkeyPatch) ->
     assert source.count(sound) == 1
     space = dict(vars(inspect.getmodule(getattr(module, function))))
     exec(compile(source.replace(sound, faulty), "<planted>", "exec", dont_inherit=True, flags=1 << 24), space)
-    for user in (segments, control, requests, replies, sites):
+    for user in (segments, control, messages, sites):
         if hasattr(user, function):
             monkeypatch.setattr(user, function, space[function])
     plain = function == "_plain"

@@ -11,8 +11,7 @@ from interfaces.recording.marks import OF_EVENTS, MarkKind
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.staleness import late_often
 from interfaces.stream import control
-from interfaces.stream.control import Attached, ProblemCode, Role
-from interfaces.stream.network import DirectionConditions, Impair, Survey
+from interfaces.stream.control import Attached, DirectionConditions, Impair, ProblemCode, Role, Survey
 from interfaces.teleop import OperatorSite, RobotLine
 from tests.interfaces.stream.served import HOME, MODEL, make_hub
 from tests.interfaces.stream.test_session import Peer, holder

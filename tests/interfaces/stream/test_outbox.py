@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from interfaces.stream.codec import Encoding
-from interfaces.stream.outbox import BATCH, Outbox
+from interfaces.stream.limits import BATCH, Outbox
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,8 @@ from interfaces.link.round_trip import Ping
 from interfaces.messages import Follow, Order, ViewForm, Want
 from interfaces.stream import control
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
-from interfaces.stream.control import ProblemCode, Role
+from interfaces.stream.control import DirectionConditions, Impair, Network, ProblemCode, Role, Survey
 from interfaces.stream.limits import Allowance, Allowances, ClientLimits
-from interfaces.stream.network import DirectionConditions, Impair, Network, Survey
 from interfaces.stream.server import Slices
 from interfaces.teleop import Report
 from tests.interfaces.stream.served import HOME, make_hub, served

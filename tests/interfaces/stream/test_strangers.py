@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from interfaces.stream.strangers import Strangers
+from interfaces.stream.limits import Strangers
 from vrs.errors import InvalidValueError
 
 

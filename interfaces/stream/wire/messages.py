@@ -1,4 +1,4 @@
-"""Messages of the server submodule, on the wire."""
+"""Messages of the four interfaces and of the server submodule on the wire: `interfaces.messages`."""
 
 from __future__ import annotations
 
@@ -10,20 +10,93 @@ from typing_extensions import override
 
 from interfaces.messages import (
     Answer,
+    Ask,
     Broadcast,
     Change,
+    Follow,
     Frame,
     FrameStatus,
     History,
+    Order,
     Outcome,
     Pulse,
     Scene,
     Verdicts,
+    ViewForm,
+    Want,
 )
-from interfaces.stream.wire.requests import Rate
 from interfaces.stream.wire.segments import C, Dof, Segments, rows, segments_of
-from interfaces.wire.commands import ReceiptWire
-from interfaces.wire.fields import CommandId, Count, Joints, Message, Number, Text, Time, Word, array, numbers, text
+from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.wire.fields import (
+    CommandId,
+    Count,
+    Epoch,
+    Joints,
+    Message,
+    Number,
+    Text,
+    Time,
+    Word,
+    array,
+    digits,
+    epoch,
+    numbers,
+    text,
+)
+
+Rate = Annotated[float, Meta(gt=0, le=1e4)]
+
+
+class OrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="order"):
+    """`Order`."""
+
+    number: Number
+    command: CommandWire | None = None
+    epoch: Epoch | None = None
+
+    @override
+    @classmethod
+    def of(cls, value: Order, packed: bool) -> OrderWire:
+        return cls(value.number, command_wire(value.command, packed), digits(value.epoch))
+
+    def read(self) -> Order:
+        """The order."""
+        command = None if self.command is None else self.command.read()
+        return Order(self.number, command, epoch(self.epoch))
+
+
+class AskWire(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
+    """`Ask`."""
+
+    number: Number
+    t: Time | None = None
+
+    def read(self) -> Ask:
+        """The question."""
+        return Ask(self.number, self.t)
+
+
+class FollowWire(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
+    """`Follow`."""
+
+    number: Number
+    form: ViewForm
+    rate: Rate | None = None
+
+    def read(self) -> Follow:
+        """The wish."""
+        return Follow(self.number, self.form, self.rate)
+
+
+class WantWire(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
+    """`Want`."""
+
+    edit: Count
+    index: Count | None = None
+
+    def read(self) -> Want:
+        """The wish."""
+        return Want(self.edit, self.index)
 
 
 class OutcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="outcome"):
