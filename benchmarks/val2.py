@@ -10,10 +10,10 @@ import numpy as np
 
 from benchmarks.results import Bar, Cost, Part, Result
 from interfaces.val2.check import check_text
+from interfaces.val2.context import ProgramEnded, ProgramFailed
 from interfaces.val2.controller import Controller
-from interfaces.val2.events import ProgramEnded, ProgramFailed
 from interfaces.val2.motion import arm_for
-from interfaces.val2.rehearsal import rehearse
+from interfaces.val2.playing import rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.syntax import Program
 from robots import puma560

@@ -49,7 +49,7 @@ def check(
 def _rehearsed(source: SourceFile) -> list[CheckFinding]:
     """What only planning shows: the first program on a virtual arm alone."""
     from interfaces.val2.check import CheckFinding
-    from interfaces.val2.rehearsal import rehearse
+    from interfaces.val2.playing import rehearse
     from robots import puma560
 
     return [

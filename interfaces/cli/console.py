@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
+import selectors
+import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from interfaces.system import software
-from vrs.errors import InvalidValueError
+from vrs.errors import InvalidValueError, VrsError
 
 if TYPE_CHECKING:
+    from interfaces.val2.monitor.control import Control
     from interfaces.val2.monitor.monitor import TerminalMonitor
-    from interfaces.val2.monitor.switchboard import Control
     from interfaces.val2.motion import Arm
     from vrs.clock import Clock
+
+START: Final = 90.0
+"""Time for it to be ready [s]."""
+_END: Final = 8.0
+"""Time for it and its robot to come to rest and end [s]."""
+_SAYS: Final = re.compile(r"vrs: serving \S+ on (http://\S+)/view\b.*")
 
 
 def console(
@@ -57,8 +68,6 @@ def console(
     elif connect is not None:
         _connected(connect, token_file, files)
     else:
-        from interfaces.val2.local import local_server
-
         typer.echo("vrs: starting both robots ..", err=True)
         with local_server(["--delay", delay, "--link-loss", "hold"]) as url:
             typer.echo(f"vrs: {url}/view shows both robots", err=True)
@@ -66,7 +75,7 @@ def console(
 
 
 def _alone(files: Path) -> None:
-    from interfaces.val2.monitor.switchboard import Free
+    from interfaces.val2.monitor.control import Free
     from interfaces.val2.motion import arm_for
     from robots import puma560
     from vrs.clock import ManualClock, WallClock
@@ -81,7 +90,7 @@ def _connected(url: str, token_file: Path | None, files: Path) -> None:
     from interfaces import connect
     from interfaces.stream.access import read_tokens
     from interfaces.stream.control import Role
-    from interfaces.val2.control import LeaseControl
+    from interfaces.val2.monitor.control import LeaseControl
     from interfaces.val2.motion import arm_for
 
     token = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
@@ -96,9 +105,9 @@ def _converse(arm: Arm, control: Control, clock: Clock, files: Path, what: str) 
     import asyncio
 
     from interfaces.val2.controller import Controller
+    from interfaces.val2.monitor.control import Switchboard
     from interfaces.val2.monitor.files import Files
     from interfaces.val2.monitor.monitor import TerminalMonitor
-    from interfaces.val2.monitor.switchboard import Switchboard
 
     controller = Controller(arm, parameters=arm.parameters, now=clock.now())
     typed = sys.stdin.isatty() and sys.stdout.isatty()
@@ -116,12 +125,65 @@ async def _typed(monitor: TerminalMonitor, clock: Clock) -> None:
 
 async def _piped(monitor: TerminalMonitor, clock: Clock) -> None:
     import asyncio
-    import contextlib
     import signal
 
-    from interfaces.val2.monitor.pipe import Pipe
+    from interfaces.val2.monitor.teletype import Pipe
 
     pipe = Pipe(monitor, clock, source=sys.stdin.fileno())
     with contextlib.suppress(NotImplementedError):
         asyncio.get_running_loop().add_signal_handler(signal.SIGINT, pipe.interrupt)
     await pipe.run()
+
+
+class ServerStartError(VrsError):
+    """The server couldn't be started."""
+
+    def __init__(self, problem: str) -> None:
+        self.problem = problem
+        super().__init__(f"the server didn't start: {problem}")
+
+
+@contextlib.contextmanager
+def local_server(options: Sequence[str]) -> Iterator[str]:
+    """Run `vrs serve` on a free loopback port meanwhile.
+
+    Args:
+        options: Of `vrs serve`, but for the address.
+
+    Returns:
+        Its address, `http://127.0.0.1:PORT`.
+
+    Raises:
+        ServerStartError: If it isn't ready in time.
+    """
+    command = [sys.executable, "-P", "-m", "interfaces.cli", "serve", "--port", "0", "--until-eof", *options]
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+        start_new_session=True,
+    )
+    try:
+        assert process.stdout is not None
+        yield _address(process.stdout)
+    finally:
+        try:
+            process.communicate(timeout=_END)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+
+
+def _address(output: IO[bytes]) -> str:
+    """What it says first."""
+    with selectors.DefaultSelector() as selector:
+        selector.register(output, selectors.EVENT_READ)
+        if not selector.select(START):
+            raise ServerStartError(f"it said nothing for {START:g} s")
+    line = output.readline().decode(errors="replace").strip()
+    found = _SAYS.fullmatch(line)
+    if found is None:
+        raise ServerStartError(line or "it ended at once")
+    return found[1]

@@ -8,20 +8,18 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from interfaces.val2 import forms, kinds, walk
+from interfaces.val2 import forms, kinds
 from interfaces.val2.compiler import compiled, refusal
 from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
 from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.forms import Kind, nearest
 from interfaces.val2.grammar import SIGNIFICANT
-from interfaces.val2.immediate import stray
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
-from interfaces.val2.reading import read_all, words_of
 from interfaces.val2.signals import legal, settable
-from interfaces.val2.slots import Kind, nearest
-from interfaces.val2.source import SourceFile
-from interfaces.val2.structure import survey
+from interfaces.val2.source import SourceFile, read_all, words_of
+from interfaces.val2.structure import stray, survey
 from interfaces.val2.syntax import (
     Apply,
     Assign,
@@ -130,7 +128,7 @@ class _Checker:
         for parameter in program.parameters:
             self._set[program.name].add(parameter.name)
         for step in program.steps:
-            for variable in walk.writes(step.statement):
+            for variable in kinds.writes(step.statement):
                 scope = program.name if variable.name in own else ""
                 self._set[scope].add(variable.name)
                 self._known[scope][variable.name].add(_given(step.statement))
@@ -179,7 +177,7 @@ class _Checker:
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
         errors = [*self._calls(statement), *_numbers(statement), *_signals(statement)]
-        for expression, wanted in walk.reads(statement):
+        for expression, wanted in kinds.reads(statement):
             errors += kinds.mistakes(expression, wanted, known)
         if isinstance(statement, For) and statement.variable.prefix:
             errors.append(mismatch(statement.variable))
@@ -188,7 +186,7 @@ class _Checker:
             uncompilable = refusal(step, self._context)
             errors += [] if uncompilable is None else [uncompilable]
         yield from (_error(error) for error in errors)
-        for expression, wanted in walk.reads(statement):
+        for expression, wanted in kinds.reads(statement):
             yield from self._unset(expression, wanted, usable, reported)
 
     def _unset(
@@ -252,11 +250,11 @@ def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
         return [
             (argument, slots[min(i, len(slots) - 1)].kind)
             for i, argument in enumerate(expression.arguments)
-            if argument is not None and argument in walk.children(expression)
+            if argument is not None and argument in kinds.children(expression)
         ]
     kind: Kind = "real" if isinstance(expression, Variable) else "frame"
     located = kinds.kind_of(expression, {}) == "frame"
-    return [(child, kind if located else "real") for child in walk.children(expression)]
+    return [(child, kind if located else "real") for child in kinds.children(expression)]
 
 
 def _given(statement: Statement) -> str:
@@ -327,8 +325,8 @@ def _signals(statement: Statement) -> Iterator[ValError]:
             named += [(operand, legal) for operand in operands]
         case React(signal):
             named.append((signal, legal))
-    for expression, _ in walk.reads(statement):
-        for part in walk.parts(expression):
+    for expression, _ in kinds.reads(statement):
+        for part in kinds.parts(expression):
             if isinstance(part, Apply) and part.function == "SIG":
                 named += [(argument, legal) for argument in part.arguments]
     for number, check_number in named:

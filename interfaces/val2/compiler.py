@@ -10,19 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from interfaces.val2.code import Code, StepFunction
-from interfaces.val2.context import SPECIAL, Context, Invoke, Leave
+from interfaces.val2.arithmetic import Slots
+from interfaces.val2.context import SPECIAL, Code, Context, Invoke, Leave, StepFunction, Warned
 from interfaces.val2.dialogue import prompt_step, type_step
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Warned
 from interfaces.val2.expressions import ResultKind
 from interfaces.val2.forms import UNAVAILABLE
 from interfaces.val2.functions import expressions
-from interfaces.val2.geometry import to_oat
 from interfaces.val2.instructions import instruction
 from interfaces.val2.memory import MOST_DIMENSIONS, VariableSlot, index, mismatch, undefined, where
-from interfaces.val2.operations import Slots
-from interfaces.val2.reactions import reaction_to
+from interfaces.val2.signals import reaction_to
 from interfaces.val2.structure import StructureBlock, structure
 from interfaces.val2.syntax import (
     AnyValue,
@@ -56,7 +53,7 @@ from interfaces.val2.syntax import (
     Variable,
     While,
 )  # fmt: skip
-from interfaces.val2.values import Location, Transformation
+from interfaces.val2.values import Location, Transformation, to_oat
 
 
 def compiled(program: Program, context: Context) -> Code:

@@ -1,4 +1,4 @@
-"""What running programs share: memory, arm, signals, switches, parameters, timers, and what they want done."""
+"""What running programs share: memory, arm, signals, switches, parameters, timers, compiled programs and events."""
 
 from __future__ import annotations
 
@@ -8,15 +8,103 @@ from collections.abc import Callable, Generator, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
-from interfaces.val2.code import Code
+from interfaces.val2.arithmetic import Slots
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.events import Event, SignalChanged, Warned
 from interfaces.val2.forms import PARAMETERS, SWITCHES
-from interfaces.val2.memory import Memory, where
+from interfaces.val2.memory import Memory, VariableSlot, where
 from interfaces.val2.ports import ArmPort
-from interfaces.val2.reactions import Reactions
-from interfaces.val2.signals import Signals
+from interfaces.val2.signals import Reactions, Signals
 from interfaces.val2.syntax import NOWHERE, Program
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """A program wrote something."""
+
+    text: str
+    """With its line ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A program wants a line: `Controller.answer`."""
+
+    text: str
+    """What it asks; no line end."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramPaused:
+    """A program stands before a step, and can go on."""
+
+    program: str
+    step: int
+    """The next step, from 1."""
+    word: str
+    """Why: `PAUSE`, `ABORT` or `XSTEP`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramEnded:
+    """A program, or a `DO`, is done."""
+
+    program: str
+    """Empty for a `DO`."""
+    word: str
+    """How: `END`, `STOP`, `HALT`, `ABORT` or `DO`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramFailed:
+    """A program, or a `DO`, was stopped by an error."""
+
+    error: ValError
+
+
+@dataclass(frozen=True, slots=True)
+class Warned:
+    """Something was passed over."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SignalChanged:
+    """A signal turned on or off."""
+
+    number: int
+    on: bool
+
+
+Event: TypeAlias = Typed | Asked | ProgramPaused | ProgramEnded | ProgramFailed | Warned | SignalChanged
+
+
+StepFunction: TypeAlias = Callable[[Slots], int]
+"""Does a step and returns the next one's index, or SPECIAL."""
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A compiled program."""
+
+    program: Program
+    steps: list[StepFunction]
+    """One more than the program has: the last is its end."""
+    names: int
+    """How many names are the call's own: arguments first."""
+    kept: int
+    """How many FOR and CASE there are."""
+
+    def slots(self, arguments: list[VariableSlot]) -> list[Any]:
+        """What a call has of its own.
+
+        Raises:
+            ValError: If there are too many arguments.
+        """
+        if len(arguments) > len(self.program.parameters):
+            raise ValError("Too many arguments", f"{self.program.name} takes {len(self.program.parameters)}")
+        return [*arguments, *[VariableSlot() for _ in range(self.names - len(arguments))], *[None] * self.kept]
+
 
 SPECIAL: Final = -1
 """What a step returns instead of the next step's index when `Context.pending` holds what is to be done."""

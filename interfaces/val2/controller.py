@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from typing import Final
 
 from interfaces.val2.compiler import compiled
-from interfaces.val2.context import Context
+from interfaces.val2.context import Context, Event, ProgramFailed
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Event, ProgramFailed
 from interfaces.val2.functions import expressions
-from interfaces.val2.immediate import meanwhile, stray
 from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.ports import ArmPort
 from interfaces.val2.signals import Rule, Signals
 from interfaces.val2.source import SignalRule
+from interfaces.val2.structure import meanwhile, stray
 from interfaces.val2.syntax import (
     Expression,
     Program,

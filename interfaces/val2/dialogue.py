@@ -1,17 +1,132 @@
-"""TYPE and PROMPT as closures."""
+"""TYPE and PROMPT: the text of values in formats, and the steps that write and ask.
+
+Without a format a number has one leading blank and as many digits as it needs, seven at most unless it's whole;
+`/F8.2` is a width and decimals, `/I5` a whole number, `/E12.3` with an exponent, `/G12.5` either, `/H4` and `/O6`
+whole to the base of 16 and 8, `/D` as without. A width of 0, or none, is what the number needs; a number that is
+too wide makes a field of `*`. A format holds until the next one. `/X3` is blanks, `/C2` line ends, `/B` the bell;
+`/S` leaves out the line end of TYPE; `/U`, lines up, is passed over.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+import math
+import re
+from collections.abc import Generator, Sequence
+from typing import Final
 
-from interfaces.val2 import formats
-from interfaces.val2.code import StepFunction
-from interfaces.val2.context import SPECIAL, Waiting
-from interfaces.val2.events import Asked, Typed
+from interfaces.val2.arithmetic import Slots, checked
+from interfaces.val2.context import SPECIAL, Asked, StepFunction, Typed, Waiting
+from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
 from interfaces.val2.memory import VariableSlot, mismatch
-from interfaces.val2.operations import Slots
 from interfaces.val2.syntax import Expression, Format, Prompt, Variable
+from interfaces.val2.values import PrecisionPoint, Transformation, Value, to_oat
+
+NUMBERS: Final = "DFGEIHO"
+"""Formats of numbers."""
+WIDEST: Final = 80
+_DEFAULT: Final = Format("D")
+_WHOLE: Final = 1e15
+"""Numbers below it are exact where they're whole."""
+
+
+def number(value: float, form: Format = _DEFAULT) -> str:
+    """A number in a format."""
+    width = form.width or 0
+    decimals = form.decimals if form.decimals is not None else 3
+    match form.code:
+        case "F":
+            text = f"{_clean(value, decimals):.{decimals}f}"
+        case "E":
+            text = f"{value:.{decimals}E}"
+        case "G":
+            text = f"{value:.{max(decimals, 1)}G}"
+        case "I":
+            text = f"{_clean(value, 0):.0f}"
+        case "H":
+            text = f"{int(value):X}"
+        case "O":
+            text = f"{int(value):o}"
+        case _:
+            return " " + general(value)
+    if width and len(text) > width:
+        return "*" * width
+    return text.rjust(width)
+
+
+def general(value: float) -> str:
+    """A number with the digits that it needs: whole ones exact, others to seven."""
+    if value == int(value) and abs(value) < _WHOLE:
+        return str(int(value))
+    return f"{value:.7G}"
+
+
+def _clean(value: float, decimals: int) -> float:
+    """Without a minus before nothing but zeros."""
+    return 0.0 if round(value, decimals) == 0.0 else value
+
+
+def spelled(items: Sequence[Value | Format]) -> tuple[str, bool]:
+    """The text of items, and whether a line end belongs after it.
+
+    Raises:
+        ValError: If a format isn't one of these.
+    """
+    parts, form, ends = [], _DEFAULT, True
+    for item in items:
+        if not isinstance(item, Format):
+            parts.append(_value(item, form))
+            continue
+        count = min(item.width if item.width is not None else 1, WIDEST)
+        match item.code:
+            case "S":
+                ends = False
+            case "C":
+                parts.append("\n" * count)
+            case "X":
+                parts.append(" " * count)
+            case "U":
+                pass
+            case "B":
+                parts.append("\a")
+            case code if code in NUMBERS:
+                if (item.width or 0) > WIDEST or (item.decimals or 0) > WIDEST:
+                    raise ValError("Illegal format", f"/{code}: {WIDEST} characters at most")
+                form = item
+            case code:
+                raise ValError("Illegal format", f"/{code}: one of /B /C /S /X /{' /'.join(NUMBERS)}")
+    return "".join(parts), ends
+
+
+def _value(value: Value, form: Format) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Transformation):
+        return "".join(number(v, form) for v in to_oat(value))
+    if isinstance(value, PrecisionPoint):
+        return "".join(number(v, form) for v in value.joints)
+    return number(value, form)
+
+
+_NUMBER: Final = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)(E[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+
+
+def leading_number(text: str) -> float:
+    """The number at the beginning of a text; 0 if there's none.
+
+    Raises:
+        ValError: If it's too large.
+    """
+    found = _NUMBER.match(text)
+    value = float(found[0]) if found else 0.0
+    return checked(value)
+
+
+def whole_number(text: str) -> float | None:
+    """The number that a text is, blanks around it apart; None if it's none."""
+    found = _NUMBER.fullmatch(text.rstrip())
+    value = float(found[0]) if found else math.inf
+    return value if math.isfinite(value) else None
 
 
 def type_step(x: Expressions, items: tuple[Expression | Format, ...], following: int) -> StepFunction:
@@ -20,7 +135,7 @@ def type_step(x: Expressions, items: tuple[Expression | Format, ...], following:
     parts = [i if isinstance(i, Format) else x.value(i) for i in items]
 
     def type_(s: Slots) -> int:
-        text, ends = formats.spelled([p if isinstance(p, Format) else p(s) for p in parts])
+        text, ends = spelled([p if isinstance(p, Format) else p(s) for p in parts])
         if context.switches["MESSAGES"]:
             context.events.append(Typed(text + "\n" if ends else text))
         return context.go_on(following)
@@ -74,7 +189,7 @@ def _answers(line: str, names: tuple[Variable, ...]) -> list[float | str] | None
         rest = rest.strip()
         end = next((k for k, c in enumerate(rest) if c == "," or (c.isspace() and not name.prefix)), len(rest))
         field, rest = rest[:end].strip(), rest[end:].lstrip().removeprefix(",")
-        value = field if name.prefix else formats.whole_number(field)
+        value = field if name.prefix else whole_number(field)
         if value is None:
             return None
         values.append(value)

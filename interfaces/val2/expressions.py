@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple, TypeAlias, cast
 import numpy as np
 
 from interfaces.val2 import arithmetic
+from interfaces.val2.arithmetic import Real, Slots, joined, placed
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import MOST_DIMENSIONS, Key, VariableSlot, index, mismatch, undefined, where
-from interfaces.val2.operations import Real, Slots, joined, placed
 from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Number, Text, Unary, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
 

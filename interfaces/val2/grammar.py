@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.slots import Function, nearest
+from interfaces.val2.forms import Function, nearest
 from interfaces.val2.syntax import (
     Apply,
     Binary,

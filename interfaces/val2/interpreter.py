@@ -8,23 +8,25 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from interfaces.val2.code import Code
 from interfaces.val2.context import (
     ARM,
     Action,
+    Code,
     Context,
     Finish,
     Finished,
     Invoke,
     Leave,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
     Suspend,
     Waiting,
-)  # fmt: skip
+)
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import ProgramEnded, ProgramFailed, ProgramPaused
 from interfaces.val2.instructions import until
 from interfaces.val2.memory import VariableSlot, where
-from interfaces.val2.reactions import Reaction
+from interfaces.val2.signals import Reaction
 from vrs.errors import VrsError
 
 MOST_CALLS: Final = 1_000

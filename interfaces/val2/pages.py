@@ -21,9 +21,9 @@ from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
 from interfaces.timer import Turning
 from interfaces.val2.monitor.completion import suggestions
-from interfaces.val2.monitor.desk import Said, Style
+from interfaces.val2.monitor.control import SharedOperator, Switchboard
 from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
-from interfaces.val2.monitor.switchboard import SharedOperator, Switchboard
+from interfaces.val2.monitor.state import Said, Style
 from vrs.clock import Clock
 from vrs.errors import VrsError
 

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from interfaces.stream.control import Role
-from interfaces.val2.control import LeaseControl
 from interfaces.val2.controller import Controller
+from interfaces.val2.monitor.control import LeaseControl, SharedOperator, Switchboard
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.switchboard import SharedOperator, Switchboard
 from interfaces.val2.pages import TerminalRoom
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.tcp import ValDoor

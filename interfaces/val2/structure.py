@@ -1,4 +1,4 @@
-"""Which steps of a program belong together, and where each goes when it doesn't go on to the next."""
+"""Which steps of a program belong together, where each leads, and which may stand alone."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
 from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.memory import where
 from interfaces.val2.syntax import (
     AnyValue,
+    Assign,
     Blank,
     Case,
+    Decompose,
     Do,
     Else,
     EndBlock,
@@ -21,14 +24,18 @@ from interfaces.val2.syntax import (
     If,
     IfGoto,
     Instruction,
+    Local,
     Next,
     Number,
     Program,
+    Return,
+    Set,
     Step,
+    Type,
     Until,
     Value,
     While,
-)
+)  # fmt: skip
 
 BlockKind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
 _LOOPS: Final = ("WHILE", "DO", "FOR")
@@ -248,3 +255,44 @@ class _Surveyor:
         else:
             known = ", ".join(map(str, sorted(self.labels)[:8])) or "none"
             self._fail(i, f"{label}; the program's labels: {known}", "Undefined label", at)
+
+
+_MEANWHILE: Final = {
+    "SIGNAL", "RESET", "ENABLE", "DISABLE", "PARAMETER", "TIMER", "SPEED", "HERE", "ALTOUT", "ALTER", "NOALTER",
+}  # fmt: skip
+"""What DO may do while a program runs, beside assignments and TYPE."""
+
+
+def stray(step: Step, at: TextPosition) -> ValError | None:
+    """Why a step can't stand alone, as DO wants it; None if it can."""
+    match step.statement:
+        case (
+            If()
+            | Else()
+            | EndBlock()
+            | While()
+            | Do()
+            | Until()
+            | For()
+            | Case()
+            | Value()
+            | AnyValue()
+            | Exit()
+            | Next()
+        ):
+            return ValError("Control structure error", "it's for programs", place=where(at))
+        case Goto() | IfGoto() | Return() | Local():
+            return ValError("Control structure error", "it's for programs", place=where(at))
+        case _:
+            return None
+
+
+def meanwhile(step: Step) -> bool:
+    """Whether a step takes no time and moves nothing."""
+    match step.statement:
+        case Assign() | Set() | Type() | Decompose():
+            return True
+        case Instruction(keyword, _, words):
+            return keyword in _MEANWHILE and (keyword != "SPEED" or "MONITOR" in words)
+        case _:
+            return False

@@ -17,8 +17,8 @@ from typing import Final
 
 from interfaces.stream.limits import Strangers
 from interfaces.timer import Turning
+from interfaces.val2.monitor.control import Switchboard
 from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
-from interfaces.val2.monitor.switchboard import Switchboard
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from vrs.clock import Clock
 

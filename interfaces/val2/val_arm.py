@@ -19,7 +19,7 @@ from interfaces.jobs.values import ArmJob
 from vrs.model import Array
 
 if TYPE_CHECKING:
-    from interfaces.val2.rehearsal import Rehearsal
+    from interfaces.val2.playing import Rehearsal
     from vrs.timeline import Timeline
 
 LONGEST: Final = 600.0
@@ -41,7 +41,7 @@ def rehearsed(
         start: Where the arm stands [rad], (6,); in its `nominal` pose unless given.
     """
     from interfaces.val2.errors import ValError
-    from interfaces.val2.rehearsal import rehearse
+    from interfaces.val2.playing import rehearse
     from interfaces.val2.source import parse_file
     from robots import puma560
 

@@ -1,14 +1,22 @@
-"""Values of VAL-II. Lengths are millimetres and angles degrees, as everywhere in the language."""
+"""Values of VAL-II, and how they stand for poses and joints.
+
+Lengths are millimetres and angles degrees, as everywhere in the language. O, A and T are Euler angles:
+R = Rz(O - 90) Ry(A + 90) Rz(T), in degrees. VAL's world is the base frame turned by 180 degrees about the waist,
+and its hand the last link turned by 180 degrees about its own axis, at the flange.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.model import Array, frozen_array
+from robots.puma560 import parameters
+from vrs.model import Array, Limits, frozen_array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,3 +59,117 @@ Value: TypeAlias = float | str | Transformation | PrecisionPoint
 
 NULL: Final = Transformation(np.eye(4))
 """`NULL`: no translation, no turn; O, A, T of it are 90, -90, 0."""
+
+
+FLANGE: Final = 1000.0 * parameters.FLANGE
+"""From the wrist's centre to the flange along the tool's axis [mm]."""
+_VERTICAL: Final = 1e-9
+"""Sine of the angle between tool and vertical under which O and T can't be told apart."""
+_OFFSETS: Final = (0.0, 180.0, 180.0, 0.0, 0.0, 0.0)
+"""VAL's joint values less the Robotics Toolbox's [deg]."""
+_HALF_TURN: Final = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+def about_x(angle: float) -> Transformation:
+    """A turn about the x axis by an angle [deg]."""
+    return _turn(angle, 1, 2)
+
+
+def about_y(angle: float) -> Transformation:
+    """A turn about the y axis by an angle [deg]."""
+    return _turn(angle, 2, 0)
+
+
+def about_z(angle: float) -> Transformation:
+    """A turn about the z axis by an angle [deg]."""
+    return _turn(angle, 0, 1)
+
+
+def _turn(angle: float, i: int, j: int) -> Transformation:
+    c, s = _cos_sin(angle)
+    X = np.eye(4)
+    X[i, i] = X[j, j] = c
+    X[i, j], X[j, i] = -s, s
+    return Transformation(X)
+
+
+def _cos_sin(degrees: float) -> tuple[float, float]:
+    """Exact at right angles."""
+    quarters, rest = divmod(degrees + 45.0, 90.0)
+    angle = math.radians(rest - 45.0)
+    c, s = math.cos(angle), math.sin(angle)
+    match int(quarters) % 4:
+        case 0:
+            return c, s
+        case 1:
+            return -s, c
+        case 2:
+            return -c, -s
+        case _:
+            return s, -c
+
+
+def from_oat(x: float, y: float, z: float, o: float, a: float, t: float) -> Transformation:
+    """The transformation of X, Y, Z [mm] and O, A, T [deg]."""
+    (c1, s1), (c2, s2), (c3, s3) = _cos_sin(o - 90.0), _cos_sin(a + 90.0), _cos_sin(t)
+    return Transformation(
+        [
+            [c1 * c2 * c3 - s1 * s3, -c1 * c2 * s3 - s1 * c3, c1 * s2, x],
+            [s1 * c2 * c3 + c1 * s3, -s1 * c2 * s3 + c1 * c3, s1 * s2, y],
+            [-s2 * c3, s2 * s3, c2, z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def to_oat(transformation: Transformation) -> tuple[float, float, float, float, float, float]:
+    """X, Y, Z [mm] and O, A, T [deg] in (-180, 180], A in [-90, 90]; O is 90 where A is ±90."""
+    R, (x, y, z) = transformation.X[:3, :3], transformation.X[:3, 3].tolist()
+    level = math.hypot(R[0, 2], R[1, 2])
+    if level < _VERTICAL:
+        up = R[2, 2] > 0
+        t = math.atan2(R[1, 0], R[1, 1])
+        return x, y, z, 90.0, -90.0 if up else 90.0, _wrapped(math.degrees(t))
+    o = math.atan2(R[1, 2], R[0, 2])
+    a = math.atan2(level, R[2, 2])
+    t = math.atan2(R[2, 1], -R[2, 0])
+    return x, y, z, _wrapped(math.degrees(o) + 90.0), math.degrees(a) - 90.0, _wrapped(math.degrees(t))
+
+
+def _wrapped(degrees: float) -> float:
+    """In (-180, 180]."""
+    turned = math.remainder(degrees, 360.0)
+    return 180.0 if turned == -180.0 else turned + 0.0
+
+
+def to_val_joints(q: Sequence[float] | Array, limits: Limits) -> PrecisionPoint:
+    """VAL's joint values [deg] of joints [rad], (6,), on the turn on which they stand within the limits."""
+    joints = []
+    for value, low, offset in zip(np.degrees(q).tolist(), np.degrees(limits.q_min).tolist(), _OFFSETS, strict=True):
+        joints.append(value + offset - (360.0 if low + offset > 0.0 else 0.0))
+    return PrecisionPoint(tuple(joints))
+
+
+def from_val_joints(point: PrecisionPoint, limits: Limits) -> Array:
+    """Joints [rad], (6,), of VAL's joint values [deg]; within the limits or not."""
+    q = []
+    for value, low, offset in zip(point.joints, np.degrees(limits.q_min).tolist(), _OFFSETS, strict=True):
+        q.append(math.radians(value - offset + (360.0 if low + offset > 0.0 else 0.0)))
+    return np.array(q)
+
+
+def from_base(X: Array) -> Transformation:
+    """The flange in VAL's world, of the pose of the last link in the base frame, (4, 4) [m]."""
+    pose = _HALF_TURN @ X @ _HALF_TURN
+    pose[:3, 3] *= 1000.0
+    pose[:3, 3] += FLANGE * pose[:3, 2]
+    return Transformation(pose)
+
+
+def to_base(flange: Transformation) -> Array:
+    """The pose of the last link in the base frame, (4, 4) [m], of the flange in VAL's world."""
+    pose = np.array(flange.X)
+    pose[:3, 3] -= FLANGE * pose[:3, 2]
+    pose[:3, 3] /= 1000.0
+    X: Array = _HALF_TURN @ pose @ _HALF_TURN
+    return X

@@ -9,9 +9,8 @@ from typing import Final
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor import commands, words
-from interfaces.val2.monitor.desk import TerminalState
-from interfaces.val2.monitor.text import split_word
+from interfaces.val2.monitor import commands
+from interfaces.val2.monitor.state import TerminalState, split_word
 
 MOST: Final = 200
 """Longest list."""
@@ -63,7 +62,7 @@ def _command(before: str, desk: TerminalState) -> Iterable[Suggestion]:
     if not word:
         return [Suggestion(one.name, one.help) for one in commands.COMMANDS.values()]
     try:
-        name = commands.command(word).name
+        name = commands.command_named(word).name
     except ValError:
         return []
     memory = desk.controller.memory
@@ -125,7 +124,7 @@ def _names(desk: TerminalState, *kinds: str) -> list[Suggestion]:
 
 def _all_words() -> Iterator[Suggestion]:
     for name in {*commands.COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS}:
-        yield Suggestion(name, next(said for _, _, said in words.explained(name)))
+        yield Suggestion(name, next(said for _, _, said in commands.explained(name)))
 
 
 def hint(text: str, *, program: bool = False) -> str:
@@ -138,11 +137,11 @@ def hint(text: str, *, program: bool = False) -> str:
     parts = re.findall(r"[#$]?[A-Za-z][A-Za-z0-9._]*", text)
     if not program and parts:
         try:
-            parts[0] = commands.command(parts[0]).name
+            parts[0] = commands.command_named(parts[0]).name
         except ValError:
             return ""
     for index in reversed(range(len(parts))):
-        found = list(words.explained(parts[index]))
+        found = list(commands.explained(parts[index]))
         if found:
             wanted = "command" if index == 0 and not program else "instruction"
             kind, usage, said = next((one for one in found if one[0].startswith(wanted)), found[0])

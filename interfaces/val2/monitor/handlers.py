@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeAlias
 
-from interfaces.val2.monitor import listing, locations, running, settings, storage, words
-from interfaces.val2.monitor.desk import Dialogue
-from interfaces.val2.monitor.editing import edit
+from interfaces.val2.monitor import commands, locations, running, settings, storage
+from interfaces.val2.monitor.editor import edit
+from interfaces.val2.monitor.state import Dialogue
 
 Handler: TypeAlias = Callable[..., Dialogue | None]
 """Called with the desk, what follows the name, and `now`; what takes the next line, or None."""
@@ -23,23 +23,23 @@ HANDLERS: Final[dict[str, Handler]] = {
     "DELETEP": storage.delete_programs,
     "DELETER": storage.delete_values("real"),
     "DELETES": storage.delete_values("string"),
-    "DIRECTORY": listing.directory,
+    "DIRECTORY": storage.directory,
     "DISABLE": settings.disable,
     "DO": running.do,
     "EDIT": edit,
     "ENABLE": settings.enable,
     "EXECUTE": running.execute,
     "FLIST": storage.flist,
-    "FREE": listing.free,
-    "HELP": words.help_,
+    "FREE": storage.free,
+    "HELP": commands.help_,
     "HERE": locations.here,
-    "ID": listing.identity,
+    "ID": storage.identity,
     "IO": settings.io,
     "LISTF": storage.flist,
-    "LISTL": listing.listl,
-    "LISTP": listing.listp,
-    "LISTR": listing.listr,
-    "LISTS": listing.lists,
+    "LISTL": storage.listl,
+    "LISTP": storage.listp,
+    "LISTR": storage.listr,
+    "LISTS": storage.lists,
     "LOAD": storage.load,
     "NEXT": running.next_,
     "PANIC": running.panic,

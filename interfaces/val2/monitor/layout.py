@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from interfaces.val2.geometry import to_oat
 from interfaces.val2.ports import Where
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import Location, PrecisionPoint, Transformation
+from interfaces.val2.values import Location, PrecisionPoint, Transformation, to_oat
 
 WIDTH = 79
 """Longest line [characters]."""

@@ -7,17 +7,15 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
-from interfaces.val2 import events
+from interfaces.val2 import context
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor import commands, settings, words
-from interfaces.val2.monitor.desk import Dialogue, Said, Style, TerminalState
-from interfaces.val2.monitor.dialogues import WatchDialogue
-from interfaces.val2.monitor.editing import Editing
+from interfaces.val2.monitor import commands, settings
+from interfaces.val2.monitor.control import SharedOperator, Switchboard
+from interfaces.val2.monitor.editor import Editing
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.handlers import HANDLERS
-from interfaces.val2.monitor.locations import Teach
-from interfaces.val2.monitor.switchboard import SharedOperator, Switchboard
-from interfaces.val2.monitor.text import split_word
+from interfaces.val2.monitor.locations import Teach, WatchDialogue
+from interfaces.val2.monitor.state import Dialogue, Said, Style, TerminalState, split_word
 from vrs.errors import VrsError
 
 LONGEST: Final = 2048
@@ -195,7 +193,7 @@ class TerminalMonitor:
         """Whether a line is a command that may be given while a program runs."""
         word, _ = split_word(text)
         try:
-            return not text.strip() or not commands.command(word).idle
+            return not text.strip() or not commands.command_named(word).idle
         except ValError:
             return False
 
@@ -219,7 +217,7 @@ class TerminalMonitor:
             return
         if rest == "?" and settings.state(self.desk, word.upper()):
             return
-        command = words.command(bare)
+        command = commands.command(bare)
         if command.name in {"QUIT", "EXIT"}:
             self._end(now)
             return
@@ -271,26 +269,26 @@ class TerminalMonitor:
         self._waiting.clear()
         self._board.leave(self, now=now)
 
-    def take(self, event: events.Event) -> None:
+    def take(self, event: context.Event) -> None:
         """Take an event of the controller, when in control."""
         desk = self.desk
         match event:
-            case events.Typed(text):
+            case context.Typed(text):
                 desk.said.append(Said(text, Style.TYPED))
-            case events.Asked(text):
+            case context.Asked(text):
                 self._asked = text
-            case events.ProgramPaused(program, step, word):
+            case context.ProgramPaused(program, step, word):
                 self._asked = None
                 if word != "XSTEP" or not desk.steps:
                     desk.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
-            case events.ProgramEnded(program, word):
+            case context.ProgramEnded(program, word):
                 self._asked, desk.steps = None, 0
                 if program or word == "ABORT":
                     desk.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
-            case events.ProgramFailed(error):
+            case context.ProgramFailed(error):
                 self._asked, desk.steps = None, 0
                 desk.fail(error)
-            case events.Warned(text):
+            case context.Warned(text):
                 desk.say(text if text.startswith("*") else f"*Warning* {text}", style=Style.NOTE)
             case _:
                 pass

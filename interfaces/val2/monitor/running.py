@@ -9,8 +9,7 @@ from typing import Final
 from interfaces.val2.controller import ControllerStatus
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.desk import Style, TerminalState
-from interfaces.val2.monitor.text import integer, named, nothing, pieces
+from interfaces.val2.monitor.state import Style, TerminalState, integer, named, nothing, pieces
 from interfaces.val2.statements import timed
 from interfaces.val2.syntax import Blank, Call, Expression
 

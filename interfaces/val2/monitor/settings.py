@@ -9,10 +9,9 @@ from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.commands import unique
-from interfaces.val2.monitor.desk import Dialogue, Style, TerminalState
-from interfaces.val2.monitor.dialogues import Confirm
+from interfaces.val2.monitor.locations import Confirm
 from interfaces.val2.monitor.running import POWER
-from interfaces.val2.monitor.text import halves, nothing, pieces
+from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, nothing, pieces
 from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
 
 

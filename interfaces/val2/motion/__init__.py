@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from interfaces.val2.motion.arm import Arm
-from interfaces.val2.motion.engines import EngineRobot, SiteRobot
-from interfaces.val2.motion.robot import CommandOutcome, RobotPort
+from interfaces.val2.motion.robot import CommandOutcome, EngineRobot, RobotPort, SiteRobot
 
 if TYPE_CHECKING:
     from collections.abc import MutableMapping

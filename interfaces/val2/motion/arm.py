@@ -17,12 +17,11 @@ import numpy as np
 from interfaces.stream.control import OVERRULED
 from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
-from interfaces.val2.motion.altering import Alterations
 from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand
-from interfaces.val2.motion.pacing import MonitorSpeed
 from interfaces.val2.motion.places import (
     NEST,
     READY,
+    Alterations,
     Frames,
     aligned,
     behind,
@@ -32,7 +31,7 @@ from interfaces.val2.motion.places import (
     with_word,
 )
 from interfaces.val2.motion.robot import CommandOutcome, RobotPort
-from interfaces.val2.motion.speeds import Manners, MotionSettings, Speed, bounded
+from interfaces.val2.motion.speeds import Manners, MonitorSpeed, MotionSettings, Speed, bounded
 from interfaces.val2.ports import Where
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.clients.designer import Issued
-from interfaces.val2.motion.engines import standing
-from interfaces.val2.motion.robot import CommandOutcome
+from interfaces.val2.motion.robot import CommandOutcome, standing
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt

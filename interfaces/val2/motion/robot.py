@@ -1,11 +1,18 @@
-"""What motions need of a robot, here or elsewhere: somewhere to send commands, and its timeline."""
+"""What motions need of a robot: somewhere to send commands, and its timeline; robots in this process."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
 
+from interfaces.teleop.operator import OperatorSite
+from vrs.clock import ManualClock
 from vrs.commands import Command
+from vrs.engine import Engine
+from vrs.errors import VrsError
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
@@ -65,3 +72,140 @@ class RobotPort(Protocol):
 
     def real(self, *, now: float) -> Array | None:
         """Joints of the other twin as they were measured last [rad], (n,); None where there's none."""
+
+
+_REMEMBERED: Final = 64
+"""Answers that are kept."""
+_LOOKED: Final = 256
+"""Newest receipts that are looked through for what isn't over."""
+
+
+class EngineRobot:
+    """An engine in this process; a manual clock of it is set to the time of each call."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self._number = 0
+        self._fates: OrderedDict[int, CommandOutcome] = OrderedDict()
+
+    @property
+    def model(self) -> RobotModel:
+        """Its kinematics and limits."""
+        return self.engine.model
+
+    @property
+    def timeline(self) -> Timeline:
+        """The engine's."""
+        return self.engine.timeline
+
+    def ask(self, command: Command | None, *, now: float) -> int:
+        """Carry out a command, or an undo, at once."""
+        self._number += 1
+        try:
+            answer = self._do(command, now)
+        except VrsError as error:
+            fate = CommandOutcome(refusal=str(error))
+        else:
+            fate = (
+                CommandOutcome(answer)
+                if answer is not None
+                else CommandOutcome(refusal="there's nothing to take back")
+            )
+        self._fates[self._number] = fate
+        if len(self._fates) > _REMEMBERED:
+            self._fates.popitem(last=False)
+        return self._number
+
+    def _do(self, command: Command | None, now: float) -> Receipt | None:
+        clock = self.engine.clock
+        if isinstance(clock, ManualClock):
+            clock.set(max(now, clock.now()))
+        if command is None:
+            return self.engine.undo()
+        return self.engine.execute(command)  # type: ignore[arg-type]
+
+    def fate(self, number: int, *, now: float) -> CommandOutcome | None:  # noqa: ARG002 - answers come at once
+        """What became of it; of one that's long over, nothing but that it's over."""
+        fate = self._fates.get(number)
+        if fate is None:
+            return CommandOutcome()
+        receipt = fate.receipt
+        if receipt is None or receipt.status is Status.REJECTED:
+            return fate
+        return CommandOutcome(self.engine.receipt(receipt.command_id))
+
+    def trouble(self) -> str:
+        """None: there's no other twin."""
+        return ""
+
+    @property
+    def lost(self) -> bool:
+        """It's here."""
+        return False
+
+    @property
+    def looks(self) -> float:
+        """It's never in trouble."""
+        return math.inf
+
+    def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
+        """Receipts of what isn't over."""
+        newest = self.engine.newest
+        numbers = range(max(newest - _LOOKED, 0) + 1, newest + 1)
+        return standing((self.engine.receipt(number) for number in numbers), now)
+
+    def real(self, *, now: float) -> Array | None:  # noqa: ARG002 - there's never one
+        """None: there's no other twin."""
+        return None
+
+
+class SiteRobot(EngineRobot):
+    """The operator's site of the laboratory."""
+
+    def __init__(self, site: OperatorSite, told: Callable[[float, Command, Receipt], None] | None = None) -> None:
+        """Reach a site.
+
+        Args:
+            site: The operator's.
+            told: Is told what was carried out, and when [s].
+        """
+        super().__init__(site.engine)
+        self._site, self._told = site, told
+
+    def _do(self, command: Command | None, now: float) -> Receipt | None:
+        if command is None:
+            return self._site.undo(now=now)
+        answer = self._site.execute(command, now=now)
+        assert isinstance(answer, Receipt)
+        if self._told is not None and answer.status is not Status.REJECTED:
+            self._told(now, command, answer)
+        return answer
+
+    def trouble(self) -> str:
+        """Why the real robot stopped by itself."""
+        return self._site.halted
+
+    def real(self, *, now: float) -> Array | None:  # noqa: ARG002 - the newest report counts
+        """Joints that the newest report gives."""
+        report = self._site.report
+        return None if report is None else report.q
+
+
+def standing(receipts: Iterable[Receipt], now: float) -> tuple[Receipt, ...]:
+    """Those that are to be carried out and aren't over at a time [s], in the order of their beginning."""
+    known = {receipt.command_id: receipt for receipt in receipts if receipt.end is not None and not receipt.undone}
+    chosen = []
+    for receipt in known.values():
+        by = known.get(receipt.superseded_by or 0)
+        # One that the next begins before it's over gives way to that; anything else drops it.
+        if by is not None and by.q is not None and receipt.q is not None:
+            after = known.get(by.superseded_by or 0, by)
+            begins = min(by.execute_at or 0.0, after.execute_at or 0.0)
+            lasting = replace(receipt, end=begins)
+        elif receipt.superseded_by is None:
+            lasting = receipt
+        else:
+            continue
+        if (lasting.end or 0.0) > now:
+            chosen.append(lasting)
+    return tuple(sorted(chosen, key=lambda receipt: (receipt.execute_at or 0.0, receipt.command_id)))

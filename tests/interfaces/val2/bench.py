@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from interfaces.val2.geometry import from_oat
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.motion.places import Frames
+from interfaces.val2.values import from_oat
 from robots import puma560
 from vrs import Engine, ManualClock
 

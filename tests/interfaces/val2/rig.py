@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from interfaces.val2.context import Event, ProgramFailed, Typed
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import Event, ProgramFailed, Typed
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.ports import Where
 from interfaces.val2.source import parse_file

@@ -9,11 +9,10 @@ from interfaces.clients.viewer import Viewer
 from interfaces.stream import control
 from interfaces.stream.client import Phase
 from interfaces.stream.control import Role
-from interfaces.val2.control import LeaseControl
 from interfaces.val2.controller import Controller
+from interfaces.val2.monitor.control import LeaseControl, Switchboard
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.switchboard import Switchboard
 from interfaces.val2.motion import Arm
 from interfaces.val2.motion.remote import RemoteRobot
 from tests.interfaces.stream.joined import STEP, Joined

@@ -7,9 +7,9 @@ import re
 from pathlib import Path
 
 from interfaces.val2.controller import Controller
+from interfaces.val2.monitor.control import Control, Free, Switchboard
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.switchboard import Control, Free, Switchboard
 from interfaces.val2.motion import arm_for
 from robots import puma560
 from vrs.clock import ManualClock

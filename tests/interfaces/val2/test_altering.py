@@ -8,13 +8,12 @@ import pytest
 from interfaces.link import delay_profile
 from interfaces.runtime.bodies import exact_arm
 from interfaces.val2.errors import ValError
-from interfaces.val2.geometry import about_x, about_z, from_oat, to_oat
 from interfaces.val2.motion import Arm
 from interfaces.val2.motion.remote import RemoteRobot
 from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from interfaces.val2.values import Transformation
+from interfaces.val2.values import Transformation, about_x, about_z, from_oat, to_oat
 from tests.interfaces.joined import MODEL, bad, constant
 
 from .bench import SQUARE, Bench, close

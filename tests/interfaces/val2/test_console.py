@@ -22,12 +22,11 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.colours import LineLexer, style
 from interfaces.val2.monitor.completion import hint, suggestions
+from interfaces.val2.monitor.control import Free, Switchboard
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.switchboard import Free, Switchboard
-from interfaces.val2.monitor.terminal import Keyboard, Terminal
+from interfaces.val2.monitor.terminal import Keyboard, LineLexer, Terminal, style
 from interfaces.val2.motion import arm_for
 from robots import puma560
 from vrs.clock import ManualClock, WallClock

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from interfaces.stream.control import Lease, Problem, ProblemCode
-from interfaces.val2.control import MEETING, PATIENCE, LeaseControl
+from interfaces.val2.monitor.control import MEETING, PATIENCE, LeaseControl
 from robots.onboard.lease import LeaseState
 
 FREE = Lease(LeaseState.FREE)

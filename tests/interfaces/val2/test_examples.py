@@ -9,8 +9,7 @@ import pytest
 
 from interfaces.link import delay_profile
 from interfaces.runtime.bodies import simulated_puma
-from interfaces.val2.playing import Listeners
-from interfaces.val2.rehearsal import rehearse
+from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
 from robots import puma560

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from interfaces.val2 import parser
-from interfaces.val2.monitor.desk import SLICE
+from interfaces.val2.monitor.state import SLICE
 from interfaces.val2.syntax import Variable
 
 from .sitting import HELLO, LOOP

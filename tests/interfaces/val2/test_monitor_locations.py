@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.val2.geometry import from_oat, to_oat
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import PrecisionPoint, Transformation
+from interfaces.val2.values import PrecisionPoint, Transformation, from_oat, to_oat
 
 from .sitting import AWAY, LOOP, numbers
 

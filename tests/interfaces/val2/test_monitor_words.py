@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor import words
+from interfaces.val2.monitor import commands
 from interfaces.val2.monitor.commands import COMMANDS, command, unique
 from interfaces.val2.monitor.handlers import HANDLERS
 
@@ -64,7 +64,7 @@ def test_an_instruction_or_an_assignment_at_the_prompt_says_what_to_type(sitting
 
 def test_every_word_can_be_explained(sitting):
     for name in COMMANDS:
-        assert next(words.explained(name))[2]
+        assert next(commands.explained(name))[2]
     assert "behind a location" in sitting.type("HELP APPRO")
     assert "DRY.RUN" in sitting.type("HELP dry")
     assert sitting.type("HELP xyzzy").startswith("*Unknown word*")

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.geometry import from_oat, to_oat, to_val_joints
 from interfaces.val2.motion.places import NEST, READY, Frames, aligned, with_word
-from interfaces.val2.values import NULL, PrecisionPoint
+from interfaces.val2.values import NULL, PrecisionPoint, from_oat, to_oat, to_val_joints
 from robots import puma560
 from tests.interfaces.val2.bench import DOWN, MODEL, SQUARE, Bench, close
 from vrs import Status

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.val2.geometry import about_z
+from interfaces.val2.values import about_z
 from tests.interfaces.val2.bench import SQUARE, Bench
 from vrs import Status
 

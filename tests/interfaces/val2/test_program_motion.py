@@ -7,9 +7,9 @@ import time
 
 import pytest
 
+from interfaces.val2.context import ProgramEnded, ProgramPaused, SignalChanged
 from interfaces.val2.controller import STATEMENT
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import ProgramEnded, ProgramPaused, SignalChanged
 from interfaces.val2.values import PrecisionPoint
 from tests.interfaces.val2.rig import READY, FakeArm, Rig, body, failure, run
 

@@ -7,8 +7,8 @@ import random
 
 import pytest
 
+from interfaces.val2.context import ProgramFailed
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import ProgramFailed
 from interfaces.val2.parser import parse_line
 from tests.interfaces.val2.rig import FakeArm, Rig
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from interfaces.val2.context import ProgramEnded
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import ProgramEnded
 from interfaces.val2.interpreter import ProgramState
-from interfaces.val2.reactions import Reactions, reaction_to
+from interfaces.val2.signals import Reactions, reaction_to
 from tests.interfaces.val2.rig import FakeArm, Rig, body
 
 ALARM = ".PROGRAM alarm()\n TYPE TIMER(0)\n.END\n"

@@ -14,10 +14,10 @@ from interfaces import Designer, Viewer, connect
 from interfaces.stream.control import Lease
 from interfaces.teleop import OperatorSite, RobotSiteConfig
 from interfaces.val2.errors import ValError
-from interfaces.val2.geometry import from_oat, to_oat
 from interfaces.val2.motion import Arm, SiteRobot, arm_for
 from interfaces.val2.motion.places import READY
 from interfaces.val2.motion.remote import RemoteRobot
+from interfaces.val2.values import from_oat, to_oat
 from tests.interfaces.joined import MODEL, Joined, bad, constant
 from tests.interfaces.live_rig import operator_here, robot_here
 from vrs.commands import Stop

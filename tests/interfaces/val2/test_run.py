@@ -11,11 +11,10 @@ from interfaces.cli import main
 from interfaces.link import delay_profile
 from interfaces.runtime.bodies import exact_arm
 from interfaces.val2.errors import ValError
-from interfaces.val2.geometry import from_base
-from interfaces.val2.playing import Listeners
-from interfaces.val2.rehearsal import rehearse
+from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
+from interfaces.val2.values import from_base
 from robots import puma560
 
 model = puma560.model()
@@ -145,7 +144,7 @@ def test_where_a_rehearsal_sees_no_farther_isnt_an_error(line):
 
 
 def test_a_rehearsal_ends_where_a_program_computes_for_ever(monkeypatch):
-    monkeypatch.setattr("interfaces.val2.rehearsal.COMPUTING", 0.05)
+    monkeypatch.setattr("interfaces.val2.playing.COMPUTING", 0.05)
     rehearsal = rehearse(parse_file(program("WHILE TRUE DO", "n = 1", "END"), "test.v2"), model)
     assert [finding.error.what for finding in rehearsal.findings] == ["Program given up"]
     assert 0.04 < rehearsal.end < 0.1

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from interfaces.val2.context import SignalChanged
 from interfaces.val2.errors import ValError
-from interfaces.val2.events import SignalChanged
 from interfaces.val2.signals import SOONEST, Rule, Signals
 from interfaces.val2.source import parse_rule
 from tests.interfaces.val2.rig import Rig, body, run

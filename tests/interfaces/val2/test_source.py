@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.geometry import from_oat
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.source import (
     NamedValue,
@@ -24,7 +23,7 @@ from interfaces.val2.source import (
     print_rule,
 )
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import PrecisionPoint, Transformation
+from interfaces.val2.values import PrecisionPoint, Transformation, from_oat
 
 PROGRAMS = sorted((Path(__file__).parent / "programs").glob("*.v2"))
 WHOLE = """; a tray

@@ -16,10 +16,10 @@ import pytest
 
 from interfaces.stream import sockets
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.desk import Said, Style
+from interfaces.val2.monitor.control import Free, Switchboard
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
-from interfaces.val2.monitor.switchboard import Free, Switchboard
+from interfaces.val2.monitor.state import Said, Style
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from interfaces.val2.motion import arm_for
 from interfaces.val2.tcp import MOST, TRIES, UNREAD, ValDoor
