@@ -13,7 +13,7 @@ from interfaces.recording.kinds import ARM
 from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, MeshcatScene
-from interfaces.stream.meshcat.twins import TwinScene
+from interfaces.stream.meshcat.scene import TwinScene
 
 
 class Stage(Protocol):
@@ -32,14 +32,19 @@ class ArmStage(Stage):
 
     def __init__(self, recording: Recording) -> None:
         self._model = recording.model
-        self.scene: MeshcatScene = MeshcatScene(recording.model)
+        self._scene = MeshcatScene(recording.model)
+
+    @property
+    @override
+    def scene(self) -> MeshcatScene:
+        return self._scene
 
     @override
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         links = self._model.links
         assert frame.q_virtual is not None
         real = None if frame.q_real is None else links(frame.q_real)
-        self.scene.show(virtual=links(frame.q_virtual), real=real, path=committed, now=now)
+        self._scene.show(virtual=links(frame.q_virtual), real=real, path=committed, now=now)
 
 
 def stage_of(recording: Recording) -> Stage:

@@ -2,15 +2,117 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
+from functools import lru_cache
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+from vrs.errors import FormatError
+import io
+from pathlib import Path
+from typing import Final
+from PIL import Image, ImageDraw, ImageFont
 from collections.abc import Sequence
 from typing import Any, NamedTuple
-
 import numpy as np
-
 from interfaces.stream.meshcat.commands import Json
-from interfaces.stream.meshcat.library import module
 from interfaces.stream.meshcat.meshes import ShadedMesh, tube
 from vrs.model import Array
+
+ALIAS = "_meshcat_without_its_door"
+"""Name under which the package is known here; `import meshcat` stays what it is."""
+
+
+@lru_cache(maxsize=8)
+def module(name: str) -> Any:
+    """Load a module of MeshCat: `geometry`, `commands` or `path`.
+
+    Raises:
+        FormatError: If MeshCat isn't installed.
+    """
+    spec = find_spec("meshcat")
+    if spec is None or spec.submodule_search_locations is None:
+        raise FormatError("meshcat", "not installed; the 3D view is its viewer")
+    if ALIAS not in sys.modules:
+        package = ModuleType(ALIAS)
+        package.__path__ = list(spec.submodule_search_locations)
+        sys.modules[ALIAS] = package
+    return importlib.import_module(f"{ALIAS}.{name}")
+
+
+SIZE: Final = (448, 268)
+"""Pixels across and down."""
+PAPER: Final = (26, 60, 84)
+INK: Final = (240, 246, 250)
+LARGEST, SMALLEST = 72, 14
+"""Height of the letters [pixels]."""
+MARGIN: Final = 18
+_SPACING: Final = 1.25
+
+
+@lru_cache(maxsize=1)
+def _letters() -> Path:
+    """The letters that matplotlib brings, found without loading it.
+
+    Raises:
+        FormatError: If they aren't there.
+    """
+    spec = find_spec("matplotlib")
+    if spec is None or spec.origin is None:
+        raise FormatError("matplotlib", "not installed; its letters are those of the robot's screen")
+    return Path(spec.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
+
+
+def lettered(text: str) -> bytes:
+    """A PNG with a text in its middle, in lines broken between words, else within; what doesn't fit is left out."""
+    for size in range(LARGEST, SMALLEST - 1, -2):
+        font = ImageFont.truetype(_letters(), size)
+        lines = broken(text, font, SIZE[0] - 2 * MARGIN, within=size == SMALLEST)
+        if lines and len(lines) * size * _SPACING <= SIZE[1] - 2 * MARGIN:
+            break
+    image = Image.new("RGB", SIZE, PAPER)
+    draw = ImageDraw.Draw(image)
+    step = size * _SPACING
+    top = max((SIZE[1] - len(lines) * step) / 2, MARGIN)
+    for k, line in enumerate(lines):
+        draw.text((SIZE[0] / 2, top + (k + 0.5) * step), line, INK, font, anchor="mm")
+    file = io.BytesIO()
+    image.save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def broken(text: str, font: ImageFont.FreeTypeFont, width: float, *, within: bool) -> list[str]:
+    """Break a text into lines.
+
+    Args:
+        text: The text.
+        font: Of its letters.
+        width: Of a line at most [pixels].
+        within: Whether words that are too long are broken as well; else there are no lines then.
+    """
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and font.getlength(longer) <= width:
+            lines[-1] = longer
+        elif font.getlength(word) <= width:
+            lines.append(word)
+        elif within:
+            lines += _pieces(word, font, width)
+        else:
+            return []
+    return lines
+
+
+def _pieces(word: str, font: ImageFont.FreeTypeFont, width: float) -> list[str]:
+    pieces = [""]
+    for letter in word:
+        if pieces[-1] and font.getlength(pieces[-1] + letter) > width:
+            pieces.append("")
+        pieces[-1] += letter
+    return pieces
+
 
 g = module("geometry")
 

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
-
 from interfaces.clients.ports import EnginePort
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.stream import control
@@ -24,6 +23,21 @@ from interfaces.stream.control import (
 )
 from interfaces.stream.line import ClientPart, Line, UnreachableError, Worker
 from vrs.clock import WallClock
+from functools import partial
+from interfaces.clients.viewer import ShownFrame
+from interfaces.messages import ViewForm
+from interfaces.stream.client import ClientCore
+from interfaces.stream.control import Role, State, Welcome
+from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
+from interfaces.clients.designer import Issued
+from interfaces.jobs import Forecast, JobList, ListCommand, Load
+from interfaces.stream.client import MobileCore, Replied
+from interfaces.stream.control import Problem, ProblemCode, Role
+from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
+from interfaces.stream.remote import RemoteDesigner
+from interfaces.teleop.tasks import Doing, Go
+from robots.onboard.journey import Goal
+from vrs.commands import DriveCommand, Stop
 
 C = TypeVar("C", bound=ClientCore)
 T = TypeVar("T")
@@ -280,3 +294,165 @@ def _address(url: str) -> str:
         scheme, rest = "ws", url
     scheme = {"http": "ws", "https": "wss"}.get(scheme, scheme)
     return f"{scheme}://{rest}" if "/" in rest else f"{scheme}://{rest}/ws"
+
+
+class Connection(RobotConnection[ClientCore]):
+    """An arm that a server serves."""
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        role: Role = Role.OPERATOR,
+        token: str | None = None,
+        name: str = "client",
+        encoding: Encoding = Encoding.MSGPACK,
+        timeout: float = 5.0,
+    ) -> None:
+        """Connect; see `interfaces.connect`."""
+        super().__init__(ClientCore, url, role=role, token=token, name=name, encoding=encoding, timeout=timeout)
+        self.designer = RemoteDesigner(self._session)
+        """Issues commands; they need the lease."""
+        self.observer = RemoteObserver(self._session)
+        """Asks for positions."""
+        self.supervisor = RemoteSupervisor(self.designer, self.observer)
+        """Both."""
+        self._add(self._session, self.designer)
+        self._add(self._session, self.observer)
+
+    def viewer(
+        self,
+        *,
+        rate: float = 50.0,
+        form: ViewForm = ViewForm.SEGMENTS,
+        show: Callable[[ShownFrame], None] | None = None,
+    ) -> RemoteViewer:
+        """A viewer, on a connection of its own.
+
+        Args:
+            rate: Frames to show a second, 0.1 to 1000.
+            form: What crosses.
+            show: Is called with each frame, in another thread: to be quick.
+
+        Raises:
+            UnreachableError: If the connection doesn't come about.
+            InvalidValueError: If rate is out of range.
+        """
+        session = self._open(Role.VIEWER)
+        viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), show=show, end=partial(self._end, session))
+        self._add(session, viewer)
+        return viewer
+
+    @property
+    def state(self) -> State | None:
+        """The real robot as it was last heard of; None before that."""
+        return self._session.core.state
+
+    @property
+    def welcome(self) -> Welcome:
+        """What the server said of itself and its robot."""
+        welcome = self._session.core.welcome
+        assert isinstance(welcome, Welcome)
+        return welcome
+
+
+class MobileConnection(RobotConnection[MobileCore]):
+    """Drives a mobile robot, sends it to goals, and lets it do jobs."""
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        role: Role = Role.OPERATOR,
+        token: str | None = None,
+        name: str = "client",
+        encoding: Encoding = Encoding.MSGPACK,
+        timeout: float = 5.0,
+    ) -> None:
+        """Connect; see `interfaces.connect_mobile`."""
+        super().__init__(MobileCore, url, role=role, token=token, name=name, encoding=encoding, timeout=timeout)
+        self._designer = RemoteDesigner(self._session)
+        self._add(self._session, self._designer)
+
+    def drive(self, v: float, w: float, *, wait: float = 0.0) -> Issued:
+        """Drive for a moment; who doesn't say so again stops. It ends what the robot does by itself.
+
+        Args:
+            v: Linear speed [m/s].
+            w: Angular speed [rad/s].
+            wait: How long to wait for the answer [s].
+
+        Returns:
+            What is known of it; a `refusal` says why it isn't carried out.
+        """
+        return self._designer.issue(DriveCommand(v, w, self.welcome.holds), wait=wait)
+
+    def stop(self, *, wait: float = 0.0) -> Issued:
+        """Stop both robots, and what the real one does by itself."""
+        return self._designer.issue(Stop(), wait=wait)
+
+    def go(self, goal: Goal, *, wait: float = 5.0) -> Tasks | Problem:
+        """Send the robot to a goal.
+
+        Args:
+            goal: Where to.
+            wait: How long to wait for the answer, not for the robot [s].
+
+        Returns:
+            What it does then; or why not.
+        """
+        return self._ask(Go(goal), wait)
+
+    def load(self, jobs: JobList, *, wait: float = 5.0) -> Tasks | Problem:
+        """Put a list of jobs in the place of the one that's there; see `go`."""
+        return self._ask(Load(jobs), wait)
+
+    def do(self, command: ListCommand, *, wait: float = 5.0) -> Tasks | Problem:
+        """Run, pause, resume or abort the list, or press the key; see `go`."""
+        return self._ask(command, wait)
+
+    def dry_run(self, *, wait: float = 30.0) -> Forecast | Problem:
+        """Ask how long the list is likely to take; the virtual robot alone tries it."""
+        answer = self._ask(Trial.DRY_RUN, wait)
+        if isinstance(answer, Problem):
+            return answer
+        self.wait(lambda _: self.tasks is not None and self.tasks.forecast is not None, wait)
+        tasks = self.tasks
+        if tasks is None or tasks.forecast is None:
+            return Problem(ProblemCode.STOPPING, f"no forecast within {wait:g} s")
+        return tasks.forecast
+
+    def finished(self, timeout: float) -> bool:
+        """Wait until the robot does nothing by itself any more, or the time [s] is over; whether that's so."""
+        return self.wait(lambda _: self.tasks is not None and self.tasks.doing is Doing.NOTHING, timeout)
+
+    def _ask(self, wanted: Wanted, wait: float) -> Tasks | Problem:
+        answer: Replied = self._wish(lambda number, epoch: TaskOrder(number, epoch, wanted), wait)
+        return answer if isinstance(answer, Tasks | Problem) else ELSE
+
+    @property
+    def postures(self) -> Postures | None:
+        """Where both robots are; None before that was told."""
+        return self._session.core.postures
+
+    @property
+    def tasks(self) -> Tasks | None:
+        """What the robot does by itself; None before that was told."""
+        return self._session.core.tasks
+
+    @property
+    def seen(self) -> Seen | None:
+        """What it sees; None before that was told."""
+        return self._session.core.seen
+
+    @property
+    def plan(self) -> Plan | None:
+        """The known map; None before that was told."""
+        return self._session.core.plan
+
+    @property
+    def welcome(self) -> MobileWelcome:
+        """What the server said of itself and its robot."""
+        welcome = self._session.core.welcome
+        assert isinstance(welcome, MobileWelcome)
+        return welcome

@@ -7,17 +7,17 @@ import contextlib
 import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Protocol
-
 from interfaces.engine_server.site import earliest
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem, ProtocolError
-from interfaces.stream.dialling import dial
 from vrs.clock import Clock
 from vrs.errors import VrsError
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from websockets.asyncio.client import ClientConnection
+    from websockets.asyncio.client import connect
 
 OPENING = 5.0
 """Time for a connection to stand [s]."""
@@ -207,3 +207,28 @@ class Line:
                     part.renew()
             self._sessions = sessions
         return iter(self.parts)
+
+
+def dial(url: str, encoding: Encoding, *, largest: int, opening: float, closing: float) -> connect:
+    """A connection to enter: not compressed, not by a proxy, and without WebSocket's own pings.
+
+    Args:
+        url: `ws://HOST:PORT/…`.
+        encoding: What the server is asked for.
+        largest: Longest message that is received [B].
+        opening: Longest that it may take to be made [s].
+        closing: Longest that a farewell may take [s].
+    """
+    from websockets.asyncio.client import connect
+    from websockets.typing import Subprotocol
+
+    return connect(
+        url,
+        subprotocols=[Subprotocol(encoding.value)],
+        compression=None,
+        max_size=largest,
+        open_timeout=opening,
+        close_timeout=closing,
+        ping_interval=None,
+        proxy=None,
+    )
