@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from interfaces.stream.connect import Connection
-    from interfaces.stream.mobile_connect import MobileConnection
+    from interfaces.stream.connection import Connection, MobileConnection
 
 
 def connect(
@@ -33,7 +32,7 @@ def connect(
         ValueError: If role or encoding is none of those.
     """
     from interfaces.stream.codec import Encoding
-    from interfaces.stream.connect import Connection
+    from interfaces.stream.connection import Connection
     from interfaces.stream.control import Role
 
     return Connection(url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout)
@@ -50,8 +49,8 @@ def connect_mobile(
 ) -> MobileConnection:
     """Reach a mobile robot that `vrs serve --robot ipr` serves; see `connect`."""
     from interfaces.stream.codec import Encoding
+    from interfaces.stream.connection import MobileConnection
     from interfaces.stream.control import Role
-    from interfaces.stream.mobile_connect import MobileConnection
 
     return MobileConnection(
         url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout

@@ -27,9 +27,8 @@ from interfaces.media.camera import CameraError
 from interfaces.media.live import LiveMedia
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
-from interfaces.stream.kept_files import HEADERS
 from interfaces.stream.limits import Bucket
-from interfaces.stream.meshcat.viewers import (
+from interfaces.stream.meshcat.page import (
     PATIENCE,
     POLICY_VIOLATION,
     TRY_AGAIN_LATER,
@@ -38,6 +37,7 @@ from interfaces.stream.meshcat.viewers import (
     same_origin,
     token_in,
 )
+from interfaces.stream.server import HEADERS
 from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError, VrsError
 

@@ -20,8 +20,7 @@ from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack
 from interfaces.recording.stages import stage_of
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.meshcat.page import HEADERS, files
-from interfaces.stream.meshcat.viewers import Viewers
+from interfaces.stream.meshcat.page import HEADERS, Viewers, files
 from vrs.clock import Clock
 from vrs.errors import VrsError
 

@@ -14,8 +14,8 @@ from typing import Annotated, Any, Final
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from interfaces.stream.kept_files import HEADERS, POLICY
 from interfaces.stream.limits import Bucket, Strangers
+from interfaces.stream.server import HEADERS, POLICY
 from interfaces.stream.sockets import let_stay
 from vrs.checks import validated, within
 

@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from interfaces.stream.kept_files import HEADERS, KeptFile
+from interfaces.stream.server import HEADERS, KeptFile
 
 _TYPES: Final = {"css": "text/css", "js": "text/javascript"}
 _READER: Final = "vrs.js"

@@ -24,10 +24,10 @@ from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.control import Role
-from interfaces.stream.kept_files import HEADERS
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.meshcat.viewers import Viewers
+from interfaces.stream.meshcat.page import Viewers
+from interfaces.stream.server import HEADERS
 from vrs.errors import InvalidValueError, VrsError
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from interfaces.recording.recording import Recording, open_recording
 from interfaces.recording.stages import prepare
 from interfaces.station.shelf import LOOKED_INTO, Shelf
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.meshcat.viewers import Viewers
+from interfaces.stream.meshcat.page import Viewers
 from vrs.checks import one_of
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError

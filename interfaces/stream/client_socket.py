@@ -1,4 +1,4 @@
-"""Keeps clients connected: a thread with its own loop, and the sockets of each client; a thin shell."""
+"""The sockets of a client, which connect again by themselves: a thread with an event loop. A thin shell."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ import contextlib
 import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Protocol
+
 from interfaces.engine_server.site import earliest
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Problem, ProtocolError
 from vrs.clock import Clock
 from vrs.errors import VrsError
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from websockets.asyncio.client import ClientConnection
-    from websockets.asyncio.client import connect
+    from websockets.asyncio.client import ClientConnection, connect
 
 OPENING = 5.0
 """Time for a connection to stand [s]."""

@@ -1,15 +1,22 @@
-"""What programs do with a server of any robot: connect, have the lease, and change the way to the robot."""
+"""A robot that a server serves, for `interfaces.connect` and `interfaces.connect_mobile`."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from types import TracebackType
 from typing import Generic, Self, TypeVar
+
+from interfaces.clients.designer import Issued
 from interfaces.clients.ports import EnginePort
+from interfaces.clients.viewer import ShownFrame
+from interfaces.jobs import Forecast, JobList, ListCommand, Load
 from interfaces.link.clock_sync import ClockEstimate
+from interfaces.messages import ViewForm
 from interfaces.stream import control
-from interfaces.stream.client import Ask, ClientCore, Replied
+from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
+from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import (
     DirectionConditions,
@@ -19,24 +26,15 @@ from interfaces.stream.control import (
     Problem,
     ProblemCode,
     Role,
+    State,
     Survey,
+    Welcome,
 )
-from interfaces.stream.line import ClientPart, Line, UnreachableError, Worker
-from vrs.clock import WallClock
-from functools import partial
-from interfaces.clients.viewer import ShownFrame
-from interfaces.messages import ViewForm
-from interfaces.stream.client import ClientCore
-from interfaces.stream.control import Role, State, Welcome
-from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
-from interfaces.clients.designer import Issued
-from interfaces.jobs import Forecast, JobList, ListCommand, Load
-from interfaces.stream.client import MobileCore, Replied
-from interfaces.stream.control import Problem, ProblemCode, Role
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
-from interfaces.stream.remote import RemoteDesigner
+from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
 from interfaces.teleop.tasks import Doing, Go
 from robots.onboard.journey import Goal
+from vrs.clock import WallClock
 from vrs.commands import DriveCommand, Stop
 
 C = TypeVar("C", bound=ClientCore)

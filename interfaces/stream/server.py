@@ -1,26 +1,25 @@
-"""The sockets of a hub: a task that writes for each client, and one look at those whose sending is blocked."""
+"""The HTTP and WebSocket server of a hub: one writer task a client, Host and Origin checks, cached files."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
-from starlette.requests import Request
-from starlette.responses import Response
 import asyncio
 import contextlib
+import hashlib
 import logging
 import math
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Final
+
 from starlette.applications import Starlette
-from starlette.responses import JSONResponse, PlainTextResponse
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from websockets.frames import Opcode
+
 from interfaces.stream.access import check_host, check_origin
 from interfaces.stream.codec import Encoding
 from interfaces.stream.control import Role

@@ -22,7 +22,7 @@ from vrs.errors import VrsError
 
 if TYPE_CHECKING:
     from interfaces.stream.access import Access
-    from interfaces.stream.connect import Connection
+    from interfaces.stream.connection import Connection
     from interfaces.val2.motion import Arm
 
 HOST: Final = "127.0.0.1"

@@ -28,10 +28,10 @@ from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRob
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
+from interfaces.stream.client_socket import UnreachableError
+from interfaces.stream.connection import MobileConnection
 from interfaces.stream.control import Lease, Problem, Role
-from interfaces.stream.line import UnreachableError
 from interfaces.stream.mobile import Tasks
-from interfaces.stream.mobile_connect import MobileConnection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.equipment import CONTROL
 from interfaces.teleop.driving import DrivenConfig

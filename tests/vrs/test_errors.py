@@ -6,7 +6,7 @@ import pickle
 
 import pytest
 
-from interfaces.stream.line import UnreachableError
+from interfaces.stream.client_socket import UnreachableError
 from vrs.errors import (
     FormatError,
     InvalidValueError,

@@ -14,9 +14,9 @@ from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
 
 from interfaces.link.round_trip import Ping
+from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.control import Attached, Hello, Problem, ProtocolError, Role
-from interfaces.stream.dialling import dial
 from interfaces.teleop import Report
 from interfaces.teleop.line import SiteLine
 from robots.onboard import LossPolicy

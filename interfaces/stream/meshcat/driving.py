@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from interfaces.clients.appearance import parts_at
-from interfaces.stream.meshcat.commands import set_transform
 from interfaces.stream.meshcat.committed import Committed
 from interfaces.stream.meshcat.meshes import Bodies, bodies, shaded
-from interfaces.stream.meshcat.twins import COLOURS, PATH_PERIOD, ROOT, TwinScene
+from interfaces.stream.meshcat.scene import COLOURS, PATH_PERIOD, ROOT, TwinScene, set_transform
 from vrs.checks import finite_array, number_in
 from vrs.mobile import Grid, MobileModel
 from vrs.model import Array
@@ -149,12 +148,12 @@ class MobileScene(TwinScene):
         """Show a message on the real robot's screen; an empty one clears it."""
         path = f"{ROOT}/real/body/0/screen"
         if text:
-            from interfaces.stream.meshcat.screen import lettered
+            from interfaces.stream.meshcat.objects import text_picture
             from robots.ipr.shapes import SCREEN_SIZE, screen_pose
 
             X = screen_pose()
             X[:3, 3] += SCREEN_LIFT * X[:3, 0]
-            self._set_object(path, self._objects.sign(path, lettered(text), SCREEN_SIZE, X))
+            self._set_object(path, self._objects.sign(path, text_picture(text), SCREEN_SIZE, X))
         self._set(path, "visible", bool(text))
         self._newest.wake()
 

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import importlib
+import io
 import sys
+from collections.abc import Sequence
 from functools import lru_cache
 from importlib.util import find_spec
-from types import ModuleType
-from typing import Any
-from vrs.errors import FormatError
-import io
 from pathlib import Path
-from typing import Final
-from PIL import Image, ImageDraw, ImageFont
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
 import numpy as np
-from interfaces.stream.meshcat.commands import Json
+
 from interfaces.stream.meshcat.meshes import ShadedMesh, tube
+from vrs.errors import FormatError
 from vrs.model import Array
+
+if TYPE_CHECKING:
+    from PIL import ImageFont
+
+Json = dict[str, Any]
 
 ALIAS = "_meshcat_without_its_door"
 """Name under which the package is known here; `import meshcat` stays what it is."""
@@ -41,18 +44,18 @@ def module(name: str) -> Any:
     return importlib.import_module(f"{ALIAS}.{name}")
 
 
-SIZE: Final = (448, 268)
+SCREEN_PIXELS: Final = (448, 268)
 """Pixels across and down."""
-PAPER: Final = (26, 60, 84)
-INK: Final = (240, 246, 250)
-LARGEST, SMALLEST = 72, 14
+SCREEN_PAPER: Final = (26, 60, 84)
+SCREEN_INK: Final = (240, 246, 250)
+LARGEST_LETTERS, SMALLEST_LETTERS = 72, 14
 """Height of the letters [pixels]."""
-MARGIN: Final = 18
-_SPACING: Final = 1.25
+SCREEN_MARGIN: Final = 18
+_LINE_SPACING: Final = 1.25
 
 
 @lru_cache(maxsize=1)
-def _letters() -> Path:
+def _font_file() -> Path:
     """The letters that matplotlib brings, found without loading it.
 
     Raises:
@@ -64,32 +67,34 @@ def _letters() -> Path:
     return Path(spec.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
 
 
-def lettered(text: str) -> bytes:
-    """A PNG with a text in its middle, in lines broken between words, else within; what doesn't fit is left out."""
-    for size in range(LARGEST, SMALLEST - 1, -2):
-        font = ImageFont.truetype(_letters(), size)
-        lines = broken(text, font, SIZE[0] - 2 * MARGIN, within=size == SMALLEST)
-        if lines and len(lines) * size * _SPACING <= SIZE[1] - 2 * MARGIN:
+def text_picture(text: str) -> bytes:
+    """Return a PNG with a text in its middle, its lines wrapped; what doesn't fit is left out."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    for size in range(LARGEST_LETTERS, SMALLEST_LETTERS - 1, -2):
+        font = ImageFont.truetype(_font_file(), size)
+        lines = wrapped(text, font, SCREEN_PIXELS[0] - 2 * SCREEN_MARGIN, within=size == SMALLEST_LETTERS)
+        if lines and len(lines) * size * _LINE_SPACING <= SCREEN_PIXELS[1] - 2 * SCREEN_MARGIN:
             break
-    image = Image.new("RGB", SIZE, PAPER)
+    image = Image.new("RGB", SCREEN_PIXELS, SCREEN_PAPER)
     draw = ImageDraw.Draw(image)
-    step = size * _SPACING
-    top = max((SIZE[1] - len(lines) * step) / 2, MARGIN)
+    step = size * _LINE_SPACING
+    top = max((SCREEN_PIXELS[1] - len(lines) * step) / 2, SCREEN_MARGIN)
     for k, line in enumerate(lines):
-        draw.text((SIZE[0] / 2, top + (k + 0.5) * step), line, INK, font, anchor="mm")
+        draw.text((SCREEN_PIXELS[0] / 2, top + (k + 0.5) * step), line, SCREEN_INK, font, anchor="mm")
     file = io.BytesIO()
     image.save(file, "PNG", optimize=True)
     return file.getvalue()
 
 
-def broken(text: str, font: ImageFont.FreeTypeFont, width: float, *, within: bool) -> list[str]:
+def wrapped(text: str, font: ImageFont.FreeTypeFont, width: float, *, within: bool) -> list[str]:
     """Break a text into lines.
 
     Args:
         text: The text.
         font: Of its letters.
         width: Of a line at most [pixels].
-        within: Whether words that are too long are broken as well; else there are no lines then.
+        within: Whether words that are too long are wrapped as well; else there are no lines then.
     """
     lines: list[str] = []
     for word in text.split():
@@ -99,13 +104,13 @@ def broken(text: str, font: ImageFont.FreeTypeFont, width: float, *, within: boo
         elif font.getlength(word) <= width:
             lines.append(word)
         elif within:
-            lines += _pieces(word, font, width)
+            lines += _word_pieces(word, font, width)
         else:
             return []
     return lines
 
 
-def _pieces(word: str, font: ImageFont.FreeTypeFont, width: float) -> list[str]:
+def _word_pieces(word: str, font: ImageFont.FreeTypeFont, width: float) -> list[str]:
     pieces = [""]
     for letter in word:
         if pieces[-1] and font.getlength(pieces[-1] + letter) > width:

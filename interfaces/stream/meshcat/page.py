@@ -1,27 +1,26 @@
-"""The page `/view`, and `/meshcat`, its WebSocket: a thin shell round a `TwinScene`."""
+"""The page `/view` and its WebSocket: each viewer gets the newest of everything, as quickly as it can."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Sequence
 from functools import lru_cache
+from importlib import resources
 from typing import Final, Protocol
 from urllib.parse import urlsplit
-from starlette.requests import HTTPConnection
-from starlette.websockets import WebSocket, WebSocketDisconnect
-from interfaces.stream.meshcat.newest import ReaderPosition
-from interfaces.stream.sockets import let_stay
-from vrs.errors import InvalidValueError
-from collections.abc import Awaitable, Callable, Sequence
-from importlib import resources
-from typing import Final
+
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
 from interfaces.clients.appearance import viewer_bundle
-from interfaces.stream.kept_files import KeptFile
+from interfaces.stream.meshcat.newest import ReaderPosition
 from interfaces.stream.meshcat.scene import TwinScene
+from interfaces.stream.server import KeptFile
+from interfaces.stream.sockets import let_stay
+from vrs.errors import InvalidValueError
 
 BATCHES: Final = "vrs.meshcat.1"
 """WebSocket subprotocol of messages of several commands, each after its length: four bytes, little-endian.

@@ -1,26 +1,24 @@
-"""Both robots and the committed path as MeshCat's commands: the scene once, then what changes."""
+"""Scenes of a virtual and a real robot as MeshCat's commands: everything once, then what changes."""
 
 from __future__ import annotations
 
-from typing import Any
-import msgspec
-from vrs.model import Array
+from collections import deque
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any, Final
+
+import msgspec
 import numpy as np
-from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece, Kinematics
-from interfaces.stream.meshcat.newest import Newest, ReaderPosition
-from vrs.mobile import ArcTimeline
-from vrs.timeline import Timeline
-from collections import deque
-from typing import Final
 from numpy.typing import ArrayLike
-from interfaces.stream.meshcat.committed import Committed
+
+from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece, Kinematics
 from interfaces.stream.meshcat.meshes import Bodies, bodies
+from interfaces.stream.meshcat.newest import Newest, ReaderPosition
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
+from vrs.mobile import ArcTimeline
 from vrs.model import Array, RobotModel, frozen_array
+from vrs.timeline import Timeline
 
 Json = dict[str, Any]
 

@@ -13,7 +13,7 @@ from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from robots.onboard.lease import LeaseState
 
 if TYPE_CHECKING:
-    from interfaces.stream.connect import Connection
+    from interfaces.stream.connection import Connection
 
 _AGAIN: Final = 0.02
 """Time between two looks whether control is there again [s]."""

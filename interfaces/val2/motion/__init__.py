@@ -10,7 +10,7 @@ from interfaces.val2.motion.robot import CommandOutcome, EngineRobot, RobotPort,
 if TYPE_CHECKING:
     from collections.abc import MutableMapping
 
-    from interfaces.stream.connect import Connection
+    from interfaces.stream.connection import Connection
     from vrs.engine import Engine
 
 __all__ = ["Arm", "CommandOutcome", "EngineRobot", "RobotPort", "SiteRobot", "arm_for"]

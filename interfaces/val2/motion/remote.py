@@ -15,7 +15,7 @@ from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
-    from interfaces.stream.connect import Connection
+    from interfaces.stream.connection import Connection
     from interfaces.stream.control import State
 
 _PATIENCE: Final = 2.0

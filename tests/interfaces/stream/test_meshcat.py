@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from interfaces.stream.meshcat import Committed, MeshcatScene
-from interfaces.stream.meshcat.commands import set_transform
 from interfaces.stream.meshcat.committed import PIECE, CommittedPath
-from interfaces.stream.meshcat.library import module
 from interfaces.stream.meshcat.meshes import shaded, tube
 from interfaces.stream.meshcat.newest import MOST_READERS, Newest
+from interfaces.stream.meshcat.objects import module
+from interfaces.stream.meshcat.scene import set_transform
 from robots import puma560
 from robots.puma560.parameters import FLANGE
 from robots.puma560.shapes import LinkShape

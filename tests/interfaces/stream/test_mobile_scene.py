@@ -14,7 +14,7 @@ from PIL import Image
 from interfaces.clients.appearance import parts_at
 from interfaces.stream.meshcat import Committed, MobileScene
 from interfaces.stream.meshcat.meshes import bodies
-from interfaces.stream.meshcat.screen import INK
+from interfaces.stream.meshcat.objects import SCREEN_INK
 from robots import ipr
 from robots.ipr.robot import place
 from robots.ipr.shapes import SCREEN_SIZE, screen_pose
@@ -125,7 +125,7 @@ def test_a_message_stands_on_the_glass_of_the_real_robot_until_it_is_cleared() -
     scene.say("")
     assert told(slot)["/vrs/real/body/0/screen visible"]["value"] is False
     for picture in pictures:
-        ink = (picture == INK).all(axis=-1)
+        ink = (picture == SCREEN_INK).all(axis=-1)
         rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
         assert 0 < rows[0] < rows[-1] < picture.shape[0] - 1
         assert 0 < columns[0] < columns[-1] < picture.shape[1] - 1

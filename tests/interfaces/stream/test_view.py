@@ -15,8 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from interfaces.stream.meshcat import Committed, MeshcatScene
-from interfaces.stream.meshcat.page import routes
-from interfaces.stream.meshcat.viewers import BATCHES, PATIENCE, UNAUTHORISED
+from interfaces.stream.meshcat.page import BATCHES, PATIENCE, UNAUTHORISED, routes
 from robots import puma560
 from tests.interfaces.pages import until, wait
 from tests.interfaces.stream.serving import Serving, served
