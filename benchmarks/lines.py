@@ -22,8 +22,8 @@ from vrs.errors import PlanningError
 from vrs.model import Array
 from vrs.planning.along import TOLERANCE
 from vrs.planning.certificate import violation
-from vrs.planning.course import Course, rotation_vector, rotations
 from vrs.planning.line import line
+from vrs.planning.path import Course, rotation_vector, rotations
 from vrs.planning.plan import Plan
 from vrs.segment import State, evaluate
 

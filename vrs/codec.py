@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar, overload
 
 import msgspec
 
 from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile.timeline import ArcTimeline
 from vrs.model import Array, frozen_array
 from vrs.segment import ArcSegment, PolynomialSegment, Segment
 from vrs.timeline import Timeline
 
 SCHEMA = "vrs.timeline"
+ARC_SCHEMA = "vrs.arc_timeline"
 SCHEMA_VERSION = 1
 
 _Row = Annotated[list[float], msgspec.Meta(min_length=1, max_length=64)]
-_Made = TypeVar("_Made")
+AnyTimeline: TypeAlias = Timeline | ArcTimeline
+_KindT = TypeVar("_KindT", Timeline, ArcTimeline)
 
 
 class PolynomialWire(msgspec.Struct, tag="polynomial", tag_field="type", forbid_unknown_fields=True, frozen=True):
@@ -51,6 +54,17 @@ class TimelineWire(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     start: float
     initial: _Row
     segments: list[PolynomialWire]
+
+
+class ArcTimelineWire(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A timeline of arcs as it's written."""
+
+    schema: str
+    schema_version: int
+    version: int
+    start: float
+    initial: tuple[float, float, float]
+    segments: list[ArcWire]
 
 
 def _rows(a: Array) -> list[list[float]]:
@@ -97,68 +111,69 @@ def _polynomial(wire: PolynomialWire) -> PolynomialSegment:
     return PolynomialSegment(wire.start, wire.duration, frozen_array(wire.coefficients), wire.command_id)
 
 
-def _to_wire(timeline: Timeline) -> TimelineWire:
+def _to_wire(timeline: AnyTimeline) -> TimelineWire | ArcTimelineWire:
+    if isinstance(timeline, ArcTimeline):
+        x, y, theta = timeline.initial.tolist()
+        arcs = [arc_to_wire(arc) for arc in timeline.segments]
+        return ArcTimelineWire(ARC_SCHEMA, SCHEMA_VERSION, timeline.version, timeline.start, (x, y, theta), arcs)
     segments = [PolynomialWire(s.start, s.duration, _rows(s.coefficients), s.command_id) for s in timeline.segments]
     initial: list[float] = timeline.initial.tolist()
     return TimelineWire(SCHEMA, SCHEMA_VERSION, timeline.version, timeline.start, initial, segments)
 
 
-def to_json(timeline: Timeline) -> bytes:
+def to_json(timeline: AnyTimeline) -> bytes:
     """Write a timeline as JSON; floats are exact."""
     return msgspec.json.encode(_to_wire(timeline))
 
 
-def to_msgpack(timeline: Timeline) -> bytes:
+def to_msgpack(timeline: AnyTimeline) -> bytes:
     """Write a timeline as msgpack; floats are exact."""
     return msgspec.msgpack.encode(_to_wire(timeline))
 
 
-def from_json(data: bytes) -> Timeline:
+@overload
+def from_json(data: bytes) -> Timeline: ...
+@overload
+def from_json(data: bytes, kind: type[_KindT]) -> _KindT: ...
+def from_json(data: bytes, kind: Any = Timeline) -> Any:
     """Read a timeline that `to_json` wrote.
-
-    Raises:
-        FormatError: If the bytes are anything else.
-    """
-    return _read(data, msgspec.json.decode)
-
-
-def from_msgpack(data: bytes) -> Timeline:
-    """Read a timeline that `to_msgpack` wrote.
-
-    Raises:
-        FormatError: If the bytes are anything else.
-    """
-    return _read(data, msgspec.msgpack.decode)
-
-
-def _read(data: bytes, decode: Callable[..., Any]) -> Timeline:
-    return read(data, decode, TimelineWire, (SCHEMA, SCHEMA_VERSION), _timeline)
-
-
-def _timeline(wire: TimelineWire) -> Timeline:
-    return Timeline(wire.initial, wire.start, [_polynomial(one) for one in wire.segments], wire.version)
-
-
-def read(
-    data: bytes, decode: Callable[..., Any], form: type[Any], schema: tuple[str, int], make: Callable[[Any], _Made]
-) -> _Made:
-    """Read a timeline of any kind from a document.
 
     Args:
         data: The document.
-        decode: Of JSON or msgpack.
-        form: What the document must be.
-        schema: Its name and version.
-        make: Makes the timeline of it; what isn't sound raises an `InvalidValueError`.
+        kind: `Timeline`, or `ArcTimeline`.
 
     Raises:
         FormatError: If the bytes are anything else.
     """
+    return _read(data, msgspec.json.decode, kind)
+
+
+@overload
+def from_msgpack(data: bytes) -> Timeline: ...
+@overload
+def from_msgpack(data: bytes, kind: type[_KindT]) -> _KindT: ...
+def from_msgpack(data: bytes, kind: Any = Timeline) -> Any:
+    """Read a timeline that `to_msgpack` wrote.
+
+    Args:
+        data: The document.
+        kind: `Timeline`, or `ArcTimeline`.
+
+    Raises:
+        FormatError: If the bytes are anything else.
+    """
+    return _read(data, msgspec.msgpack.decode, kind)
+
+
+def _read(data: bytes, decode: Callable[..., Any], kind: Any) -> Any:
+    of_arcs = issubclass(kind, ArcTimeline)
+    form, schema = (ArcTimelineWire, ARC_SCHEMA) if of_arcs else (TimelineWire, SCHEMA)
     try:
         wire = decode(data, type=form)
-        if (wire.schema, wire.schema_version) != schema:
+        if (wire.schema, wire.schema_version) != (schema, SCHEMA_VERSION):
             found = f"{wire.schema} {wire.schema_version}"
-            raise FormatError("timeline", f"must be of schema {schema[0]} {schema[1]}, not {found}")
-        return make(wire)
+            raise FormatError("timeline", f"must be of schema {schema} {SCHEMA_VERSION}, not {found}")
+        make: Callable[[Any], Segment] = arc_from_wire if of_arcs else _polynomial
+        return kind(wire.initial, wire.start, [make(one) for one in wire.segments], wire.version)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, InvalidValueError) as error:
         raise FormatError("timeline", str(error)) from None

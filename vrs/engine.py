@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.analyzer import check
 from vrs.archive import Keeper
 from vrs.checks import finite, finite_array
 from vrs.clock import Clock
@@ -39,14 +38,15 @@ from vrs.commands import (
 from vrs.errors import InvalidValueError
 from vrs.ledger import Ledger, Receipt
 from vrs.model import Array, Limits, RobotModel, frozen_array
+from vrs.moves import check
 from vrs.scheduler import Scheduler
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from vrs.anchoring import Anchored
     from vrs.ledger import Standing
-    from vrs.mobile.driver import Driver
     from vrs.mobile.model import DriveLimits, MobileModel
+    from vrs.mobile.scheduler import DriveScheduler
     from vrs.mobile.timeline import ArcTimeline
 
 
@@ -362,7 +362,7 @@ class MobileEngine(Engine):
     """
 
     _model: MobileModel  # type: ignore[assignment]
-    _plan: Driver  # type: ignore[assignment]
+    _plan: DriveScheduler  # type: ignore[assignment]
     _limit_names: ClassVar[tuple[str, ...]] = ("v_max", "w_max", "a_max", "alpha_max")
 
     def __init__(
@@ -389,8 +389,8 @@ class MobileEngine(Engine):
             InvalidValueError: If both a posture and a timeline are given, or one isn't sound.
         """
         # Arms don't wait for what is about wheels.
-        from vrs.mobile.driver import Driver
         from vrs.mobile.model import DriveLimits, MobileModel
+        from vrs.mobile.scheduler import DriveScheduler
         from vrs.mobile.timeline import ArcTimeline
 
         if not isinstance(model, MobileModel) or not isinstance(model.limits, DriveLimits):
@@ -407,7 +407,7 @@ class MobileEngine(Engine):
         self._model = model
         self._clock = clock
         ledger: Ledger[ArcTimeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
-        self._plan = Driver(model, timeline, ledger, lateness_of(lateness))
+        self._plan = DriveScheduler(model, timeline, ledger, lateness_of(lateness))
         self._keeper = Keeper()
 
     @property

@@ -16,8 +16,7 @@ from vrs.model import Array
 from vrs.planning import Plan, empty
 from vrs.planning.plan import end_state, stacked
 from vrs.segment import HOLD, Packed, Piece, State
-from vrs.timeline import Timeline
-from vrs.track import Track
+from vrs.timeline import BaseTimeline, Timeline
 
 MovePlanner = Callable[[State], tuple[Plan, Array, str]]
 """Plans the new move from the state at its start: the plan, the joints where it ends, what the user must know."""
@@ -25,7 +24,7 @@ JoinPlanner = Callable[[Array, State], tuple[Plan, str]]
 """Plans from rest at the new target to the state in which the tail begins."""
 
 _Row = TypeVar("_Row")
-_TrackT = TypeVar("_TrackT", bound=Track[Any])
+_TimelineT = TypeVar("_TimelineT", bound=BaseTimeline[Any])
 
 _SLIVER = 1e-12
 """Duration [s] below which a segment is only rounding."""
@@ -57,10 +56,10 @@ class Gap(NamedTuple):
     """What the user must know of that."""
 
 
-class Edit(NamedTuple, Generic[_TrackT]):
+class Edit(NamedTuple, Generic[_TimelineT]):
     """What an insertion makes."""
 
-    timeline: _TrackT
+    timeline: _TimelineT
     start: float
     """When the new move begins [s]."""
     arrival: float
@@ -76,14 +75,14 @@ class Edit(NamedTuple, Generic[_TrackT]):
     notes: str = ""
 
 
-def next_move(timeline: Track[Any], index: int) -> int | None:
+def next_move(timeline: BaseTimeline[Any], index: int) -> int | None:
     """The first segment from an index on that isn't a hold; None if there's none."""
     if index < len(timeline) and timeline.owner_of(index) == HOLD:
         index = timeline.end_of_run(index)
     return index if index < len(timeline) else None
 
 
-def end_of_move(timeline: Track[Any], index: int) -> int:
+def end_of_move(timeline: BaseTimeline[Any], index: int) -> int:
     """One past the last segment of the move that a segment belongs to.
 
     A move is one command's segments; holds in which it spends slack before its joining move are part of it.
@@ -91,7 +90,7 @@ def end_of_move(timeline: Track[Any], index: int) -> int:
     return _around(timeline, index, timeline.owner_of(index))[0]
 
 
-def _around(timeline: Track[Any], index: int, owner: int) -> tuple[int, bool]:
+def _around(timeline: BaseTimeline[Any], index: int, owner: int) -> tuple[int, bool]:
     """The end of the move that a command's segment belongs to, and whether another one follows."""
     count = len(timeline)
     while True:
@@ -143,7 +142,7 @@ def gap_at(timeline: Timeline, t: float, how: Insertion) -> tuple[Gap, tuple[int
     return Gap(t, t, timeline.state_before(t), tail), dropped
 
 
-def tail_at(timeline: Track[Any], t: float, how: Insertion) -> tuple[int | None, tuple[int, ...] | None]:
+def tail_at(timeline: BaseTimeline[Any], t: float, how: Insertion) -> tuple[int | None, tuple[int, ...] | None]:
     """The first segment that follows a move at t, and the commands that lose segments to it; see Gap and Edit."""
     tail: int | None = None
     dropped: tuple[int, ...] | None = ()

@@ -23,7 +23,7 @@ import numpy as np
 from vrs.commands import Lateness, MotionCommand, Profile
 from vrs.errors import UnknownCommandError
 from vrs.model import Array, Limits
-from vrs.track import Track
+from vrs.timeline import BaseTimeline
 
 Names: TypeAlias = tuple[int, ...] | Callable[[], tuple[int, ...]]
 """Command ids, or what finds them when somebody asks."""
@@ -98,7 +98,7 @@ UNDO_DEPTH = 1000
 ARRIVED = 1e-9
 """A command that's this near to its end [s] has arrived: ends are sums of durations, and rounded."""
 
-_TrackT = TypeVar("_TrackT", bound=Track[Any])
+_TimelineT = TypeVar("_TimelineT", bound=BaseTimeline[Any])
 
 TimeMap: TypeAlias = Callable[[float], float]
 """New time of what was scheduled at a time."""
@@ -125,13 +125,13 @@ class Change(NamedTuple):
     """Whether commands to where the arm stood anyway are dropped too: they have no segments that could be kept."""
 
 
-class Undo(NamedTuple, Generic[_TrackT]):
+class Undo(NamedTuple, Generic[_TimelineT]):
     """What is needed to take an edit back."""
 
     command_id: int
     at: float
     """Nothing before this time was edited [s]."""
-    before: _TrackT
+    before: _TimelineT
     changes: tuple[int, tuple[Change, ...]]
     """Where in the log it wrote, and what stood there."""
     overwritten: dict[int, Entry | None]
@@ -140,7 +140,7 @@ class Undo(NamedTuple, Generic[_TrackT]):
     """Where in the list of stills it changed something, and what stood there; put back one after the other."""
 
 
-class Ledger(Generic[_TrackT]):
+class Ledger(Generic[_TimelineT]):
     """Receipts by command id, as later edits left them."""
 
     def __init__(self, newest: int) -> None:
@@ -152,7 +152,7 @@ class Ledger(Generic[_TrackT]):
         self._changes: list[Change] = []
         self._versions: list[int] = []
         self._stills: list[tuple[float, int]] = []
-        self._undo: deque[Undo[_TrackT]] = deque(maxlen=UNDO_DEPTH)
+        self._undo: deque[Undo[_TimelineT]] = deque(maxlen=UNDO_DEPTH)
         self.settled = ""
         """Why edits before the newest ones can't be taken back any more; empty where all can."""
 
@@ -280,7 +280,7 @@ class Ledger(Generic[_TrackT]):
         self,
         receipt: Receipt,
         command: MotionCommand | None,
-        before: _TrackT,
+        before: _TimelineT,
         change: Change | None,
         others: Collection[Entry] = (),
     ) -> Receipt:
@@ -315,7 +315,9 @@ class Ledger(Generic[_TrackT]):
         self.newest = max(self.newest, receipt.command_id)
         return receipt
 
-    def reinstate(self, receipt: Receipt, before: _TrackT, change: Change, others: Iterable[Entry] = ()) -> Receipt:
+    def reinstate(
+        self, receipt: Receipt, before: _TimelineT, change: Change, others: Iterable[Entry] = ()
+    ) -> Receipt:
         """Write down an edit that brings back what the newest one dropped.
 
         Args:
@@ -369,7 +371,7 @@ class Ledger(Generic[_TrackT]):
         self._note_still(receipt)
 
     @property
-    def last(self) -> Undo[_TrackT] | None:
+    def last(self) -> Undo[_TimelineT] | None:
         """The newest edit that can be taken back."""
         return self._undo[-1] if self._undo else None
 

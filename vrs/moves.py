@@ -1,6 +1,8 @@
-"""The plans of one command: at its speed and pace, with its share of the acceleration, for its tool.
+"""The plans of one command: its check against the robot, its arm solution, its moves at its speed and pace.
 
-Or for two commands: a move may begin before the one before it is over, so that the arm doesn't stop between them.
+Or of two commands: a move may begin before the one before it is over, so that the arm doesn't stop between them.
+
+Source: Doulgeri, Zikos, Delopoulos, sections II-A and II-B.
 """
 
 from __future__ import annotations
@@ -9,14 +11,25 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from math import inf
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from vrs import planning
-from vrs.analyzer import solve
-from vrs.commands import JointTarget, Motion, MotionCommand, Profile
-from vrs.errors import PlanningError
+from vrs.commands import (
+    DriveCommand,
+    InsertVia,
+    JointTarget,
+    Motion,
+    MotionCommand,
+    ParameterChange,
+    PlanEdit,
+    PositionQuery,
+    Profile,
+    SteerCommand,
+    Target,
+)
+from vrs.errors import InvalidValueError, PlanningError
 from vrs.insertion import Gap, MovePlanner, joined
 from vrs.model import Array, Limits, RobotModel
 from vrs.planning import Plan, rounding
@@ -25,6 +38,47 @@ from vrs.planning.plan import end_position, slowed
 from vrs.planning.rounding import braking, continuous, starting
 from vrs.segment import State
 from vrs.timeline import Timeline
+
+Checked: TypeAlias = MotionCommand | SteerCommand | PlanEdit | PositionQuery | ParameterChange
+"""A command that an engine for an arm takes."""
+
+
+def check(command: object, model: RobotModel) -> Checked:
+    """Return the command if its form fits the robot.
+
+    Raises:
+        InvalidValueError: If it's no command for an arm of this many joints.
+    """
+    if isinstance(command, DriveCommand):
+        raise InvalidValueError("command", command, f"for an arm: {model.name} has joints and no wheels")
+    if not isinstance(command, Checked):
+        allowed = "a MotionCommand, SteerCommand, PositionQuery, ParameterChange or an edit of the plan"
+        raise InvalidValueError("command", command, allowed)
+    n = model.limits.dof
+    if isinstance(command, (MotionCommand, InsertVia)):
+        target = command.target
+        if isinstance(target, JointTarget) and target.q.shape != (n,):
+            raise InvalidValueError("target q", target.q, f"of shape ({n},) for {model.name}")
+    if isinstance(command, SteerCommand) and command.rates is not None and command.rates.shape != (n,):
+        raise InvalidValueError("rates", command.rates, f"of shape ({n},) for {model.name}")
+    return command
+
+
+def solve(target: Target, model: RobotModel, q: Array) -> Array:
+    """Joints of a target, (n,) [rad]; a pose is resolved nearest to the arm at q.
+
+    Raises:
+        OutOfLimitsError: If a joint target lies outside the position limits.
+        UnreachablePoseError: If a pose has no arm solution within the limits.
+        InvalidValueError: If the configuration isn't one.
+    """
+    if isinstance(target, JointTarget):
+        model.limits.check(target.q)
+        return target.q
+    solution = model.inverse_near(target.X, q, target.configuration)
+    model.limits.check(solution)
+    return solution
+
 
 FULL_LIMITS_NOTE = "planned with all of the limits: the arm is too fast for the command's pace or acceleration"
 

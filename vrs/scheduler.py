@@ -1,23 +1,29 @@
-"""The scheduler: f, eq. (1), and the edits of its plan, on one timeline, with receipts. Time is an argument.
+"""The scheduler: f, eq. (1), and edits of a timeline under causality, with receipts. Time is an argument.
 
-One concept in many lines: each command and edit acts on the same timeline, ledger and limits, under one causality.
+`BaseScheduler` has what arms and mobile robots share: when an edit acts, its receipt, taking it back. `Scheduler`
+is the arms'; `vrs.mobile.scheduler` has the other one.
+
+One concept in over 600 lines: each command and edit acts on the same timeline, ledger and limits.
 
 Source: Doulgeri, Zikos, Delopoulos, section II-B.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import NamedTuple
+from operator import add
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from vrs.agenda import Agenda, Moment
 from vrs.anchoring import Anchored, anchored
 from vrs.commands import (
     Cancel,
+    DriveCommand,
     Insertion,
     InsertVia,
     JointTarget,
@@ -55,15 +61,210 @@ from vrs.insertion import (
     span,
     stay,
 )
-from vrs.ledger import MOST_KNOWN, Change, Entry, Known, Ledger, Receipt, Standing, Status
+from vrs.ledger import ARRIVED, MOST_KNOWN, Change, Entry, Known, Ledger, Names, Receipt, Standing, Status
 from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.moves import Passer, join, move
 from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
-from vrs.planning import Plan, rounding, steering, stopping
+from vrs.planning import Plan, rounding, steering
 from vrs.planning.certificate import violation
+from vrs.planning.jerk_limited import is_prompt_stop, stop, straight_stop
 from vrs.planning.plan import end_position, end_state
 from vrs.segment import HOLD, Piece, State
-from vrs.timeline import Timeline
+from vrs.timeline import BaseTimeline, Timeline
+
+TimelineT = TypeVar("TimelineT", bound=BaseTimeline[Any])
+
+_NAMED_AT_ONCE = 64
+"""Segments whose commands are named at once; those of longer runs when somebody asks."""
+
+
+class EditTiming(NamedTuple):
+    """When an edit acts, and what its receipt says of that."""
+
+    t: float
+    issued: float | None
+    asked: float | None
+    status: Status
+    reason: str
+
+
+class BaseScheduler(Generic[TimelineT]):
+    """A timeline, the policy for late commands, and a ledger of receipts."""
+
+    def __init__(self, timeline: TimelineT, ledger: Ledger[TimelineT], lateness: Lateness) -> None:
+        self.timeline = timeline
+        self.ledger = ledger
+        self.lateness = lateness
+
+    @contextmanager
+    def atomic(self) -> Iterator[None]:
+        """Put everything back as it was, receipts too, if what is done meanwhile raises."""
+        saved = vars(self).copy()
+        try:
+            with self.ledger.atomic():
+                yield
+        except BaseException:
+            vars(self).update(saved)
+            raise
+
+    def brake(self, t: float, command_id: int) -> tuple[TimelineT, str]:
+        """What is scheduled, with the robot braking from t [s] on for a command; and what must be said of it."""
+        raise NotImplementedError
+
+    def moment(self, command: PlanEdit | SteerCommand, now: float | None, soonest: float) -> EditTiming:
+        """When an edit acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
+
+        Args:
+            command: The edit.
+            now: Present time [s]; None offline.
+            soonest: As soon as it can, offline [s].
+
+        Raises:
+            PlanningError: If it's late and the policy rejects, or if it was to act before it was issued.
+        """
+        asked = _as_asked(command, now, soonest if now is None else now)
+        if now is None or asked.t >= now:
+            return asked
+        late = _passed(asked.t, now)
+        if self.lateness is Lateness.REJECT and not isinstance(command, Stop):
+            raise PlanningError(late)
+        return asked._replace(t=now, status=Status.POSTPONED, reason=f"{late}: at once")
+
+    def beginning(self, command: MotionCommand | DriveCommand, now: float | None, soonest: float) -> EditTiming:
+        """When a motion begins: as asked, else as soon as it can; a late one after the segment that is under way.
+
+        By the other policy a late one doesn't begin at all.
+
+        Args:
+            command: The motion.
+            now: Present time [s]; None offline.
+            soonest: As soon as it can, offline [s]; with a clock not before now, nor before it was issued.
+
+        Raises:
+            PlanningError: If it's late and the policy rejects, or if it was to begin before it was issued.
+        """
+        asked = _as_asked(command, now, soonest)
+        if now is None or asked.t >= now:
+            return asked
+        late = _passed(asked.t, now)
+        if self.lateness is Lateness.REJECT:
+            raise PlanningError(late)
+        t = self.end_of_active(now)
+        return asked._replace(t=t, status=Status.POSTPONED, reason=f"{late}: postponed to {t:.9g} s")
+
+    def touched(self, edit: Edit[TimelineT], t: float) -> tuple[Names, Names]:
+        """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
+        before = self.timeline
+        shifted: Names = ()
+        if edit.shift > ARRIVED and edit.tail is not None:
+            shifted = self.named(before, edit.tail, t)
+        if edit.dropped is None:
+            return shifted, self.named(before, max(before.index_at(t), 0), t)
+        return shifted, tuple(i for i in edit.dropped if not self.ledger.arrived(i, t))
+
+    def accept(
+        self,
+        receipt: Receipt,
+        command: MotionCommand | None,
+        edit: Edit[TimelineT],
+        at: float,
+        *,
+        appended: bool = False,
+        others: tuple[Entry, ...] = (),
+    ) -> Receipt:
+        """Put an edit in force, and write its receipt down.
+
+        Args:
+            receipt: Of the command that made the edit.
+            command: That command, where it's a motion.
+            edit: What it did.
+            at: Earliest time that the edit changed [s].
+            appended: Whether all that was scheduled stays.
+            others: Receipts and commands of other moves that were planned anew.
+        """
+        before, self.timeline = self.timeline, edit.timeline
+        change = None
+        if not appended:
+            dropped = None if edit.dropped is None else frozenset(edit.dropped)
+            moved = partial(add, edit.shift) if edit.shift > 0 else None
+            change = Change(edit.timeline.version, receipt.command_id, at, dropped, moved)
+        return self.ledger.accept(receipt, command, before, change, others)
+
+    def named(self, timeline: TimelineT, index: int, t: float) -> Names:
+        """Commands that arrive after t and have segments from an index on."""
+        # Joining moves may stand there first whose commands have arrived.
+        if len(timeline) - index > _NAMED_AT_ONCE:
+            return partial(_names, self.ledger, timeline, index, t)
+        return tuple(i for i in timeline.owners(index, len(timeline)) if not self.ledger.arrived(i, t))
+
+    def reject(self, issued: float | None, asked: float | None, reason: str) -> Receipt:
+        """Answer a command that can't be."""
+        return self.ledger.reject(issued, asked, reason, self.timeline.version)
+
+    def end_of_active(self, now: float) -> float:
+        """End of the segment that is valid now; in a hold, or where none is, now."""
+        timeline = self.timeline
+        index = timeline.index_at(now)
+        if 0 <= index < len(timeline) and timeline.owner_of(index) != HOLD:
+            return timeline.start_of(index + 1)
+        return now
+
+    def undo(self, now: float | None) -> Receipt | None:
+        """Take back the newest edit; see `vrs.engine.Engine.undo`."""
+        last = self.ledger.last
+        if last is None:
+            return None
+        version = self.timeline.version + 1
+        if now is None or now <= last.at:
+            self.timeline = last.before.with_version(version)
+            return self.ledger.take_back(version)
+        if now >= self.timeline.end:
+            return None
+        self.timeline, note = self.brake(now, last.command_id)
+        return self.ledger.break_off(Change(version, last.command_id, now, None), note)
+
+    def undo_refusal(self, now: float | None) -> str:
+        """Why there's nothing to take back; see `vrs.engine.Engine.undo_refusal`."""
+        last = self.ledger.last
+        if last is None:
+            return self.ledger.settled
+        if now is None or now <= last.at or now < self.timeline.end:
+            return ""
+        return f"command {last.command_id} is over: what has happened can't be taken back"
+
+
+def _names(ledger: Ledger[Any], timeline: BaseTimeline[Any], index: int, t: float) -> tuple[int, ...]:
+    """Commands that have segments from an index on, and hadn't arrived at t when the timeline was edited."""
+    return tuple(i for i in timeline.owners(index, len(timeline)) if not ledger.arrived(i, t, timeline.version + 1))
+
+
+def _as_asked(
+    command: MotionCommand | DriveCommand | SteerCommand | PlanEdit, now: float | None, soonest: float
+) -> EditTiming:
+    """When a command is to act, be that late or not.
+
+    Args:
+        command: The command.
+        now: Present time [s]; None offline.
+        soonest: When, if it doesn't say so [s]; with a clock not before now, nor before it was issued.
+
+    Raises:
+        PlanningError: If it was to act before it was issued.
+    """
+    issued, asked = command.issued_at, command.execute_at
+    if now is None:
+        return EditTiming(soonest if asked is None else asked, issued, asked, Status.ACCEPTED, "")
+    issued = now if issued is None else issued
+    t = max(soonest, now, issued) if asked is None else asked
+    if t < issued:
+        raise PlanningError(f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s")
+    return EditTiming(t, issued, asked, Status.ACCEPTED, "")
+
+
+def _passed(t: float, now: float) -> str:
+    """Say that a command is late."""
+    return f"t_exec = {t:.9g} s had passed at {now:.9g} s"
+
 
 REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
 """What planning raises when a command can't be."""
@@ -96,7 +297,7 @@ class _Session(NamedTuple):
     """When the first began [s]."""
 
 
-class Scheduler(Agenda[Timeline]):
+class Scheduler(BaseScheduler[Timeline]):
     """What an engine has planned: a timeline, the limits in force, and a ledger of receipts."""
 
     def __init__(self, model: RobotModel, timeline: Timeline, ledger: Ledger[Timeline], lateness: Lateness) -> None:
@@ -197,7 +398,7 @@ class Scheduler(Agenda[Timeline]):
     def stop_at(self, t: float) -> tuple[Plan, str]:
         """Plan a stop of each joint at t [s], jerk-limited where the motion is; and what must be said of it."""
         profile = self.profile(owner_before(self.timeline, t))
-        return stopping.stop(self.timeline.state_before(t), profile, self.limits)
+        return stop(self.timeline.state_before(t), profile, self.limits)
 
     def profile(self, command_id: int) -> Profile:
         """By which profile a command moves the arm."""
@@ -372,7 +573,7 @@ class Scheduler(Agenda[Timeline]):
         return accepted
 
     def _as_planned(
-        self, receipt: Receipt, made: Edit[Timeline], moment: Moment, reason: str, at: float
+        self, receipt: Receipt, made: Edit[Timeline], moment: EditTiming, reason: str, at: float
     ) -> Receipt:
         """A command's receipt after it was planned anew, by an edit that changes nothing before a time."""
         shifted, dropped = self.touched(made, at)
@@ -537,7 +738,7 @@ class Scheduler(Agenda[Timeline]):
             # A plan made under other limits may have no way to stop on that keeps these.
             keeps = violation(as_plan(way, timeline.dof), self.limits, jerk=jerky) is None
             on_way = sum(sum(part.durations) for part in way)
-            if smooth and keeps and stopping.is_prompt(on_way, braking.duration):
+            if smooth and keeps and is_prompt_stop(on_way, braking.duration):
                 reason = "stopped on its way"
                 pieces = [part._replace(command_id=number) for part in way]
             else:
@@ -628,13 +829,13 @@ class Scheduler(Agenda[Timeline]):
     def _straight_stop(self, state: State, t: float) -> Plan | None:
         """A stop at t along a way that's straight in joint space, and long enough; None where it isn't."""
         until = straight_until(self.timeline, t)
-        found = None if until is None else stopping.straight_stop(state, self.limits)
+        found = None if until is None else straight_stop(state, self.limits)
         if found is None or until is None:
             return None
         ahead, needed = self.timeline.sample(until) - state.q, end_state(found).q - state.q
         return found if ahead @ state.qd >= needed @ state.qd else None
 
-    def _edit_receipt(self, moment: Moment, after: Timeline, end: float, reason: str) -> Receipt:
+    def _edit_receipt(self, moment: EditTiming, after: Timeline, end: float, reason: str) -> Receipt:
         reason = joined(moment.reason, reason)
         number = self.ledger.newest + 1
         stamps = moment.issued, moment.asked, moment.t

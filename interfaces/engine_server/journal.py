@@ -15,8 +15,7 @@ from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt, Status
 from vrs.segment import HOLD, Piece
-from vrs.timeline import Timeline
-from vrs.track import Track
+from vrs.timeline import BaseTimeline, Timeline
 from vrs.tree import Leaf
 
 PART = 64
@@ -82,7 +81,7 @@ def difference(base: Timeline, new: Timeline, since: float, *, edit: int, comman
     )
 
 
-def first_unlike(base: Track[Any], new: Track[Any], index: int) -> int:
+def first_unlike(base: BaseTimeline[Any], new: BaseTimeline[Any], index: int) -> int:
     """The first segment from an index on in which two timelines differ: what they share is passed over at once."""
     most = min(len(base), len(new))
     while index < most:

@@ -16,7 +16,7 @@ from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Journey, JourneyState
 from robots.onboard.routes import Point, RouteMap
 from vrs.mobile import DriveLimits
-from vrs.mobile.kinematics import advanced
+from vrs.mobile.model import advanced
 
 PERIOD: Final = 0.05
 """Between two drives [s]."""

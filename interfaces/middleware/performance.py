@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from robots.onboard.driving import Drive
 from vrs.checks import number_in
-from vrs.mobile.kinematics import sinc
+from vrs.mobile.model import sinc
 from vrs.model import Array
 
 LARGEST_EPSILON = 3.0

@@ -36,7 +36,7 @@ from vrs.errors import VrsError
 from vrs.insertion import hold, piece
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
-from vrs.planning.stopping import stop
+from vrs.planning.jerk_limited import stop
 from vrs.segment import HOLD, State
 from vrs.timeline import Timeline
 

@@ -27,7 +27,7 @@ from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
-from vrs.mobile.kinematics import all_wrapped
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array
 
 _STRAIGHT = 1e-4

@@ -20,7 +20,7 @@ from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, expected_ranges, judged, matched
 from vrs.checks import validated, within
 from vrs.mobile import wrapped
-from vrs.mobile.kinematics import all_wrapped
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array, frozen_array
 
 

@@ -34,7 +34,7 @@ from robots.onboard.laser import Points
 from vrs.checks import finite_array, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
-from vrs.mobile.kinematics import all_wrapped, sinc
+from vrs.mobile.model import all_wrapped, sinc
 from vrs.model import Array, frozen_array
 
 OWN = 6

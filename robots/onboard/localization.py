@@ -15,7 +15,7 @@ from robots.onboard.line_extraction import Extraction, ExtractionConfig, extract
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, MotionConfig, Sights, evidence, matched
 from vrs.checks import validated, within
 from vrs.mobile import wrapped
-from vrs.mobile.kinematics import sinc
+from vrs.mobile.model import sinc
 from vrs.model import Array, frozen_array
 
 _BENT = 0.1

@@ -29,7 +29,7 @@ from robots.onboard.line_filter import LineFilter, Sights
 from robots.onboard.localization import LocalizationConfig, Tracker
 from vrs.checks import validated, within
 from vrs.mobile import wrapped
-from vrs.mobile.kinematics import all_wrapped
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array, frozen_array
 
 _EXACT = 1e-12

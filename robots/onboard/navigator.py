@@ -23,7 +23,7 @@ from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, Yielding
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.routes import RouteMap
 from vrs.mobile.environment import Grid
-from vrs.mobile.kinematics import all_wrapped
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array
 
 CELL = 0.05

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robots.onboard.laser import LaserScan, OdometryTrack, beam_angles, deskewed
 from vrs.checks import validated, within
 from vrs.mobile.environment import Grid
-from vrs.mobile.kinematics import all_wrapped
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array
 
 Bools = NDArray[np.bool_]

@@ -26,7 +26,7 @@ from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.localization import step_between
 from vrs.checks import validated, within
 from vrs.mobile import advanced
-from vrs.mobile.kinematics import all_wrapped
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array
 
 

@@ -12,7 +12,8 @@ from vrs.commands import Profile
 from vrs.insertion import piece
 from vrs.model import Array, Limits, frozen_array
 from vrs.pacing import composed, halting
-from vrs.planning import parabolic, stopping
+from vrs.planning import parabolic
+from vrs.planning.jerk_limited import is_prompt_stop, stop
 from vrs.planning.plan import Plan, end_state
 from vrs.segment import PolynomialSegment, State
 from vrs.timeline import Timeline
@@ -51,7 +52,7 @@ def from_commanded(
     """
     t = finite("t", t, "finite seconds")
     state = timeline.state_before(t)
-    braking, _ = stopping.stop(state, profile, limits)
+    braking, _ = stop(state, profile, limits)
     if not len(braking):
         after = timeline.edited(t, []) if t < timeline.end else timeline
         return _stop(after, t, t, limits, on_path=True)
@@ -59,7 +60,7 @@ def from_commanded(
     on_path = False
     if keep_path:
         law = halting(timeline, t, limits, jerk=profile is Profile.JERK_LIMITED)
-        if stopping.is_prompt(law.duration, braking.duration):
+        if is_prompt_stop(law.duration, braking.duration):
             pieces, on_path = list(composed(timeline, law)), True
     after = timeline.edited(t, pieces)
     return _stop(after, t, after.end, limits, on_path=on_path)

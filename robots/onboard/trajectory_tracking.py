@@ -28,7 +28,7 @@ from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture, kept
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, advanced, clipped, wrapped
-from vrs.mobile.kinematics import sinc
+from vrs.mobile.model import sinc
 from vrs.segment import ArcSegment
 
 SAME = 1e-9

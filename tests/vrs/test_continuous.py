@@ -28,7 +28,7 @@ from vrs import (
     Status,
     Stop,
 )
-from vrs.planning.course import rotations
+from vrs.planning.path import rotations
 from vrs.testing import Figures, Watch, check_run, check_way, columns
 
 MODEL = puma560.model()

@@ -9,10 +9,8 @@ from robots import puma560
 from vrs import Profile
 from vrs.errors import PlanningError
 from vrs.model import Limits, RobotModel
-from vrs.planning.course import Course, rotation_vector, rotations
-from vrs.planning.joining import smooth_stop
-from vrs.planning.line import line, obstacle
-from vrs.planning.path import trace
+from vrs.planning.line import line, obstacle, smooth_stop
+from vrs.planning.path import Course, rotation_vector, rotations, trace
 from vrs.planning.plan import Plan, end_state
 from vrs.segment import State, evaluate
 

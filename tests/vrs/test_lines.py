@@ -14,8 +14,8 @@ from vrs import Profile
 from vrs.errors import PlanningError
 from vrs.planning import move
 from vrs.planning.certificate import violation
-from vrs.planning.course import rotation_vector, rotations
 from vrs.planning.line import line
+from vrs.planning.path import rotation_vector, rotations
 from vrs.planning.plan import Plan, end_state
 from vrs.segment import State
 
@@ -360,7 +360,7 @@ def test_where_no_blend_fits_the_arm_brakes_and_the_line_starts_there():
 
 
 def test_a_jerk_limited_stop_before_a_line_keeps_the_jerk(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("vrs.planning.line.courses", lambda *_, **__: iter(()))
+    monkeypatch.setattr("vrs.planning.line.blend_courses", lambda *_, **__: iter(()))
     first = plan_from_rest(NOMINAL, moved(NOMINAL, (0.0, 0.35, -0.1)), profile=Profile.JERK_LIMITED)
     for share in (0.05, 0.2, 0.5, 0.8, 0.95):
         state = cut(first, share)

@@ -14,8 +14,16 @@ from vrs.planning import Profile, move
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, end_state
-from vrs.planning.steer_joint import change, one_joint, run
-from vrs.planning.steering import BRAKED_ONLY, damped_rates, sliding_rates, steer, weighted_jacobian
+from vrs.planning.steering import (
+    BRAKED_ONLY,
+    change,
+    damped_rates,
+    one_joint,
+    run,
+    sliding_rates,
+    steer,
+    weighted_jacobian,
+)
 from vrs.segment import Piece, State
 from vrs.timeline import Timeline
 

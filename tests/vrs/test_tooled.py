@@ -11,8 +11,7 @@ from robots import puma560
 from tests.vrs.test_continuous import TOOL, along, corner, lawful
 from vrs import Engine, Insertion, InsertVia, JointTarget, Motion, MotionCommand, PoseTarget, Profile
 from vrs.errors import InvalidValueError
-from vrs.planning.course import rotation_vector, rotations
-from vrs.planning.path import Tooled, bare, tooled
+from vrs.planning.path import Tooled, bare, rotation_vector, rotations, tooled
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

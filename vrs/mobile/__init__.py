@@ -8,8 +8,20 @@ from __future__ import annotations
 from vrs.mobile.avoidance import Avoidance
 from vrs.mobile.environment import Grid, VirtualEnvironment, cast
 from vrs.mobile.estimator import Feedback, PostureEstimator
-from vrs.mobile.kinematics import advanced, increment, rotation, speeds, wheel_speeds, wrapped
-from vrs.mobile.model import DriveLimits, MobileModel, Wheels, braking, clipped, limited
+from vrs.mobile.model import (
+    DriveLimits,
+    MobileModel,
+    Wheels,
+    advanced,
+    braking,
+    clipped,
+    increment,
+    limited,
+    rotation,
+    speeds,
+    wheel_speeds,
+    wrapped,
+)
 from vrs.mobile.timeline import ArcPiece, ArcTimeline
 
 __all__ = [

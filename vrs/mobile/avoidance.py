@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile.environment import Grid, cast
-from vrs.mobile.kinematics import on_arcs, wrapped
-from vrs.mobile.model import DriveLimits, braking, clipped, limited
+from vrs.mobile.model import DriveLimits, braking, clipped, limited, on_arcs, wrapped
 from vrs.model import Array
 
 _Posture = tuple[float, float, float]

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError
-from vrs.mobile.kinematics import advanced, wrapped
+from vrs.mobile.model import advanced, wrapped
 from vrs.model import Array, frozen_array
 
 HISTORY = 8192

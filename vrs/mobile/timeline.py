@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError, NonFiniteTimeError
-from vrs.mobile.kinematics import advanced, displaced, on_arcs, wrapped
+from vrs.mobile.model import advanced, displaced, on_arcs, wrapped
 from vrs.model import Array
 from vrs.segment import HOLD, ArcSegment, check_derivative, known_arc, times
-from vrs.track import Track, remade
+from vrs.timeline import BaseTimeline, remade
 from vrs.tree import Node, Run, leaves, splice
 
 _Posture = tuple[float, float, float]
@@ -42,7 +42,7 @@ class ArcPiece(NamedTuple):
     """Who made it; HOLD for standing."""
 
 
-class ArcTimeline(Track[ArcSegment]):
+class ArcTimeline(BaseTimeline[ArcSegment]):
     """An immutable run of arcs, half-open and contiguous.
 
     Before the start the robot stands at the initial posture, after the end at the last one. θ isn't wrapped.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from vrs.testing.extremes import extremes
 from vrs.testing.laws import (
     BOUNDS,
     Columns,
@@ -22,6 +21,7 @@ from vrs.testing.laws import (
     check_tail,
     check_way,
     columns,
+    extremes,
 )
 from vrs.testing.sessions import KINDS, Draws, Generator, Session, Source, lines_are_planned
 from vrs.testing.watch import Watch

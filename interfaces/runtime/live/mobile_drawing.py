@@ -16,8 +16,7 @@ from interfaces.teleop.tasks import Doing, Point
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
 from vrs.mobile import ArcPiece, ArcTimeline, Grid, MobileModel, wrapped
-from vrs.mobile.kinematics import advanced
-from vrs.mobile.model import braking
+from vrs.mobile.model import advanced, braking
 
 APART = 0.04
 """Distance between two places of a way that was driven [m]."""

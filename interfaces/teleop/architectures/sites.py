@@ -14,8 +14,7 @@ from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
 from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
-from vrs.mobile.kinematics import advanced
-from vrs.mobile.model import braking, limited
+from vrs.mobile.model import advanced, braking, limited
 from vrs.segment import ArcSegment, known_arc
 
 

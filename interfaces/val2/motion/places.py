@@ -23,7 +23,7 @@ from interfaces.val2.values import (
 )
 from vrs.errors import InvalidValueError, OutOfLimitsError, UnreachablePoseError
 from vrs.model import Array, RobotModel
-from vrs.planning.course import rotations
+from vrs.planning.path import rotations
 
 READY: Final = PrecisionPoint((0.0, -90.0, 90.0, 0.0, 0.0, 0.0))
 NEST: Final = PrecisionPoint((0.0, -135.0, 180.0, 0.0, 45.0, 0.0))

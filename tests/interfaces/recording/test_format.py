@@ -23,7 +23,7 @@ from interfaces.recording.errors import RecordingError
 from interfaces.recording.poses import quaternions
 from tests.interfaces.recording import recorded, shown
 from vrs.commands import JointTarget, MotionCommand, ParameterChange, PoseTarget, SteerCommand
-from vrs.planning.course import rotations
+from vrs.planning.path import rotations
 
 KINDS = ("boolean", "string", "number", "integer", "object", "array")
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vrs import ArcSegment
-from vrs.mobile.kinematics import (
+from vrs.mobile.model import (
     advanced,
     all_wrapped,
     constraint,

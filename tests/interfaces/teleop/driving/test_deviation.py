@@ -9,7 +9,7 @@ import pytest
 
 from interfaces.teleop.driving import PathDeviation
 from robots.onboard.driving import Posture
-from vrs.mobile.kinematics import advanced
+from vrs.mobile.model import advanced
 from vrs.segment import ArcSegment
 
 T = 0.1

@@ -1,23 +1,23 @@
-"""The driver: f, eq. (1) of Doulgeri et al., for a mobile robot. It's given the time and reads no clock."""
+"""The scheduler of a mobile robot: f, eq. (1) of Doulgeri et al. Time is an argument, no clock is read."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vrs.agenda import Agenda
 from vrs.commands import DriveCommand, Insertion, Lateness, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Edit, tail_at
 from vrs.ledger import Ledger, Receipt
 from vrs.mobile.model import DriveLimits, MobileModel, braking
 from vrs.mobile.timeline import ArcPiece, ArcTimeline
+from vrs.scheduler import BaseScheduler
 from vrs.segment import HOLD
 
 _NOWHERE = np.empty(0)
 """A drive command has no target."""
 
 
-class Driver(Agenda[ArcTimeline]):
+class DriveScheduler(BaseScheduler[ArcTimeline]):
     """What an engine has planned for a mobile robot."""
 
     def __init__(
