@@ -23,7 +23,7 @@ from interfaces.timer import Turning
 from interfaces.val2.monitor.completion import suggestions
 from interfaces.val2.monitor.control import SharedOperator, Switchboard
 from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
-from interfaces.val2.monitor.state import Said, Style
+from interfaces.val2.monitor.state import OutputText, Style
 from vrs.clock import Clock
 from vrs.errors import VrsError
 
@@ -118,7 +118,7 @@ class PageTerminal:
     """Code and reason with which the connection is to be closed."""
     monitor: TerminalMonitor | None = None
     greeted: bool = False
-    _said: deque[Said] = field(default_factory=deque)
+    _said: deque[OutputText] = field(default_factory=deque)
     _waiting: int = 0
     """Characters that wait to be sent."""
     _sent: int = 0
@@ -135,7 +135,7 @@ class PageTerminal:
     def begin(self, monitor: TerminalMonitor, *, now: float) -> None:
         """Let a monitor speak and listen."""
         self.monitor = monitor
-        files = monitor.desk.files.offered()
+        files = monitor.state.files.offered()
         self._answers.append({"type": "ready", "files": files, "barred": bool(monitor.barred)})
         monitor.start(now=now)
 
@@ -167,7 +167,7 @@ class PageTerminal:
 
     def _act(self, monitor: TerminalMonitor, message: TypedLines | Interrupt | Complete, now: float) -> None:
         if isinstance(message, Complete):
-            fragment, words = suggestions(message.text[:LONGEST], monitor.desk, program=monitor.edits)
+            fragment, words = suggestions(message.text[:LONGEST], monitor.state, program=monitor.edits)
             takes = monitor.takes_commands or monitor.edits
             listed = [one.word for one in words[:SUGGESTED]] if takes else []
             self._answers.append({"type": "completed", "text": message.text, "fragment": fragment, "words": listed})
@@ -198,14 +198,14 @@ class PageTerminal:
                 continue
             if self._lost:
                 self._lost = False
-                self._put(Said("\n*Output lost* it came faster than it could be shown\n", Style.ERROR))
+                self._put(OutputText("\n*Output lost* it came faster than it could be shown\n", Style.ERROR))
             self._put(piece)
 
-    def _put(self, piece: Said) -> None:
+    def _put(self, piece: OutputText) -> None:
         self._waiting += len(piece.text)
         last = self._said[-1] if self._said else None
         if last is not None and last.style is piece.style and len(last.text) + len(piece.text) <= FRAME:
-            self._said[-1] = Said(last.text + piece.text, piece.style)
+            self._said[-1] = OutputText(last.text + piece.text, piece.style)
         else:
             self._said.append(piece)
 
@@ -227,7 +227,7 @@ class PageTerminal:
             text, style = self._said[0].text, self._said[0].style
             part = text[:FRAME]
             if len(part) < len(text):
-                self._said[0] = Said(text[FRAME:], style)
+                self._said[0] = OutputText(text[FRAME:], style)
             else:
                 self._said.popleft()
             size += len(part)

@@ -6,14 +6,18 @@ import difflib
 import enum
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.state import TerminalState, split_word
+from interfaces.val2.monitor import layout, locations, running, settings, storage
+from interfaces.val2.monitor.editor import edit
+from interfaces.val2.monitor.state import Dialogue, TerminalState, split_word, unique
+
+Handler: TypeAlias = Callable[[TerminalState, str], Dialogue | None]
+"""Carries a command out, with what follows its name; gives what takes the next line, or None for commands."""
 
 
 class Need(enum.Enum):
@@ -33,6 +37,8 @@ class MonitorCommand:
 
     name: str
     """Upper case."""
+    act: Handler | None
+    """Carries it out; None for what the monitor does itself."""
     forms: str
     """What follows the name; forms are separated by `|`."""
     help: str
@@ -50,127 +56,14 @@ class MonitorCommand:
         """Each form with the name."""
         return tuple(f"{self.name} {form.strip()}".rstrip() for form in self.forms.split("|"))
 
-    def looks(self, rest: str) -> bool:
-        """Whether it only looks, with what follows its name."""
+    def only_shows(self, rest: str) -> bool:
+        """Whether it changes nothing, with what follows its name."""
         if self.need is not Need.ARGUMENT:
             return self.need is Need.LOOK
         return rest in {"", "?"} or (self.name == "PARAMETER" and "=" not in rest)
 
 
 _LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
-
-_TABLE: Final = (
-    MonitorCommand("ABORT", "", "Stop the program and the arm, within its limits; Ctrl-C does the same."),
-    MonitorCommand("AT", "t | +t [motion]", "The next motion begins at a time, or so long from now [s].", idle=True,
-            ours=True),
-    MonitorCommand("BASE", "| dx,dy,dz,turn", "Show the base, or set it: mm, and deg about Z.",
-            need=_ARGUMENT, idle=True),
-    MonitorCommand("CALIBRATE", "", "Make joint values valid; asks first.", idle=True),
-    MonitorCommand("COPY", "new=old", "Copy a program."),
-    MonitorCommand("DELETE", "program,..", "Delete programs; asks first.", idle=True),
-    MonitorCommand("DELETEL", "location,..", "Delete locations; asks first.", idle=True),
-    MonitorCommand("DELETEP", "program,..", "Delete programs; asks first.", idle=True),
-    MonitorCommand("DELETER", "real,..", "Delete reals; asks first.", idle=True),
-    MonitorCommand("DELETES", "$string,..", "Delete strings; asks first.", idle=True),
-    MonitorCommand("DIRECTORY", "", "List the programs in memory.", need=_LOOK),
-    MonitorCommand("DISABLE", "switch,..", "Turn switches off."),
-    MonitorCommand("DO", "instruction |", "Carry out one instruction; without one, the last again.", idle=True),
-    MonitorCommand("EDIT", "program[,step]", "Edit a program line by line; ? there says how.", idle=True),
-    MonitorCommand("ENABLE", "switch,..", "Turn switches on; ENABLE POWER after PANIC."),
-    MonitorCommand("EXECUTE", "program[(arguments)][,cycles[,step]] |",
-            "Run a program, or the last; cycles -1 for ever.", idle=True),
-    MonitorCommand("EXIT", "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
-    MonitorCommand("FLIST", "", "List the files.", need=_LOOK),
-    MonitorCommand("FREE", "", "Show what is in memory.", need=_LOOK),
-    MonitorCommand("HELP", "| word", "List the commands, or explain a word of the language.", need=_LOOK),
-    MonitorCommand("HERE", "location | #location | a:b", "Record where the arm is; then CR, or changes: ,,10"),
-    MonitorCommand("ID", "", "Show what this is, and its version.", need=_LOOK),
-    MonitorCommand("IO", "", "Show inputs, outputs and internal signals.", need=_LOOK),
-    MonitorCommand("LISTF", "", "List the files.", need=_LOOK),
-    MonitorCommand("LISTL", "| location,..", "List locations; * stands for any characters.", need=_LOOK),
-    MonitorCommand("LISTP", "| program,..", "List programs.", need=_LOOK),
-    MonitorCommand("LISTR", "| real,.. | expression", "List reals, or show what an expression comes to.",
-            need=_LOOK),
-    MonitorCommand("LISTS", "| $string,.. | expression", "List strings, or show what an expression comes to.",
-            need=_LOOK),
-    MonitorCommand("LOAD", "file", "Read programs and values from a file."),
-    MonitorCommand("NEXT", "| n", "Carry out the next step of a program that stands, or the next n.", idle=True),
-    MonitorCommand("PANIC", "", "Stop at once and turn the power off."),
-    MonitorCommand("PARAMETER", "| name | name=value", "Show or set parameters.", need=_ARGUMENT),
-    MonitorCommand("POINT", "location[=expression]", "Define or change a location; then CR, or changes: ,,10"),
-    MonitorCommand("PROCEED", "", "Go on with a program that stands, at its next step.", idle=True),
-    MonitorCommand("QUIT", "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
-    MonitorCommand("RENAME", "new=old", "Rename a program.", idle=True),
-    MonitorCommand("RESET", "", "Turn all outputs off."),
-    MonitorCommand("RETRY", "", "Go on with a program that stands, at the step that was interrupted.", idle=True),
-    MonitorCommand("REWIND", "t | -t", "Show what WHERE showed at a time, or so long ago [s].",
-            need=_LOOK, ours=True),
-    MonitorCommand("SIGNAL", "| n,-m,..", "Turn signals on, or off with a minus; show them.", need=_ARGUMENT),
-    MonitorCommand("SPEED", "| percent", "Show or set the monitor speed; it counts at once.", need=_ARGUMENT),
-    MonitorCommand("STATUS", "", "Show the program, its step and cycles, speeds, power.", need=_LOOK),
-    MonitorCommand("STORE", "file[=program,..]", "Write programs, with all that they use, to a file."),
-    MonitorCommand("STOREL", "file[=location,..]", "Write locations to a file."),
-    MonitorCommand("STOREP", "file[=program,..]", "Write programs to a file."),
-    MonitorCommand("STORER", "file[=real,..]", "Write reals to a file."),
-    MonitorCommand("STORES", "file[=$string,..]", "Write strings to a file."),
-    MonitorCommand("SWITCH", "| switch,..", "Show switches.", need=_LOOK),
-    MonitorCommand("TEACH", "location", "Record one location after the other, each by CR; E ends.", idle=True),
-    MonitorCommand("TIMELINE", "", "Show what is scheduled.", need=_LOOK, ours=True),
-    MonitorCommand("TOOL", "| transformation", "Show the tool, or set it.", need=_ARGUMENT, idle=True),
-    MonitorCommand("UNDO", "", "Take back the newest motion, as far as it's still to come.", ours=True),
-    MonitorCommand("WHERE", "| 1 | REAL", "Show where the arm is; 1 repeats until CR, REAL: the other twin.",
-            need=_LOOK),
-    MonitorCommand("XSTEP", "| program[,cycles[,step]]", "Begin a program step by step, or do its next step.",
-            idle=True),
-    MonitorCommand("ZERO", "", "Delete all programs and values; asks first.", idle=True),
-)  # fmt: skip
-
-COMMANDS: Final = {command.name: command for command in _TABLE}
-"""By name."""
-SHORT: Final = {
-    "A": "ABORT",
-    "D": "DO",
-    "E": "EXECUTE",
-    "EX": "EXECUTE",
-    "P": "PROCEED",
-    "S": "STATUS",
-    "W": "WHERE",
-}
-"""What stands for a command though others begin with it too."""
-
-
-def command_named(word: str) -> MonitorCommand:
-    """The command that a word names, whole or by its beginning.
-
-    Raises:
-        ValError: If none or several begin with it.
-    """
-    wanted = word.upper()
-    if wanted in COMMANDS:
-        return COMMANDS[wanted]
-    found = SHORT.get(wanted) or unique(
-        wanted, (name for name, one in COMMANDS.items() if not one.whole), "command"
-    )
-    return COMMANDS[found]
-
-
-def unique(word: str, names: Iterable[str], kind: str) -> str:
-    """The name that a word is the beginning of; of STORE, STOREL, STOREP it's STORE.
-
-    Args:
-        word: Upper case.
-        names: Those that there are, upper case.
-        kind: What they are, for the error.
-
-    Raises:
-        ValError: If none or several begin with it.
-    """
-    found = sorted((name for name in names if name.startswith(word)), key=lambda name: (len(name), name))
-    if not word or not found:
-        raise ValError(f"Invalid {kind}", word)
-    if found[0] != word and not all(name.startswith(found[0]) for name in found):
-        raise ValError(f"Ambiguous {kind}", f"{word}: {', '.join(sorted(found))}")
-    return found[0]
 
 
 _ASSIGNMENT: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9._]*(\[[^\]]*\])?\s*=(?!=).*", re.DOTALL)
@@ -240,21 +133,21 @@ def explained(word: str) -> Iterator[tuple[str, str, str]]:
         yield "instruction, V+", upper, passed if why is None else f"It isn't available: {why}."
 
 
-def help_(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def help_(state: TerminalState, rest: str) -> None:
     """HELP; HELP word."""
     if not rest:
-        desk.say("Commands; they may be abbreviated. HELP and a word says more of it.")
-        desk.say(*layout.in_columns(COMMANDS))
-        desk.say("Instructions, after DO or in programs:")
-        desk.say(*layout.in_columns(forms.INSTRUCTIONS))
-        desk.say("Functions:")
-        desk.say(*layout.in_columns(forms.FUNCTIONS))
+        state.say("Commands; they may be abbreviated. HELP and a word says more of it.")
+        state.say(*layout.in_columns(COMMANDS))
+        state.say("Instructions, after DO or in programs:")
+        state.say(*layout.in_columns(forms.INSTRUCTIONS))
+        state.say("Functions:")
+        state.say(*layout.in_columns(forms.FUNCTIONS))
         return
     found = list(explained(rest)) or list(explained(_whole(rest)))
     if not found:
         raise ValError("Unknown word", f"{_short(rest)}{_near(rest)}")
     for kind, usage, said in found:
-        desk.say(
+        state.say(
             f"{usage}  ({kind})",
             *textwrap.wrap(said, layout.WIDTH, initial_indent="    ", subsequent_indent="    "),
         )
@@ -275,3 +168,116 @@ def _near(word: str) -> str:
     known = [*COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS]
     close = difflib.get_close_matches(word.upper(), known, n=1, cutoff=0.7)
     return f"; did you mean {close[0]}?" if close else ""
+
+
+_TABLE: Final = (
+    MonitorCommand("ABORT", running.abort, "",
+                   "Stop the program and the arm, within its limits; Ctrl-C does the same."),
+    MonitorCommand("AT", running.at, "t | +t [motion]",
+                   "The next motion begins at a time, or so long from now [s].", idle=True, ours=True),
+    MonitorCommand("BASE", locations.base, "| dx,dy,dz,turn",
+                   "Show the base, or set it: mm, and deg about Z.", need=_ARGUMENT, idle=True),
+    MonitorCommand("CALIBRATE", settings.calibrate, "", "Make joint values valid; asks first.", idle=True),
+    MonitorCommand("COPY", storage.copy, "new=old", "Copy a program."),
+    MonitorCommand("DELETE", storage.delete_programs, "program,..", "Delete programs; asks first.", idle=True),
+    MonitorCommand("DELETEL", storage.delete_values("location"), "location,..",
+                   "Delete locations; asks first.", idle=True),
+    MonitorCommand("DELETEP", storage.delete_programs, "program,..", "Delete programs; asks first.", idle=True),
+    MonitorCommand("DELETER", storage.delete_values("real"), "real,..", "Delete reals; asks first.", idle=True),
+    MonitorCommand("DELETES", storage.delete_values("string"), "$string,..",
+                   "Delete strings; asks first.", idle=True),
+    MonitorCommand("DIRECTORY", storage.directory, "", "List the programs in memory.", need=_LOOK),
+    MonitorCommand("DISABLE", settings.disable, "switch,..", "Turn switches off."),
+    MonitorCommand("DO", running.do, "instruction |",
+                   "Carry out one instruction; without one, the last again.", idle=True),
+    MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.", idle=True),
+    MonitorCommand("ENABLE", settings.enable, "switch,..", "Turn switches on; ENABLE POWER after PANIC."),
+    MonitorCommand("EXECUTE", running.execute, "program[(arguments)][,cycles[,step]] |",
+                   "Run a program, or the last; cycles -1 for ever.", idle=True),
+    MonitorCommand("EXIT", None, "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
+    MonitorCommand("FLIST", storage.flist, "", "List the files.", need=_LOOK),
+    MonitorCommand("FREE", storage.free, "", "Show what is in memory.", need=_LOOK),
+    MonitorCommand("HELP", help_, "| word", "List the commands, or explain a word of the language.", need=_LOOK),
+    MonitorCommand("HERE", locations.here, "location | #location | a:b",
+                   "Record where the arm is; then CR, or changes: ,,10"),
+    MonitorCommand("ID", storage.identity, "", "Show what this is, and its version.", need=_LOOK),
+    MonitorCommand("IO", settings.io, "", "Show inputs, outputs and internal signals.", need=_LOOK),
+    MonitorCommand("LISTF", storage.flist, "", "List the files.", need=_LOOK),
+    MonitorCommand("LISTL", storage.listl, "| location,..",
+                   "List locations; * stands for any characters.", need=_LOOK),
+    MonitorCommand("LISTP", storage.listp, "| program,..", "List programs.", need=_LOOK),
+    MonitorCommand("LISTR", storage.listr, "| real,.. | expression",
+                   "List reals, or show what an expression comes to.", need=_LOOK),
+    MonitorCommand("LISTS", storage.lists, "| $string,.. | expression",
+                   "List strings, or show what an expression comes to.", need=_LOOK),
+    MonitorCommand("LOAD", storage.load, "file", "Read programs and values from a file."),
+    MonitorCommand("NEXT", running.next_, "| n",
+                   "Carry out the next step of a program that stands, or the next n.", idle=True),
+    MonitorCommand("PANIC", running.panic, "", "Stop at once and turn the power off."),
+    MonitorCommand("PARAMETER", settings.parameter, "| name | name=value",
+                   "Show or set parameters.", need=_ARGUMENT),
+    MonitorCommand("POINT", locations.point, "location[=expression]",
+                   "Define or change a location; then CR, or changes: ,,10"),
+    MonitorCommand("PROCEED", running.proceed, "",
+                   "Go on with a program that stands, at its next step.", idle=True),
+    MonitorCommand("QUIT", None, "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
+    MonitorCommand("RENAME", storage.rename, "new=old", "Rename a program.", idle=True),
+    MonitorCommand("RESET", settings.reset, "", "Turn all outputs off."),
+    MonitorCommand("RETRY", running.retry, "",
+                   "Go on with a program that stands, at the step that was interrupted.", idle=True),
+    MonitorCommand("REWIND", locations.rewind, "t | -t",
+                   "Show what WHERE showed at a time, or so long ago [s].", need=_LOOK, ours=True),
+    MonitorCommand("SIGNAL", settings.signal, "| n,-m,..",
+                   "Turn signals on, or off with a minus; show them.", need=_ARGUMENT),
+    MonitorCommand("SPEED", settings.speed, "| percent",
+                   "Show or set the monitor speed; it counts at once.", need=_ARGUMENT),
+    MonitorCommand("STATUS", running.status, "",
+                   "Show the program, its step and cycles, speeds, power.", need=_LOOK),
+    MonitorCommand("STORE", storage.store(""), "file[=program,..]",
+                   "Write programs, with all that they use, to a file."),
+    MonitorCommand("STOREL", storage.store("L"), "file[=location,..]", "Write locations to a file."),
+    MonitorCommand("STOREP", storage.store("P"), "file[=program,..]", "Write programs to a file."),
+    MonitorCommand("STORER", storage.store("R"), "file[=real,..]", "Write reals to a file."),
+    MonitorCommand("STORES", storage.store("S"), "file[=$string,..]", "Write strings to a file."),
+    MonitorCommand("SWITCH", settings.switch, "| switch,..", "Show switches.", need=_LOOK),
+    MonitorCommand("TEACH", locations.teach, "location",
+                   "Record one location after the other, each by CR; E ends.", idle=True),
+    MonitorCommand("TIMELINE", running.timeline, "", "Show what is scheduled.", need=_LOOK, ours=True),
+    MonitorCommand("TOOL", locations.tool, "| transformation",
+                   "Show the tool, or set it.", need=_ARGUMENT, idle=True),
+    MonitorCommand("UNDO", running.undo, "",
+                   "Take back the newest motion, as far as it's still to come.", ours=True),
+    MonitorCommand("WHERE", locations.where, "| 1 | REAL",
+                   "Show where the arm is; 1 repeats until CR, REAL: the other twin.", need=_LOOK),
+    MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
+                   "Begin a program step by step, or do its next step.", idle=True),
+    MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),
+)  # fmt: skip
+
+COMMANDS: Final = {command.name: command for command in _TABLE}
+"""By name."""
+SHORT: Final = {
+    "A": "ABORT",
+    "D": "DO",
+    "E": "EXECUTE",
+    "EX": "EXECUTE",
+    "P": "PROCEED",
+    "S": "STATUS",
+    "W": "WHERE",
+}
+"""What stands for a command though others begin with it too."""
+
+
+def command_named(word: str) -> MonitorCommand:
+    """The command that a word names, whole or by its beginning.
+
+    Raises:
+        ValError: If none or several begin with it.
+    """
+    wanted = word.upper()
+    if wanted in COMMANDS:
+        return COMMANDS[wanted]
+    found = SHORT.get(wanted) or unique(
+        wanted, (name for name, one in COMMANDS.items() if not one.whole), "command"
+    )
+    return COMMANDS[found]

@@ -33,12 +33,12 @@ class Suggestion:
     """One line; empty for none."""
 
 
-def suggestions(text: str, desk: TerminalState, *, program: bool = False) -> tuple[str, list[Suggestion]]:
+def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Suggestion]]:
     """What may complete a line.
 
     Args:
         text: As far as the cursor.
-        desk: Whose memory and files are known.
+        state: Whose memory and files are known.
         program: Whether it's a line of a program, not a command.
 
     Returns:
@@ -49,7 +49,7 @@ def suggestions(text: str, desk: TerminalState, *, program: bool = False) -> tup
     before = text[: len(text) - len(fragment)]
     if before.count('"') % 2 or ";" in before:
         return fragment, []
-    known = _instruction(before, desk) if program else _command(before, desk)
+    known = _instruction(before, state) if program else _command(before, state)
     wanted = fragment.upper()
     fitting = {one.word: one for one in known if one.word.upper().startswith(wanted) and one.word.upper() != wanted}
     lower = bool(fragment) and not any(letter.isupper() for letter in fragment)
@@ -57,7 +57,7 @@ def suggestions(text: str, desk: TerminalState, *, program: bool = False) -> tup
     return fragment, [Suggestion(one.word.lower() if lower else one.word, one.help) for one in some]
 
 
-def _command(before: str, desk: TerminalState) -> Iterable[Suggestion]:
+def _command(before: str, state: TerminalState) -> Iterable[Suggestion]:
     word, rest = split_word(before)
     if not word:
         return [Suggestion(one.name, one.help) for one in commands.COMMANDS.values()]
@@ -65,12 +65,12 @@ def _command(before: str, desk: TerminalState) -> Iterable[Suggestion]:
         name = commands.command_named(word).name
     except ValError:
         return []
-    memory = desk.controller.memory
+    memory = state.controller.memory
     if name == "DO":
-        return _instruction(before.lstrip()[len(word) :], desk)
+        return _instruction(before.lstrip()[len(word) :], state)
     if name == "AT":
         found = _DO.search(before)
-        return _instruction(found[1], desk) if found else [Suggestion("DO")]
+        return _instruction(found[1], state) if found else [Suggestion("DO")]
     if name in {"ENABLE", "DISABLE", "SWITCH"}:
         return [Suggestion(one.name, one.help) for one in forms.SWITCHES.values()]
     if name == "PARAMETER" and "=" not in rest:
@@ -78,45 +78,45 @@ def _command(before: str, desk: TerminalState) -> Iterable[Suggestion]:
     if name in _PROGRAMS:
         return [Suggestion(one) for one in memory.programs]
     if name in _LOCATIONS and "=" not in rest and ":" not in rest:
-        return _names(desk, "location", "point")
+        return _names(state, "location", "point")
     if name in _VALUES:
-        return _names(desk, _VALUES[name])
+        return _names(state, _VALUES[name])
     if name in {"LOAD", "STORE", "STOREP", "STOREL", "STORER", "STORES"}:
-        return [Suggestion(one) for one in (memory.programs if "=" in rest else desk.files.listed())]
+        return [Suggestion(one) for one in (memory.programs if "=" in rest else state.files.listed())]
     if name == "HELP":
         return _all_words()
     if name == "WHERE":
         return [Suggestion("REAL", "The other twin.")]
-    return _operands(desk) if name in {"TOOL", "BASE", "POINT", "HERE", "REWIND", "SPEED", "SIGNAL"} else []
+    return _operands(state) if name in {"TOOL", "BASE", "POINT", "HERE", "REWIND", "SPEED", "SIGNAL"} else []
 
 
-def _instruction(before: str, desk: TerminalState) -> Iterator[Suggestion]:
+def _instruction(before: str, state: TerminalState) -> Iterator[Suggestion]:
     word, _ = split_word(_LABEL.sub("", before))
     if not word:
         yield from (Suggestion(one.keyword, one.help) for one in forms.INSTRUCTIONS.values())
-        yield from _names(desk, "real", "string")
+        yield from _names(state, "real", "string")
         return
     keyword = word.upper()
     if keyword in {"CALL", "GOSUB", "REACT", "REACTI"}:
-        yield from (Suggestion(one) for one in desk.controller.memory.programs)
+        yield from (Suggestion(one) for one in state.controller.memory.programs)
     if keyword in {"ENABLE", "DISABLE"}:
         yield from (Suggestion(one.name, one.help) for one in forms.SWITCHES.values())
         return
     form = forms.INSTRUCTIONS.get(keyword)
     if form is not None:
         yield from (Suggestion(one, forms.WORDS.get(one, "")) for one in form.allowed_words)
-    yield from _operands(desk)
+    yield from _operands(state)
 
 
-def _operands(desk: TerminalState) -> Iterator[Suggestion]:
+def _operands(state: TerminalState) -> Iterator[Suggestion]:
     yield from (Suggestion(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
     yield from (Suggestion(name, said) for name, said in forms.OPERATORS.items())
-    yield from _names(desk, "location", "point", "real", "string")
+    yield from _names(state, "location", "point", "real", "string")
 
 
-def _names(desk: TerminalState, *kinds: str) -> list[Suggestion]:
+def _names(state: TerminalState, *kinds: str) -> list[Suggestion]:
     """Names in memory, an array's once."""
-    listing = desk.controller.memory.listing
+    listing = state.controller.memory.listing
     return [
         Suggestion(name) for name in {name.partition("[")[0]: None for kind in kinds for name, _ in listing(kind)}
     ]

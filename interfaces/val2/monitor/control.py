@@ -66,7 +66,7 @@ class Control(Protocol):
         """How often it's to be asked for trouble [s]; infinity for never."""
 
 
-class Free:
+class Free(Control):
     """Control over what nobody else can reach."""
 
     kept = True

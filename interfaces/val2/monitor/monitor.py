@@ -13,9 +13,8 @@ from interfaces.val2.monitor import commands, settings
 from interfaces.val2.monitor.control import SharedOperator, Switchboard
 from interfaces.val2.monitor.editor import Editing
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.handlers import HANDLERS
 from interfaces.val2.monitor.locations import Teach, WatchDialogue
-from interfaces.val2.monitor.state import Dialogue, Said, Style, TerminalState, split_word
+from interfaces.val2.monitor.state import Dialogue, OutputText, Style, TerminalState, split_word
 from vrs.errors import VrsError
 
 LONGEST: Final = 2048
@@ -57,7 +56,7 @@ class TerminalMonitor:
         """
         self._person = person
         self._board, self._patient, self.barred = board, patient, barred
-        self.desk = TerminalState(board.controller, files, version)
+        self.state = TerminalState(board.controller, files, version)
         self._dialogue: Dialogue | None = None
         self._asked: str | None = None
         self._waiting: deque[str] = deque()
@@ -81,7 +80,7 @@ class TerminalMonitor:
             return self._asked
         if self._busy:
             return ""
-        return "*" if self.desk.controller.running else "."
+        return "*" if self.state.controller.running else "."
 
     @property
     def _mine(self) -> bool:
@@ -90,13 +89,13 @@ class TerminalMonitor:
     @property
     def _busy(self) -> bool:
         """Whether lines wait: for an instruction, or for control."""
-        works = self.desk.work is not None or (self._mine and self.desk.controller.doing)
+        works = self.state.work is not None or (self._mine and self.state.controller.doing)
         return self._greeting or self._due < math.inf or works
 
     @property
     def busy(self) -> bool:
         """Whether a program or an instruction of this terminal is under way, or lines wait."""
-        running = self._mine and (self.desk.controller.running or self.desk.controller.doing)
+        running = self._mine and (self.state.controller.running or self.state.controller.doing)
         return running or self._busy or bool(self._waiting)
 
     @property
@@ -109,30 +108,32 @@ class TerminalMonitor:
         """Whether the next line is one of a program."""
         return isinstance(self._dialogue, Editing)
 
-    def output(self) -> list[Said]:
+    def output(self) -> list[OutputText]:
         """What was said since this was last called."""
-        said, self.desk.said = self.desk.said, []
-        return said
+        output, self.state.output = self.state.output, []
+        return output
 
     def start(self, *, now: float) -> None:
         """Say what this is, and ask for control."""
-        self.desk.say(f"{self.desk.version}. HELP lists the commands.", style=Style.NOTE)
+        self.state.now = now
+        self.state.say(f"{self.state.version}. HELP lists the commands.", style=Style.NOTE)
         self._greeting = self._person is None or bool(self.barred)
         self.advance(now=now)
 
     def line(self, text: str, *, now: float) -> None:
         """Take a line."""
+        self.state.now = now
         if self.done or self._ended:
             return
         if len(text) > LONGEST or text == OVERLONG:
-            self.desk.fail(ValError("Line too long", f"{LONGEST} characters at most"))
+            self.state.fail(ValError("Line too long", f"{LONGEST} characters at most"))
             return
         text = "".join(letter for letter in text.expandtabs() if letter.isprintable())
         word = text.strip().upper()
         if not self._patient and (word == "PANIC" or (word == "ABORT" and not self._at_prompt)):
-            self._urgent(word, now)
+            self._urgent(word)
         elif self.takes(text):
-            self._take(text, now=now)
+            self._take(text)
         else:
             self._wait(text)
         self.advance(now=now)
@@ -142,17 +143,17 @@ class TerminalMonitor:
         """Whether the next line can be taken, and isn't an answer to a program."""
         return not (self._busy or self._waiting) and self._asked is None
 
-    def _urgent(self, word: str, now: float) -> None:
+    def _urgent(self, word: str) -> None:
         """What is done whatever is under way; what a program asks and what waits is dropped."""
         if word == "PANIC" or self._mine:
             self._waiting.clear()
             dialogue, self._asked = self._dialogue, None
-            self._command(word, now)
+            self._command(word)
             self._dialogue = dialogue
 
     def _wait(self, text: str) -> None:
         if len(self._waiting) >= WAITING and not self._patient:
-            self.desk.fail(ValError("Too many lines waiting", f"{WAITING} at most"))
+            self.state.fail(ValError("Too many lines waiting", f"{WAITING} at most"))
         else:
             self._waiting.append(text)
 
@@ -163,28 +164,28 @@ class TerminalMonitor:
     def _can_take(self, text: str) -> bool:
         if self._busy or self._dialogue is not None or self._asked is not None:
             return not self._busy or self._asked is not None
-        runs = self._patient and self._mine and self.desk.controller.running
+        runs = self._patient and self._mine and self.state.controller.running
         return not runs or self._is_allowed(text)
 
-    def _take(self, text: str, *, now: float) -> None:
+    def _take(self, text: str) -> None:
         """Do what a line says."""
         if self._dialogue is not None and not self._busy:
-            self._converse(self._dialogue, text, now)
+            self._converse(self._dialogue, text)
         elif self._asked is not None:
             self._asked = None
-            self._guarded(lambda: self.desk.controller.answer(text, now=now))
+            self._guarded(lambda: self.state.controller.answer(text, now=self.state.now))
         else:
-            self._command(text, now)
+            self._command(text)
 
-    def _converse(self, dialogue: Dialogue, text: str, now: float) -> None:
+    def _converse(self, dialogue: Dialogue, text: str) -> None:
         if isinstance(dialogue, Teach) and not dialogue.takes(text):
-            self._command(text, now)
+            self._command(text)
             self._dialogue = self._dialogue or dialogue
             return
 
         def answer() -> None:
-            self.desk.line = text
-            self._dialogue = dialogue.line(text, now=now)
+            self.state.line = text
+            self._dialogue = dialogue.line(text)
 
         self._guarded(answer)
 
@@ -197,186 +198,190 @@ class TerminalMonitor:
         except ValError:
             return False
 
-    def _command(self, text: str, now: float) -> None:
+    def _command(self, text: str) -> None:
         """Do what a command says, or say what is wrong with it."""
-        self.desk.line = text
-        self._guarded(lambda: self._carry_out(text, now))
+        self.state.line = text
+        self._guarded(lambda: self._carry_out(text))
 
     def _guarded(self, action: Callable[[], object]) -> None:
         try:
             action()
         except ValError as error:
-            self.desk.fail(error)
+            self.state.fail(error)
         except VrsError as error:
-            self.desk.fail(ValError("Not possible", str(error)))
+            self.state.fail(ValError("Not possible", str(error)))
 
-    def _carry_out(self, text: str, now: float) -> None:
+    def _carry_out(self, text: str) -> None:
         bare = text.split(";", 1)[0].strip() if '"' not in text else text.strip()
         word, rest = split_word(bare)
         if not bare:
             return
-        if rest == "?" and settings.state(self.desk, word.upper()):
+        if rest == "?" and settings.show_setting(self.state, word.upper()):
             return
         command = commands.command(bare)
-        if command.name in {"QUIT", "EXIT"}:
-            self._end(now)
+        if command.act is None:
+            self._end()
             return
-        if not command.looks(rest):
-            answer = self.barred or self._board.wanted(self, self._person, now=now)
+        if not command.only_shows(rest):
+            answer = self.barred or self._board.wanted(self, self._person, now=self.state.now)
             if answer is None and command.name not in _URGENT:
                 self._waiting.appendleft(text)
-                self._due, self._claimed = now + ASKING, (command.name, text)
+                self._due, self._claimed = self.state.now + ASKING, (command.name, text)
                 return
             if answer:
                 raise ValError("No control", f"{command.name}: {answer}")
-        running = self.desk.controller.running
+        running = self.state.controller.running
         if command.idle and running and command.name != "DO":
             raise ValError("Program running", f"{command.name} must wait, or ABORT it")
-        self._dialogue = HANDLERS[command.name](self.desk, rest, now=now)
+        self._dialogue = command.act(self.state, rest)
         if command.name == "ENABLE":
-            self._board.resume(now=now)
+            self._board.resume(now=self.state.now)
 
     def interrupt(self, *, now: float) -> None:
         """Ctrl-C: what is asked is dropped, else what this terminal runs is aborted."""
+        self.state.now = now
         self._waiting.clear()
-        self.desk.drop_work()
+        self.state.drop_work()
         if self._dialogue is not None:
-            self._drop(now=now, kept=False)
-        elif self._mine and (self.desk.controller.running or self.desk.controller.doing):
+            self._drop(kept=False)
+        elif self._mine and (self.state.controller.running or self.state.controller.doing):
             self._asked = None
-            self._command("ABORT", now)
+            self._command("ABORT")
         self.advance(now=now)
 
-    def _drop(self, *, now: float, kept: bool) -> None:
+    def _drop(self, *, kept: bool) -> None:
         dialogue, self._dialogue, self._asked = self._dialogue, None, None
         if dialogue is not None:
-            self._guarded(lambda: dialogue.leave(now=now, kept=kept))
+            self._guarded(lambda: dialogue.leave(kept=kept))
 
     def end_of_input(self, *, now: float) -> None:
         """No line will come any more: what is under way is done, then it's over."""
+        self.state.now = now
         self._ended = True
         self.advance(now=now)
 
     def leave(self, *, now: float) -> None:
         """The terminal is gone."""
+        self.state.now = now
         if not self.done:
-            self._end(now)
+            self._end()
 
-    def _end(self, now: float) -> None:
-        self._drop(now=now, kept=True)
-        self.desk.drop_work()
+    def _end(self) -> None:
+        self._drop(kept=True)
+        self.state.drop_work()
         self.done = True
         self._waiting.clear()
-        self._board.leave(self, now=now)
+        self._board.leave(self, now=self.state.now)
 
     def take(self, event: context.Event) -> None:
         """Take an event of the controller, when in control."""
-        desk = self.desk
+        state = self.state
         match event:
             case context.Typed(text):
-                desk.said.append(Said(text, Style.TYPED))
+                state.output.append(OutputText(text, Style.TYPED))
             case context.Asked(text):
                 self._asked = text
             case context.ProgramPaused(program, step, word):
                 self._asked = None
-                if word != "XSTEP" or not desk.steps:
-                    desk.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
+                if word != "XSTEP" or not state.steps:
+                    state.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
             case context.ProgramEnded(program, word):
-                self._asked, desk.steps = None, 0
+                self._asked, state.steps = None, 0
                 if program or word == "ABORT":
-                    desk.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
+                    state.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
             case context.ProgramFailed(error):
-                self._asked, desk.steps = None, 0
-                desk.fail(error)
+                self._asked, state.steps = None, 0
+                state.fail(error)
             case context.Warned(text):
-                desk.say(text if text.startswith("*") else f"*Warning* {text}", style=Style.NOTE)
+                state.say(text if text.startswith("*") else f"*Warning* {text}", style=Style.NOTE)
             case _:
                 pass
 
     def advance(self, *, now: float) -> None:
         """Do what is due: of the controller, of what is shown again and again, and lines that have waited."""
+        self.state.now = now
         self._board.advance(now=now)
         if self._greeting or now >= self._due:
-            self._settle_control(now)
-        self._look(now)
+            self._settle_control()
+        self._look()
         if isinstance(self._dialogue, WatchDialogue):
-            self._dialogue.advance(now=now)
-        self.desk.work_on(allowed=self._mine)
-        self._step_on(now)
-        self._schedule(now)
+            self._dialogue.advance()
+        self.state.work_on(allowed=self._mine)
+        self._step_on()
+        self._schedule()
         while self._waiting and not self.done:
             text = self._waiting.popleft()
             if not self._can_take(text):
                 self._waiting.appendleft(text)
                 break
-            self._take(text, now=now)
+            self._take(text)
             if self._due < math.inf:
                 break
             self._board.advance(now=now)
-            self._step_on(now)
+            self._step_on()
         if self._ended and not self.done:
-            self._finish(now)
+            self._finish()
 
-    def _settle_control(self, now: float) -> None:
+    def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.barred or self._board.wanted(self, self._person, now=now)
+        answer = self.barred or self._board.wanted(self, self._person, now=self.state.now)
         if answer is None:
-            self._due = now + ASKING
+            self._due = self.state.now + ASKING
             return
         self._due = math.inf
         if self._greeting:
             self._greeting = False
             if answer:
-                self.desk.say(f"*No control* {answer}: looking only", style=Style.NOTE)
+                self.state.say(f"*No control* {answer}: looking only", style=Style.NOTE)
         elif answer and self._waiting and self._waiting[0] is self._claimed[1]:
             self._waiting.popleft()
-            self.desk.fail(ValError("No control", f"{self._claimed[0]}: {answer}"))
+            self.state.fail(ValError("No control", f"{self._claimed[0]}: {answer}"))
 
-    def _look(self, now: float) -> None:
+    def _look(self) -> None:
         """Say when the robot has stopped by itself, or can't be reached; and when that's over."""
-        self._looked = now
+        self._looked = self.state.now
         if self._greeting:
             return
-        trouble = self._board.trouble(now=now)
+        trouble = self._board.trouble(now=self.state.now)
         text = "" if trouble is None else str(trouble)
         if text == self._trouble:
             return
         self._trouble = text
         if text:
-            self.desk.say(text, style=Style.ERROR)
+            self.state.say(text, style=Style.ERROR)
         else:
-            self.desk.say("The robot follows again", style=Style.NOTE)
+            self.state.say("The robot follows again", style=Style.NOTE)
 
-    def _step_on(self, now: float) -> None:
+    def _step_on(self) -> None:
         """The next of the steps that NEXT is to do."""
-        controller = self.desk.controller
-        while self.desk.steps and not (controller.running or controller.doing):
-            self.desk.steps -= 1
-            self._guarded(lambda: controller.xstep(now=now))
-            self._board.advance(now=now)
+        controller = self.state.controller
+        while self.state.steps and not (controller.running or controller.doing):
+            self.state.steps -= 1
+            self._guarded(lambda: controller.xstep(now=self.state.now))
+            self._board.advance(now=self.state.now)
 
-    def _schedule(self, now: float) -> None:
+    def _schedule(self) -> None:
         """A motion for later isn't waited for, once it's accepted."""
-        controller = self.desk.controller
-        if self.desk.scheduling and self._mine and controller.doing:
-            controller.let_go(now=now)
-            self._board.advance(now=now)
-            self.desk.scheduling = controller.doing
+        controller = self.state.controller
+        if self.state.scheduling and self._mine and controller.doing:
+            controller.let_go(now=self.state.now)
+            self._board.advance(now=self.state.now)
+            self.state.scheduling = controller.doing
 
-    def _finish(self, now: float) -> None:
+    def _finish(self) -> None:
         """Leave, once nothing is under way."""
         if self._dialogue is not None and not self._busy and not self._waiting:
-            self._drop(now=now, kept=True)
+            self._drop(kept=True)
         if self._asked is not None:
-            self.desk.fail(ValError("End of input", "the program asks for a line"))
+            self.state.fail(ValError("End of input", "the program asks for a line"))
             self._asked = None
-            self._command("ABORT", now)
+            self._command("ABORT")
         if not self.busy:
-            self._end(now)
+            self._end()
 
     def next_deadline(self) -> float:
         """When to call `advance` next [s]; infinity for not before a line comes."""
-        if self.desk.work is not None:
+        if self.state.work is not None:
             return self._looked
         watched = self._dialogue.due if isinstance(self._dialogue, WatchDialogue) else math.inf
         return min(self._board.next_deadline(), self._due, watched, self._looked + self._board.looks)

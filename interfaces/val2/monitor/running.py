@@ -20,16 +20,16 @@ POWER: Final = "POWER"
 _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 
 
-def do(desk: TerminalState, rest: str, *, now: float) -> None:
+def do(state: TerminalState, rest: str) -> None:
     """DO instruction; DO alone does the last again."""
-    step = desk.step(rest) if rest else desk.last_do
+    step = state.step(rest) if rest else state.last_do
     if step is None or isinstance(step.statement, Blank):
         raise ValError("Missing argument", "DO what? An instruction follows, such as DO READY")
-    desk.last_do = step
-    desk.controller.do(step, now=now)
+    state.last_do = step
+    state.controller.do(step, now=state.now)
 
 
-def at(desk: TerminalState, rest: str, *, now: float) -> None:
+def at(state: TerminalState, rest: str) -> None:
     """AT t, AT +t, before the next motion; AT t motion, AT t DO motion in one line."""
     together, places = _AT.fullmatch(rest), timed(rest)
     when, motion = rest, ""
@@ -37,42 +37,42 @@ def at(desk: TerminalState, rest: str, *, now: float) -> None:
         when, motion = together[1], together[2]
     elif places is not None:
         when, motion = rest[: places[0]], rest[places[1] :]
-    t = desk.number(when.removeprefix("+"), now=now)
-    desk.controller.arm.at(now + t if when.startswith("+") else t)
-    desk.scheduling = True
+    t = state.number(when.removeprefix("+"))
+    state.controller.arm.at(state.now + t if when.startswith("+") else t)
+    state.scheduling = True
     if motion:
-        do(desk, motion, now=now)
+        do(state, motion)
 
 
-def execute(desk: TerminalState, rest: str, *, now: float) -> None:
+def execute(state: TerminalState, rest: str) -> None:
     """EXECUTE program(arguments), cycles, step."""
-    name, arguments, cycles, step = _program(desk, rest)
-    desk.controller.execute(name, arguments, cycles=cycles, step=step, now=now)
+    name, arguments, cycles, step = _program(state, rest)
+    state.controller.execute(name, arguments, cycles=cycles, step=step, now=state.now)
 
 
-def xstep(desk: TerminalState, rest: str, *, now: float) -> None:
+def xstep(state: TerminalState, rest: str) -> None:
     """XSTEP; XSTEP program(arguments), cycles, step begins one."""
     if not rest:
-        desk.controller.xstep(now=now)
+        state.controller.xstep(now=state.now)
         return
-    name, arguments, cycles, step = _program(desk, rest)
+    name, arguments, cycles, step = _program(state, rest)
     if arguments:
         raise ValError("Invalid argument", f"{rest}: XSTEP gives a program no arguments")
-    desk.controller.xstep(name, cycles=cycles, step=step, now=now)
+    state.controller.xstep(name, cycles=cycles, step=step, now=state.now)
 
 
-def next_(desk: TerminalState, rest: str, *, now: float) -> None:
+def next_(state: TerminalState, rest: str) -> None:
     """NEXT; NEXT n: so many steps of a program that stands."""
     steps = integer(rest, 1, "the number of steps")
     if not 1 <= steps <= 10_000:
         raise ValError("Invalid argument", f"{rest}: 1 to 10000 steps")
-    desk.controller.xstep(now=now)
-    desk.steps = steps - 1
+    state.controller.xstep(now=state.now)
+    state.steps = steps - 1
 
 
-def _program(desk: TerminalState, rest: str) -> tuple[str, tuple[Expression, ...], int, int]:
+def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ...], int, int]:
     """Program, arguments, cycles and step of a line; of an empty one those of the last."""
-    text = rest or desk.last_run
+    text = rest or state.last_run
     if not text:
         raise ValError("Missing argument", "which program?")
     called, *numbers = pieces(text)
@@ -80,7 +80,7 @@ def _program(desk: TerminalState, rest: str) -> tuple[str, tuple[Expression, ...
         raise ValError("Invalid argument", f"{rest}: program, cycles and step")
     arguments: tuple[Expression, ...] = ()
     if "(" in called:
-        statement = desk.instruction("CALL", called).statement
+        statement = state.instruction("CALL", called).statement
         assert isinstance(statement, Call)
         called = statement.program
         arguments = tuple(argument for argument in statement.arguments if argument is not None)
@@ -88,93 +88,93 @@ def _program(desk: TerminalState, rest: str) -> tuple[str, tuple[Expression, ...
             raise ValError("Missing argument", f"{text}: none may be left out")
     name = named(called, "program")
     cycles, step = integer("".join(numbers[:1]), 1, "cycles"), integer("".join(numbers[1:]), 1, "step")
-    if name not in desk.controller.memory.programs:
+    if name not in state.controller.memory.programs:
         raise ValError("Undefined program name", name)
     if cycles < FOREVER or cycles == 0:
         raise ValError("Invalid argument", f"{cycles}: cycles are 1 or more, or -1 for ever")
-    desk.last_run = text
+    state.last_run = text
     return name, arguments, cycles, step
 
 
-def abort(desk: TerminalState, rest: str, *, now: float) -> None:
+def abort(state: TerminalState, rest: str) -> None:
     """ABORT."""
     nothing(rest, "ABORT")
-    controller = desk.controller
-    if not (controller.running or controller.doing) and _stands(desk, now):
+    controller = state.controller
+    if not (controller.running or controller.doing) and _stands(state):
         raise ValError("No program running")
-    controller.abort(now=now)
+    controller.abort(now=state.now)
 
 
-def _stands(desk: TerminalState, now: float) -> bool:
-    """Whether the arm has nothing to do; what became of it is said elsewhere."""
+def _stands(state: TerminalState) -> bool:
+    """Whether the arm has nothing to do; refusals are reported elsewhere."""
     try:
-        return desk.controller.arm.settled(now=now)
+        return state.controller.arm.settled(now=state.now)
     except ValError:
         return False
 
 
-def panic(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - it works whatever follows
+def panic(state: TerminalState, _rest: str) -> None:
     """PANIC: stop, power off."""
-    controller = desk.controller
+    controller = state.controller
     controller.switch(POWER, False)
     with contextlib.suppress(ValError):
-        controller.abort(now=now)
-    desk.say("*Arm power off* ENABLE POWER turns it on again", style=Style.ERROR)
+        controller.abort(now=state.now)
+    state.say("*Arm power off* ENABLE POWER turns it on again", style=Style.ERROR)
 
 
-def proceed(desk: TerminalState, rest: str, *, now: float) -> None:
+def proceed(state: TerminalState, rest: str) -> None:
     """PROCEED."""
     nothing(rest, "PROCEED")
-    desk.controller.proceed(now=now)
+    state.controller.proceed(now=state.now)
 
 
-def retry(desk: TerminalState, rest: str, *, now: float) -> None:
+def retry(state: TerminalState, rest: str) -> None:
     """RETRY."""
     nothing(rest, "RETRY")
-    desk.controller.retry(now=now)
+    state.controller.retry(now=state.now)
 
 
-def undo(desk: TerminalState, rest: str, *, now: float) -> None:
+def undo(state: TerminalState, rest: str) -> None:
     """UNDO."""
     nothing(rest, "UNDO")
-    desk.say(desk.controller.arm.undo(now=now))
+    state.say(state.controller.arm.undo(now=state.now))
 
 
-def timeline(desk: TerminalState, rest: str, *, now: float) -> None:
+def timeline(state: TerminalState, rest: str) -> None:
     """TIMELINE."""
     nothing(rest, "TIMELINE")
-    desk.say(f"Now {layout.fixed(now, 3)} s")
-    scheduled = desk.controller.arm.timeline(now=now)
+    state.say(f"Now {layout.fixed(state.now, 3)} s")
+    scheduled = state.controller.arm.timeline(now=state.now)
     if scheduled:
         joints = " ".join(f"{f'JT {joint}':>8}" for joint in range(1, 7))
-        desk.say(f"{'no':>6} {'begins':>10} {'ends':>10}  {joints}")
-    desk.say_all(scheduled, "Nothing is scheduled")
+        state.say(f"{'no':>6} {'begins':>10} {'ends':>10}  {joints}")
+    state.say_all(scheduled, "Nothing is scheduled")
 
 
-def status(desk: TerminalState, rest: str, *, now: float) -> None:
+def status(state: TerminalState, rest: str) -> None:
     """STATUS."""
     nothing(rest, "STATUS")
-    controller = desk.controller
-    state = controller.status()
-    here, there = controller.arm.here(now=now), controller.arm.destination(now=now)
+    controller = state.controller
+    current = controller.status()
+    here, there = controller.arm.here(now=state.now), controller.arm.destination(now=state.now)
     moves = not all(abs(a - b) < 1e-6 for a, b in zip(here.joints.joints, there.joints.joints, strict=True))
-    desk.say(
+    state.say(
         *layout.table([
-            ("Program", _program_line(state)),
+            ("Program", _program_line(current)),
             ("Monitor speed", f"{layout.number(controller.arm.monitor_speed())} %"),
             ("Power", "on" if controller.switches[POWER] else "off"),
             ("Arm", "moves" if moves else "stands"),
-            ("Session time", f"{layout.fixed(now, 3)} s"),
+            ("Session time", f"{layout.fixed(state.now, 3)} s"),
         ])
     )  # fmt: skip
-    for depth, (name, step) in enumerate(reversed(state.stack[:-1]), 1):
-        desk.say(f"{'':{2 * depth}}called from {name}, step {step}")
+    for depth, (name, step) in enumerate(reversed(current.stack[:-1]), 1):
+        state.say(f"{'':{2 * depth}}called from {name}, step {step}")
 
 
-def _program_line(state: ControllerStatus) -> str:
-    word = state.state.name.lower()
-    if not state.program:
+def _program_line(current: ControllerStatus) -> str:
+    word = current.state.name.lower()
+    if not current.program:
         return word
-    left = "for ever" if state.cycles_left < 0 else f"{state.cycles_left}"
-    why = f" ({state.word})" if state.word else ""
-    return f"{state.program}, step {state.step}: {word}{why}, cycles left: {left}"
+    left = "for ever" if current.cycles_left < 0 else f"{current.cycles_left}"
+    why = f" ({current.word})" if current.word else ""
+    return f"{current.program}, step {current.step}: {word}{why}, cycles left: {left}"

@@ -5,9 +5,11 @@ from __future__ import annotations
 import enum
 import math
 import re
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Final, Protocol
+from typing import Final
+
+from typing_extensions import override
 
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
@@ -84,6 +86,25 @@ def integer(text: str, default: int, what: str) -> int:
     return int(text)
 
 
+def unique(word: str, names: Iterable[str], kind: str) -> str:
+    """The name that a word is the beginning of; of STORE, STOREL, STOREP it's STORE.
+
+    Args:
+        word: Upper case.
+        names: Those that there are, upper case.
+        kind: What they are, for the error.
+
+    Raises:
+        ValError: If none or several begin with it.
+    """
+    found = sorted((name for name in names if name.startswith(word)), key=lambda name: (len(name), name))
+    if not word or not found:
+        raise ValError(f"Invalid {kind}", word)
+    if found[0] != word and not all(name.startswith(found[0]) for name in found):
+        raise ValError(f"Ambiguous {kind}", f"{word}: {', '.join(sorted(found))}")
+    return found[0]
+
+
 def is_pattern(text: str) -> bool:
     """Whether a text is a name, of an element of an array too, in which `*` and `?` may stand for others."""
     return _PLAIN.fullmatch(text) is not None
@@ -104,7 +125,7 @@ SLICE: Final = 80
 
 
 class Style(enum.StrEnum):
-    """What is said, for its colour."""
+    """What kind of output a text is, for its colour."""
 
     ANSWER = "answer"
     """What a command shows."""
@@ -116,43 +137,71 @@ class Style(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
-    """A piece of what is said."""
+class OutputText:
+    """A piece of output."""
 
     text: str
     """Lines end with a newline; what a program types may go on in the next piece."""
     style: Style
 
 
-class Dialogue(Protocol):
-    """What takes the next lines in place of commands."""
+class Dialogue:
+    """Takes the next lines in place of commands."""
 
     @property
     def prompt(self) -> str:
         """What it asks."""
+        return ""
 
-    def line(self, text: str, *, now: float) -> Dialogue | None:
+    def line(self, text: str) -> Dialogue | None:
         """Take a line; what takes the next one, None for commands.
 
         Raises:
             ValError: If it can't be taken; then the same is asked again.
         """
+        raise NotImplementedError
 
-    def leave(self, *, now: float, kept: bool) -> None:
-        """It ends without a line: the input has ended (kept), or Ctrl-C was pressed."""
+    def leave(self, *, kept: bool) -> None:
+        """End without a line: the input has ended (kept), or Ctrl-C was pressed."""
+
+
+class Confirm(Dialogue):
+    """Asks before something is destroyed: Y does it, all else doesn't."""
+
+    def __init__(self, question: str, act: Callable[[], None]) -> None:
+        """Ask.
+
+        Args:
+            question: What would happen.
+            act: Does it.
+        """
+        self._question, self._act = question, act
+
+    @property
+    @override
+    def prompt(self) -> str:
+        return f"{self._question} (Y/N)? "
+
+    @override
+    def line(self, text: str) -> Dialogue | None:
+        if text.strip().upper() in {"Y", "YES"}:
+            self._act()
+        return None
 
 
 @dataclass(slots=True)
 class TerminalState:
-    """The place of one terminal."""
+    """What one terminal has and shows."""
 
     controller: Controller
     files: Files
     version: str
     """Name and version of the program, and what it's connected to."""
+    now: float = 0.0
+    """Session time at which the terminal does what is due [s]."""
     line: str = ""
     """The line that is being carried out."""
-    said: list[Said] = field(default_factory=list)
+    output: list[OutputText] = field(default_factory=list)
     last_do: Step | None = None
     last_run: str = ""
     """What followed the last EXECUTE."""
@@ -166,7 +215,7 @@ class TerminalState:
 
     def say(self, *lines: str, style: Style = Style.ANSWER) -> None:
         """Say whole lines."""
-        self.said.extend(Said(f"{line}\n", style) for line in lines)
+        self.output.extend(OutputText(f"{line}\n", style) for line in lines)
 
     def say_all(self, lines: Iterable[str], none: str = "") -> None:
         """Say whole lines, or a note where there are none."""
@@ -238,22 +287,22 @@ class TerminalState:
             raise ValError("Missing argument", what)
         return parse_expression(self.padded(text))
 
-    def value(self, text: str, *, now: float) -> Value:
+    def value(self, text: str) -> Value:
         """What an expression of the line comes to."""
-        return self.controller.evaluate(self.expression(text), now=now)
+        return self.controller.evaluate(self.expression(text), now=self.now)
 
-    def number(self, text: str, *, now: float) -> float:
+    def number(self, text: str) -> float:
         """A number of the line.
 
         Raises:
             ValError: If it's something else.
         """
-        value = self.value(text, now=now)
+        value = self.value(text)
         if not isinstance(value, float):
             raise ValError("Invalid argument", f"{text}: a number is wanted")
         return value
 
-    def variable(self, text: str, *, now: float) -> Variable:
+    def variable(self, text: str) -> Variable:
         """A variable of the line, its indices worked out.
 
         Raises:
@@ -262,9 +311,9 @@ class TerminalState:
         found = self.expression(text, "a name")
         if not isinstance(found, Variable):
             raise ValError("Invalid argument", f"{text}: a name is wanted")
-        return self.settled(found, now=now)
+        return self.resolved(found)
 
-    def settled(self, variable: Variable, *, now: float) -> Variable:
+    def resolved(self, variable: Variable) -> Variable:
         """A variable with its indices worked out.
 
         Raises:
@@ -272,7 +321,7 @@ class TerminalState:
         """
         indices = []
         for index in variable.indices:
-            value = self.controller.evaluate(index, now=now)
+            value = self.controller.evaluate(index, now=self.now)
             if not isinstance(value, float):
                 raise ValError("Invalid array index", variable.name)
             indices.append(Number(float(math.floor(value))))

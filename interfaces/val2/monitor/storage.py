@@ -11,8 +11,8 @@ from typing import Final, TypeVar
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import MOST_VALUES, Memory
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.locations import Confirm
 from interfaces.val2.monitor.state import (
+    Confirm,
     Dialogue,
     Style,
     TerminalState,
@@ -32,40 +32,40 @@ from interfaces.val2.values import Location, PrecisionPoint, Transformation, Val
 T = TypeVar("T")
 
 
-def listp(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def listp(state: TerminalState, rest: str) -> None:
     """LISTP: programs with their steps."""
-    programs = desk.controller.memory.programs
+    programs = state.controller.memory.programs
     for name in chosen(dict(sorted(programs.items())), rest, "program"):
         head, *steps, end = print_program(programs[name]).splitlines()
-        desk.say(head, *layout.numbered(steps), end)
+        state.say(head, *layout.numbered(steps), end)
     if not programs and not rest:
-        desk.say("No programs")
+        state.say("No programs")
 
 
-def listl(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def listl(state: TerminalState, rest: str) -> None:
     """LISTL: locations."""
-    desk.say_all(layout.locations(chosen(locations(desk), rest, "location")), "No locations")
+    state.say_all(layout.locations(chosen(locations(state), rest, "location")), "No locations")
 
 
-def listr(desk: TerminalState, rest: str, *, now: float) -> None:
+def listr(state: TerminalState, rest: str) -> None:
     """LISTR: reals, or an expression."""
-    known = {name: value for name, value in desk.controller.memory.listing("real") if isinstance(value, float)}
+    known = {name: value for name, value in state.controller.memory.listing("real") if isinstance(value, float)}
     if _computed(rest) or _product(rest, known):
-        desk.say(layout.number(desk.number(rest, now=now)))
+        state.say(layout.number(state.number(rest)))
         return
-    desk.say_all(layout.reals(chosen(known, rest, "value")), "No reals")
+    state.say_all(layout.reals(chosen(known, rest, "value")), "No reals")
 
 
-def lists(desk: TerminalState, rest: str, *, now: float) -> None:
+def lists(state: TerminalState, rest: str) -> None:
     """LISTS: strings, or an expression."""
     if _computed(rest):
-        value = desk.value(rest, now=now)
+        value = state.value(rest)
         if not isinstance(value, str):
             raise ValError("Invalid argument", f"{rest}: a string is wanted")
-        desk.say(f'"{layout.visible(value)}"')
+        state.say(f'"{layout.visible(value)}"')
         return
-    known = {name: value for name, value in desk.controller.memory.listing("string") if isinstance(value, str)}
-    desk.say_all(layout.strings(chosen(known, rest, "value")), "No strings")
+    known = {name: value for name, value in state.controller.memory.listing("string") if isinstance(value, str)}
+    state.say_all(layout.strings(chosen(known, rest, "value")), "No strings")
 
 
 def _computed(rest: str) -> bool:
@@ -84,9 +84,9 @@ def _product(rest: str, known: Mapping[str, float]) -> bool:
     return True
 
 
-def locations(desk: TerminalState) -> dict[str, Location]:
+def locations(state: TerminalState) -> dict[str, Location]:
     """All locations by name."""
-    listing = desk.controller.memory.listing
+    listing = state.controller.memory.listing
     return {name: as_location(value, name) for name, value in [*listing("location"), *listing("point")]}
 
 
@@ -120,10 +120,10 @@ def matcher(pattern: str) -> re.Pattern[str]:
     return re.compile(spelled if plain.endswith("]") and not plain.endswith("[]") else spelled + r"(\[.*\])?")
 
 
-def directory(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def directory(state: TerminalState, rest: str) -> None:
     """DIRECTORY: programs in memory."""
-    programs = chosen(dict(sorted(desk.controller.memory.programs.items())), rest, "program")
-    desk.say_all(_directory(programs), "No programs")
+    programs = chosen(dict(sorted(state.controller.memory.programs.items())), rest, "program")
+    state.say_all(_directory(programs), "No programs")
 
 
 def _directory(programs: Mapping[str, Program]) -> list[str]:
@@ -136,16 +136,16 @@ def _directory(programs: Mapping[str, Program]) -> list[str]:
     return layout.table(rows) if rows else []
 
 
-def free(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def free(state: TerminalState, rest: str) -> None:
     """FREE: what is in memory."""
     nothing(rest, "FREE")
-    memory = desk.controller.memory
+    memory = state.controller.memory
     steps = sum(len(program.steps) for program in memory.programs.values())
     values: dict[str, list[tuple[str, Value]]] = {
         kind: memory.listing(kind) for kind in ("location", "point", "real", "string")
     }
     used = sum(map(len, values.values()))
-    desk.say(
+    state.say(
         *layout.table([
             ("Programs", f"{len(memory.programs)}, of {steps} steps"),
             ("Locations", f"{len(values['location']) + len(values['point'])}"),
@@ -156,10 +156,10 @@ def free(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001
     )  # fmt: skip
 
 
-def identity(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def identity(state: TerminalState, rest: str) -> None:
     """ID: what this is."""
     nothing(rest, "ID")
-    desk.say(desk.version)
+    state.say(state.version)
 
 
 MOST_MEANWHILE: Final = 200
@@ -169,36 +169,36 @@ _VALUE_WORK: Final = 4
 _PARTS = {"P": "programs", "L": "locations", "R": "reals", "S": "strings"}
 
 
-def flist(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def flist(state: TerminalState, rest: str) -> None:
     """FLIST, LISTF: the files."""
     nothing(rest, "FLIST")
-    desk.say_all(layout.in_columns(desk.files.listed()), "No files")
+    state.say_all(layout.in_columns(state.files.listed()), "No files")
 
 
-def load(desk: TerminalState, rest: str, *, now: float) -> None:  # noqa: ARG001 - commands have one form
+def load(state: TerminalState, rest: str) -> None:
     """LOAD file: programs and values; all of it or nothing."""
-    path = desk.files.found(rest)
-    desk.work = _loading(desk, path.name, desk.files.read(path))
+    path = state.files.found(rest)
+    state.work = _loading(state, path.name, state.files.read(path))
 
 
-def _loading(desk: TerminalState, name: str, text: str) -> Generator[int, None, None]:
+def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None, None]:
     """Read a file and take what it holds, in slices."""
     source = yield from read_file(text, name)
     entries = [*source.locations, *source.reals, *source.strings]
-    if len(entries) > MOST_MEANWHILE and desk.controller.running:
+    if len(entries) > MOST_MEANWHILE and state.controller.running:
         raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
-    running = desk.in_use()
+    running = state.in_use()
     for program in source.programs:
         if program.name in running:
             raise ValError("Program in use", program.name)
-    memory = desk.controller.memory
+    memory = state.controller.memory
     yield from _set_all(memory, entries)
     memory.programs.update({program.name: program for program in source.programs})
     if source.signals:
-        desk.controller.cell = source.signals
+        state.controller.cell = source.signals
     counts = [(len(source.programs), "program"), (len(entries), "value"), (len(source.signals), "signal rule")]
     said = [f"{many} {what}{'s' * (many != 1)}" for many, what in counts if many]
-    desk.say(f"{name}: {', '.join(said) or 'nothing'}")
+    state.say(f"{name}: {', '.join(said) or 'nothing'}")
 
 
 def _set_all(memory: Memory, entries: Sequence[NamedValue]) -> Generator[int, None, None]:
@@ -226,27 +226,29 @@ def store(parts: str) -> Callable[..., Dialogue | None]:
         parts: Letters of what is written: programs, locations, reals, strings; empty for all, with what is used.
     """
 
-    def act(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
+    def act(state: TerminalState, rest: str) -> Dialogue | None:
         name, names = halves(rest)
-        path = desk.files.path(name)
-        source = _source(desk, path.name, parts, names or "")
+        path = state.files.path(name)
+        source = _source(state, path.name, parts, names or "")
 
-        def write(_: float) -> None:
-            desk.files.write(path, print_file(source))
+        def write() -> None:
+            state.files.write(path, print_file(source))
             values = len(source.locations) + len(source.reals) + len(source.strings)
             programs = len(source.programs)
-            desk.say(f"{path.name}: {programs} program{'s' * (programs != 1)}, {values} value{'s' * (values != 1)}")
+            state.say(
+                f"{path.name}: {programs} program{'s' * (programs != 1)}, {values} value{'s' * (values != 1)}"
+            )
 
         if path.exists():
             return Confirm(f"{path.name} exists. Write over it", write)
-        write(now)
+        write()
         return None
 
     return act
 
 
-def _source(desk: TerminalState, name: str, parts: str, names: str) -> SourceFile:
-    memory = desk.controller.memory
+def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFile:
+    memory = state.controller.memory
     entries = [NamedValue(variable, value) for variable, value in memory.variables()]
     kinds = {
         "locations": [entry for entry in entries if isinstance(entry.value, Transformation | PrecisionPoint)],
@@ -256,7 +258,7 @@ def _source(desk: TerminalState, name: str, parts: str, names: str) -> SourceFil
     programs = dict(memory.programs)
     if parts in {"", "P"} and names:
         programs = _called(programs, chosen(programs, names, "program"))
-    signals = desk.controller.cell if parts == "" else ()
+    signals = state.controller.cell if parts == "" else ()
     wanted = set(_PARTS.values()) if parts == "" else {_PARTS[parts]}
     if parts == "" and names:
         used = {variable.name for program in programs.values() for variable in _variables(program)}
@@ -308,17 +310,17 @@ def _walk(node: object) -> Iterator[object]:
             yield from _walk(getattr(node, field.name))
 
 
-def delete_programs(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+def delete_programs(state: TerminalState, rest: str) -> Dialogue:
     """DELETE, DELETEP."""
     if not rest:
         raise ValError("Missing argument", "which programs?")
-    programs = desk.controller.memory.programs
+    programs = state.controller.memory.programs
     doomed = chosen(dict(programs), rest, "program")
     for name in doomed:
-        if name in desk.in_use():
+        if name in state.in_use():
             raise ValError("Program in use", name)
 
-    def act(_: float) -> None:
+    def act() -> None:
         for name in doomed:
             programs.pop(name, None)
 
@@ -332,10 +334,10 @@ def delete_values(kind: str) -> Callable[..., Dialogue]:
         kind: `location`, `real` or `string`.
     """
 
-    def command(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+    def command(state: TerminalState, rest: str) -> Dialogue:
         if not rest:
             raise ValError("Missing argument", f"which {kind}s?")
-        memory = desk.controller.memory
+        memory = state.controller.memory
         kinds = {"location", "point"} if kind == "location" else {kind}
         known = {name for some in kinds for name, _ in memory.listing(some)}
         doomed = chosen(
@@ -344,7 +346,7 @@ def delete_values(kind: str) -> Callable[..., Dialogue]:
             "location" if kind == "location" else "value",
         )
 
-        def act(_: float) -> None:
+        def act() -> None:
             for variable in doomed.values():
                 memory.delete(variable)
 
@@ -358,45 +360,45 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(listed) if len(listed) <= 4 else f"{listed[0]} .. {listed[-1]}, {len(listed)} in all"
 
 
-def copy(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
+def copy(state: TerminalState, rest: str) -> Dialogue | None:
     """COPY new=old."""
-    return _put(desk, rest, "COPY", keep=True, now=now)
+    return _put(state, rest, "COPY", keep=True)
 
 
-def rename(desk: TerminalState, rest: str, *, now: float) -> Dialogue | None:
+def rename(state: TerminalState, rest: str) -> Dialogue | None:
     """RENAME new=old."""
-    return _put(desk, rest, "RENAME", keep=False, now=now)
+    return _put(state, rest, "RENAME", keep=False)
 
 
-def _put(desk: TerminalState, rest: str, name: str, *, keep: bool, now: float) -> Dialogue | None:
+def _put(state: TerminalState, rest: str, name: str, *, keep: bool) -> Dialogue | None:
     given, old = halves(rest)
     if old is None:
         raise ValError("Missing argument", f"{name} new=old")
     new, old = named(given, "program"), named(old, "program")
-    programs = desk.controller.memory.programs
+    programs = state.controller.memory.programs
     if old not in programs:
         raise ValError("Undefined program name", old)
     for one in (new, *(() if keep else (old,))):
-        if one in desk.in_use():
+        if one in state.in_use():
             raise ValError("Program in use", one)
 
-    def act(_: float) -> None:
+    def act() -> None:
         program = programs[old] if keep else programs.pop(old)
         programs[new] = replace(program, name=new)
 
     if new in programs and new != old:
         return Confirm(f"{new} exists. Replace it", act)
-    act(now)
+    act()
     return None
 
 
-def zero(desk: TerminalState, rest: str, *, now: float) -> Dialogue:  # noqa: ARG001 - commands have one form
+def zero(state: TerminalState, rest: str) -> Dialogue:
     """ZERO: forget everything."""
     nothing(rest, "ZERO")
 
-    def act(_: float) -> None:
-        desk.controller.forget()
-        desk.controller.cell = ()
-        desk.say("Memory is empty", style=Style.NOTE)
+    def act() -> None:
+        state.controller.forget()
+        state.controller.cell = ()
+        state.say("Memory is empty", style=Style.NOTE)
 
     return Confirm("Delete all programs and values. Are you sure", act)

@@ -13,7 +13,7 @@ from typing import Final
 
 from interfaces.timer import Turning
 from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
-from interfaces.val2.monitor.state import Said
+from interfaces.val2.monitor.state import OutputText
 from vrs.clock import Clock
 
 RUNNING: Final = "*"
@@ -123,7 +123,7 @@ class Output:
         """A line was taken: whoever typed it ended it."""
         self._prompt, self._within, self._starred = None, False, False
 
-    def give(self, said: Iterable[Said], prompt: str) -> str:
+    def give(self, said: Iterable[OutputText], prompt: str) -> str:
         """What to send.
 
         Args:

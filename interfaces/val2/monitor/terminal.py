@@ -30,7 +30,7 @@ from interfaces.val2.lexer import Val2Lexer
 from interfaces.val2.monitor import commands
 from interfaces.val2.monitor.completion import hint, suggestions
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.state import Said
+from interfaces.val2.monitor.state import OutputText
 from vrs.clock import Clock
 
 if TYPE_CHECKING:
@@ -136,8 +136,8 @@ class _Completer(Completer):
             return
         if not complete_event.completion_requested and not document.text_before_cursor.strip():
             return
-        desk = self._monitor.desk
-        fragment, found = suggestions(document.text_before_cursor, desk, program=self._monitor.edits)
+        state = self._monitor.state
+        fragment, found = suggestions(document.text_before_cursor, state, program=self._monitor.edits)
         for one in found:
             yield Completion(one.word, -len(fragment), display_meta=one.help)
 
@@ -164,7 +164,7 @@ class Terminal:
             sink: What is written; None for standard output.
         """
         self._monitor, self._clock = monitor, clock
-        self._said: list[Said] = []
+        self._said: list[OutputText] = []
         self._partial = ""
         """What a program typed without ending the line; it's shown before the prompt."""
         self._shown = ""

@@ -76,23 +76,23 @@ def sitting(tmp_path):
     ],
 )
 def test_what_may_follow(sitting, text, wanted, unwanted):
-    _, found = suggestions(text, sitting.monitor.desk)
+    _, found = suggestions(text, sitting.monitor.state)
     words = [one.word for one in found]
     assert wanted in words
     assert unwanted.lower() not in map(str.lower, words)
 
 
 def test_nothing_follows_in_a_text_or_a_comment_and_files_are_known(sitting):
-    assert suggestions('do type "mo', sitting.monitor.desk)[1] == []
-    assert suggestions("do ready ; mo", sitting.monitor.desk)[1] == []
+    assert suggestions('do type "mo', sitting.monitor.state)[1] == []
+    assert suggestions("do ready ; mo", sitting.monitor.state)[1] == []
     sitting.type("STORE shelf")
-    assert [one.word for one in suggestions("load s", sitting.monitor.desk)[1]] == ["shelf"]
+    assert [one.word for one in suggestions("load s", sitting.monitor.state)[1]] == ["shelf"]
 
 
 def test_lines_of_a_program_are_completed_as_such(sitting):
-    words = [one.word for one in suggestions("10 wh", sitting.monitor.desk, program=True)[1]]
+    words = [one.word for one in suggestions("10 wh", sitting.monitor.state, program=True)[1]]
     assert words == ["while"]
-    assert "palletise" in [one.word for one in suggestions("call ", sitting.monitor.desk, program=True)[1]]
+    assert "palletise" in [one.word for one in suggestions("call ", sitting.monitor.state, program=True)[1]]
 
 
 def test_there_is_a_hint_on_every_word():

@@ -19,7 +19,7 @@ from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.control import Free, Switchboard
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
-from interfaces.val2.monitor.state import Said, Style
+from interfaces.val2.monitor.state import OutputText, Style
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from interfaces.val2.motion import arm_for
 from interfaces.val2.tcp import MOST, TRIES, UNREAD, ValDoor
@@ -70,17 +70,17 @@ def test_backspaces_erase_and_bytes_that_are_no_text_do_no_harm():
 
 def test_the_prompt_is_given_once_and_again_behind_what_is_said():
     output = Output("\r\n")
-    assert output.give([Said("hello\n", Style.NOTE)], ".") == "hello\r\n."
+    assert output.give([OutputText("hello\n", Style.NOTE)], ".") == "hello\r\n."
     assert output.give([], ".") == ""
     output.took()
-    assert output.give([Said("a\nb\n", Style.ANSWER)], ".") == "a\r\nb\r\n."
+    assert output.give([OutputText("a\nb\n", Style.ANSWER)], ".") == "a\r\nb\r\n."
     output.took()
     assert output.give([], "*") == "*"
-    assert output.give([Said("tick\n", Style.TYPED)], "*") == "\r\ntick\r\n"
-    assert output.give([Said("tick\n", Style.TYPED)], "*") == "tick\r\n"
+    assert output.give([OutputText("tick\n", Style.TYPED)], "*") == "\r\ntick\r\n"
+    assert output.give([OutputText("tick\n", Style.TYPED)], "*") == "tick\r\n"
     assert output.give([], ".") == "."
     output.took()
-    assert output.give([Said("n =", Style.TYPED)], "how many? ") == "n =how many? "
+    assert output.give([OutputText("n =", Style.TYPED)], "how many? ") == "n =how many? "
 
 
 # A door on an arm in this process.
