@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from interfaces.link import delay_profile
-from interfaces.runs.attribution import measures
+from interfaces.runs.summary import measures
 from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins

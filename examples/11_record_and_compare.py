@@ -10,7 +10,7 @@ from interfaces.recording import open_recording
 from interfaces.recording.export import tables, write_csv
 from interfaces.recording.figures import summary
 from interfaces.recording.rerun import rerun
-from interfaces.recording.runs import RunRecorder
+from interfaces.recording.run_recorders import RunRecorder
 from interfaces.runs.summary import summarize
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan

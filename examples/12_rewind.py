@@ -11,7 +11,7 @@ from interfaces.recording import open_recording
 from interfaces.recording.headless import PlaybackFrames
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
-from interfaces.recording.runs import RunRecorder
+from interfaces.recording.run_recorders import RunRecorder
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins

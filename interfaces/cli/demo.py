@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from interfaces.link import DelayProfile, Service
-    from interfaces.recording.runs import RunRecorder
-    from interfaces.runs.attribution import Attribution, OffsetOutcome
+    from interfaces.recording.run_recorders import RunRecorder
+    from interfaces.runs.summary import Attribution, OffsetOutcome
     from interfaces.runs.twin_run import TwinRun
     from interfaces.runtime.plan import RunPlan
     from vrs.model import RobotModel
@@ -47,9 +47,9 @@ def demo(
 ) -> None:
     """Run virtual and real robot on one plan across an emulated internet, and compare them."""
     from interfaces.link import Conditions, delay_profile
-    from interfaces.recording.runs import RunRecorder
-    from interfaces.runs.offset import fixed_offset
+    from interfaces.recording.run_recorders import RunRecorder
     from interfaces.runs.summary import summarize
+    from interfaces.runs.twin_run import fixed_offset
     from interfaces.runtime.plan import default_plan, read_plan
     from robots import puma560
 
@@ -120,9 +120,8 @@ def explained(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    from interfaces.runs.attribution import CAUSES, attribute, measures
-    from interfaces.runs.offset import FIXED, fixed_offset, spelled
-    from interfaces.runs.twin_run import TwinRun
+    from interfaces.runs.summary import CAUSES, attribute, measures
+    from interfaces.runs.twin_run import FIXED, TwinRun, fixed_offset, spelled
     from interfaces.runtime.attribution import offset_outcome, run_without
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())

@@ -181,7 +181,7 @@ def robot(
 
 def _offset(text: str) -> float | None:
     from interfaces.link import delay_profile
-    from interfaces.runs.offset import FIXED, fixed_offset
+    from interfaces.runs.twin_run import FIXED, fixed_offset
 
     if text == FIXED:
         allowed = "'adaptive' or 'fixed:S', as in fixed:0.5: a robot knows no profile"

@@ -49,9 +49,9 @@ def run(
     Standard output is what the program TYPEs; PROMPT reads standard input.
     """
     from interfaces.link import Conditions, delay_profile
-    from interfaces.recording.runs import RunRecorder
-    from interfaces.runs.offset import fixed_offset
+    from interfaces.recording.run_recorders import RunRecorder
     from interfaces.runs.summary import summarize
+    from interfaces.runs.twin_run import fixed_offset
     from interfaces.runtime.bodies import simulated_puma
     from interfaces.val2.playing import Listeners
     from interfaces.val2.twins import play

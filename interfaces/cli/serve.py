@@ -154,9 +154,9 @@ def serve(
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
     from interfaces.recording.live import RATE, LiveRecording
+    from interfaces.recording.mcap_file import Sink
     from interfaces.recording.messages import OWN
-    from interfaces.recording.sink import Sink
-    from interfaces.runs.offset import fixed_offset, spelled
+    from interfaces.runs.twin_run import fixed_offset, spelled
     from interfaces.runtime.physics_messages import BodyKind
     from interfaces.runtime.staleness import late_often, too_slow
     from interfaces.stream.access import OPEN, read_tokens

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from interfaces.lab.claims import Cell, Claim, Figure, Reproduction, interval_said, said
-from interfaces.runs.drive_row import DIGITS
+from interfaces.runs.drive_run import DIGITS
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:

@@ -1,7 +1,6 @@
 """Recordings: MCAP in and out, figures, play-back. `docs/recording.md` is the reference."""
 
-from interfaces.recording.damage import Damage
-from interfaces.recording.errors import RecordingError
+from interfaces.recording.errors import Damage, RecordingError
 from interfaces.recording.recorder import Recorder
 from interfaces.recording.recording import Recording, open_recording
 from interfaces.recording.writer import RecordingWriter

@@ -14,7 +14,6 @@ from typing import Any, Final, TypeAlias
 import msgspec
 
 from interfaces.recording import messages as m
-from interfaces.recording.driving import messages as d
 from interfaces.recording.poses import FrameTransforms, RealPose, VirtualPose
 
 _ENDLESS = 2**63 - 1
@@ -58,13 +57,13 @@ class RecordingChannel:
 _SESSION = m.Begin, m.Dropped, m.End
 _COMMANDS = m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry
 CHANNELS: Final = (
-    RecordingChannel("/session", "vrs.Session", _SESSION, (*_SESSION, d.RoomEntry), many=False),
+    RecordingChannel("/session", "vrs.Session", _SESSION, (*_SESSION, m.RoomEntry), many=False),
     RecordingChannel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
     RecordingChannel(
         "/timeline",
         "vrs.Timeline",
         (m.HistoryEntry, m.ChangeEntry),
-        (d.ArcHistory, d.ArcChange),
+        (m.ArcHistory, m.ArcChange),
         many=False,
     ),
     RecordingChannel("/virtual/joints", "vrs.VirtualJoints", (m.VirtualSample,), ()),
@@ -76,11 +75,11 @@ CHANNELS: Final = (
     ),
     RecordingChannel("/link", "vrs.Packet", (m.LinkEntry,), (m.LinkEntry,)),
     RecordingChannel("/events", "vrs.Event", (m.EventEntry,), (m.EventEntry,), many=False),
-    RecordingChannel("/virtual/posture", "vrs.VirtualPosture", (), (d.VirtualPosture,)),
-    RecordingChannel("/real/posture", "vrs.RealPosture", (), (d.RealPosture,)),
-    RecordingChannel("/real/measured", "vrs.MeasuredPosture", (), (d.MeasuredPosture,)),
-    RecordingChannel("/virtual/estimated", "vrs.EstimatedPosture", (), (d.EstimatedPosture,)),
-    RecordingChannel("/environment", "vrs.Cells", (), (d.CellsEntry,), many=False),
+    RecordingChannel("/virtual/posture", "vrs.VirtualPosture", (), (m.VirtualPosture,)),
+    RecordingChannel("/real/posture", "vrs.RealPosture", (), (m.RealPosture,)),
+    RecordingChannel("/real/measured", "vrs.MeasuredPosture", (), (m.MeasuredPosture,)),
+    RecordingChannel("/virtual/estimated", "vrs.EstimatedPosture", (), (m.EstimatedPosture,)),
+    RecordingChannel("/environment", "vrs.Cells", (), (m.CellsEntry,), many=False),
 )
 """Every channel of a recording."""
 
@@ -90,7 +89,7 @@ NUMBER_OF: Final = {kind: number for number, channel in enumerate(CHANNELS, 1) f
 Message: TypeAlias = (
     m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.GivenEntry
     | m.HistoryEntry | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms
-    | m.LinkEntry | m.EventEntry | d.DriveMessage
+    | m.LinkEntry | m.EventEntry | m.DriveMessage
 )  # fmt: skip
 """What can be recorded."""
 

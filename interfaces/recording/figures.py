@@ -1,4 +1,4 @@
-"""The figures of a run, from its recording alone."""
+"""The figures of a run, from its recording alone: of an arm's twins, and of a mobile robot's drive."""
 
 from __future__ import annotations
 
@@ -9,25 +9,106 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.recording.engines import begun
 from interfaces.recording.history import arm_timeline
-from interfaces.recording.messages import OWN, Anchor, CommandEntry
+from interfaces.recording.messages import COLLISION, OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
-from interfaces.recording.rerun import Rerun, rerun
-from interfaces.recording.runs import extras_of
-from interfaces.recording.track import GAP, REAL, SampleTrack, gap_lengths, not_measured
-from interfaces.runs.attribution import Attribution, OffsetOutcome
-from interfaces.runs.events import waits
-from interfaces.runs.offset import ADAPTIVE
-from interfaces.runs.summary import Json, summarize
-from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun, TwinSamples, carried_out
+from interfaces.recording.rerun import Rerun, begun, rerun
+from interfaces.recording.run_recorders import extras_of
+from interfaces.recording.track import (
+    ESTIMATED,
+    GAP,
+    MEASURED,
+    REAL,
+    REAL_POSTURE,
+    SampleTrack,
+    gap_lengths,
+    not_measured,
+)
+from interfaces.runs.drive_run import DriveCase, DriveRun, facts_of, row_of
+from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
+from interfaces.runs.twin_run import ADAPTIVE, CommandPacket, RunEvent, TwinRun, TwinSamples, carried_out, waits
 from interfaces.teleop import Correction
+from interfaces.teleop.architectures import Transport
+from robots.ipr.robot import Collision
 from robots.onboard.playout import PlayoutConfig
-from vrs.comparison import measured_rows
-from vrs.errors import FormatError
+from vrs.comparison import PathMatch, match_paths, measured_rows, resample
+from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, frozen_array
 from vrs.timeline import Timeline
+
+MOST = 36_000
+"""Samples of a recording that is matched at most: beyond that it takes too long, and nobody is told."""
+
+
+FARTHEST = 50_000.0
+"""Longest path that is matched [m]: what a recording's length allows at full speed, and no hostile one's."""
+
+
+def matchable(postures: Array) -> bool:
+    """Whether a virtual robot's path, (k, 3), isn't too long to be matched."""
+    steps = np.linalg.norm(np.diff(postures[:, :2], axis=0), axis=1)
+    return bool(steps.sum() <= FARTHEST)
+
+
+class Pursuit:
+    """A recording's match, made when it's first asked for."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Take a recording."""
+        self._recording = recording
+        self._match: PathMatch | None = None
+        self._beside = self._reached = np.empty(0), np.empty(0)
+        """Of what was measured: times and distances; when places along the path were reached, and those."""
+        self._place: Array = np.empty(0)
+        self._moments: Array = np.empty(0)
+        self._until = -np.inf
+
+    def prepare(self) -> None:
+        """Match what the recording holds now."""
+        until = self._recording.span[1]
+        if until == self._until:
+            return
+        self._until, self._match = until, None
+        track = self._recording.track(self._recording.kind.real)
+        # A row without a measurement in each gap: nothing is known on either side of it.
+        moments = np.union1d(track.t, track.gaps.mean(axis=1))
+        real = track.on(moments, "q")
+        real[~np.isin(moments, track.t)] = np.nan
+        virtual = self._recording.virtual(moments)
+        known = measured_rows(virtual)
+        if not 2 <= np.count_nonzero(known) <= MOST or not matchable(virtual[known]):
+            return
+        t, leader = moments[known], virtual[known, :2]
+        match = self._match = match_paths(t, leader, real[known, :2])
+        seen, there = np.isfinite(match.distance), np.isfinite(match.t_follower)
+        self._beside = match.t[seen], match.distance[seen]
+        self._reached = match.t_follower[there], match.s[: len(there)][there]
+        self._moments = t
+        self._place = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(leader, axis=0), axis=1))))
+
+    def play(self, t: float) -> float | None:
+        """When the virtual robot was last where the real one is at a time [s]; that time if it still is there."""
+        self.prepare()
+        match = self._match
+        if match is None:
+            return None
+        reached, places = self._reached
+        whole = len(match.t_follower) == len(match.s) and t >= match.t_follower[-1]
+        s = self._place[-1] if whole or not len(reached) else float(np.interp(t, reached, places))
+        after = int(np.searchsorted(self._place, s + 1e-9, side="right"))
+        if after == len(self._place):
+            return t
+        before = after - 1
+        share = (s - self._place[before]) / (self._place[after] - self._place[before])
+        left = self._moments[before] + max(float(share), 0.0) * (self._moments[after] - self._moments[before])
+        return min(t, float(left))
+
+    def error(self, t: float, q_real: Array, play: float) -> float | None:  # noqa: ARG002 - the match knows them
+        """How far the real robot is beside the virtual one's path at a time [m]."""
+        self.prepare()
+        return None if self._match is None else float(np.interp(t, *self._beside))
+
 
 MOST_ROWS = 1_000_000
 """Rows of a run's grid, at most."""
@@ -275,3 +356,137 @@ def differences(first: Any, second: Any, path: str = "") -> dict[str, float]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+SCHEMA = "vrs-drive/1"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Driven:
+    """A run as its recording has it."""
+
+    drive: DriveRun
+    missing: tuple[str, ...]
+    """What isn't in the recording, and what stands for it; nothing in a whole one."""
+    gap_s: float
+    """For how long nothing was measured of the real robot, between its samples [s]."""
+
+
+def drive_summary(recording: Recording) -> dict[str, Any]:
+    """The run's figures, with a list `missing` where something is.
+
+    Raises:
+        FormatError: As `driven`.
+    """
+    found = driven(recording)
+    value = figures_of(recording, found)
+    return value | {"missing": list(found.missing)} if found.missing else value
+
+
+def figures_of(recording: Recording, found: Driven) -> dict[str, Any]:
+    """The figures of a run that was put together from its recording."""
+    return {
+        "schema": SCHEMA,
+        "title": recording.session.title,
+        "duration_s": float(found.drive.t[-1] - found.drive.t[0]),
+        "gap_s": found.gap_s,
+        **facts_of(row_of(found.drive)),
+    }
+
+
+def driven(recording: Recording) -> Driven:
+    """The run, put together from its recording.
+
+    Raises:
+        FormatError: If the recording has too little of it: no samples of the real robot, no known robot.
+    """
+    missing: list[str] = []
+    if recording.damage:
+        missing.append(f"the recording is damaged: {recording.damage}")
+    track = recording.track(REAL_POSTURE)
+    t = _drive_grid(recording, track)
+    missing += not_measured(track, t)
+    real = _on(t, track.t, track.q)
+    if len(t) != len(track.t):
+        real[track.unmeasured(t)] = np.nan
+        if len(track.gaps) == len(track.t) - 1:
+            raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
+    packets = [entry for entry in recording.link if entry.direction == "forward"]
+    case = _drive_case(recording)
+    taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
+    drive = DriveRun(
+        case=case,
+        t=t,
+        virtual=_virtual_postures(recording, t, missing),
+        real=real,
+        measured=_sampled(recording, MEASURED, t),
+        estimated=_sampled(recording, ESTIMATED, t),
+        drives=_on(t, track.t, track.reference),
+        offset=_on(t, track.t, (track.t - track.play)[:, None])[:, 0],
+        delays=np.array(taken).reshape(-1, 2),
+        touched=tuple(Collision(e.t, e.text) for e in recording.events if e.kind == COLLISION),
+        sent_bytes=sum(entry.size for entry in packets),
+        reported_bytes=sum(entry.size for entry in recording.link if entry.direction == "backward"),
+        learned=(),
+    )  # fmt: skip
+    return Driven(drive, tuple(missing), float(gap_lengths(track, t).sum()))
+
+
+def _drive_case(recording: Recording) -> DriveCase:
+    begin, facts = recording.session, recording.session.drive
+    if facts is None:
+        raise FormatError(str(recording.path), "of no mobile robot")
+    try:
+        return DriveCase(
+            architecture=facts.architecture,
+            transport=Transport(facts.transport),
+            delay=begin.delay,
+            robot=facts.body,
+            operator=facts.operator,
+            seed=begin.seed or 0,
+            length=facts.length,
+            position=facts.position,
+        )
+    except InvalidValueError as error:
+        raise FormatError(str(recording.path), f"its beginning: {error}") from None
+
+
+def _drive_grid(recording: Recording, track: SampleTrack) -> Array:
+    """Times of the run [s], (k,): the samples' own where none is missing."""
+    step, t, where = recording.session.step, track.t, str(recording.path)
+    if len(t) < 2:
+        raise FormatError(where, "holds less than two samples of the real robot")
+    if max(float(t[-1] - t[0]), abs(float(t[0]))) >= MOST_ROWS * step:
+        raise FormatError(where, f"is longer than the {MOST_ROWS} samples that are compared")
+    first, last = round(float(t[0]) / step), round(float(t[-1]) / step)
+    if last - first + 1 == len(t):
+        return t
+    whole: Array = step * np.arange(first, last + 1, dtype=np.float64)
+    return whole
+
+
+def _virtual_postures(recording: Recording, t: Array, missing: list[str]) -> Array:
+    """Postures of the virtual robot: as the commands make them, which is exact, or by its recorded edits."""
+    again = rerun(recording)
+    timeline = again.timeline
+    if again.missing or again.difference:
+        why = again.difference or again.missing
+        missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
+        timeline = recording.timeline
+        if recording.certain < t[-1]:
+            missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
+    virtual = timeline.sample(t)
+    if not matchable(virtual):
+        raise FormatError(str(recording.path), f"its virtual robot drives further than {FARTHEST:g} m")
+    return virtual
+
+
+def _sampled(recording: Recording, topic: str, t: Array) -> Array:
+    """Postures of a channel at times [s], (k, 3); NaN where it has none."""
+    track = recording.track(topic)
+    return _on(t, track.t, track.q) if len(track.t) else np.full((len(t), 3), np.nan)
+
+
+def _on(t: Array, known: Array, values: Array) -> Array:
+    """Values (m, n) of times (m,) at other times (k,): the same ones where those are the same."""
+    return values if np.array_equal(t, known) else resample(known, values, t)

@@ -13,11 +13,11 @@ import numpy as np
 
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
+from interfaces.recording.mcap_file import Sink
 from interfaces.recording.messages import Begin, End, EventEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
-from interfaces.recording.sink import Sink
-from interfaces.runs.events import correction_events
+from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
 from interfaces.teleop import CommandRecord, Correction, Report, RobotLine, Sample
 from interfaces.teleop.measured import PERIOD

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
-from interfaces.runs.events import correction_text
+from interfaces.runs.twin_run import correction_text
 from interfaces.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
 from vrs.ledger import Status

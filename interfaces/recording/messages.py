@@ -1,18 +1,18 @@
-"""What stands in a recording, one structure a kind of message; `docs/recording.md` is the reference.
+"""Messages of a recording, as they stand in the file: of arms, of mobile robots, of commands and links.
 
-Times are seconds of the user's timeline, exact floats. What is None is left out of the file. Which topic a kind
-belongs to stands in `interfaces.recording.channels`.
+All that a file may hold is here, rooms as well: a reader finds each message and what it is made of in one place.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from msgspec import Meta
 
-from interfaces.recording.driving.messages import DriveFacts
 from interfaces.stream.wire.segments import MOST_POWERS
 from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.wire.fields import (
@@ -30,16 +30,232 @@ from interfaces.wire.fields import (
     Word,
 )
 from vrs.commands import Command, MotionCommand, Profile
-from vrs.errors import InvalidValueError
+from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
+from vrs.mobile import Grid
 from vrs.model import Array, frozen_array
 from vrs.segment import PolynomialSegment, known_segment
 from vrs.timeline import Timeline
+
+if TYPE_CHECKING:
+    from robots.bullet.rooms import Block, Column, Door, Room
+
+Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
+"""[m]."""
+Size = Annotated[float, Meta(gt=0, le=1e6)]
+"""[m]."""
+Place = Annotated[list[Length], Meta(min_length=2, max_length=2)]
+"""x, y [m]."""
+Posture = Annotated[list[Length], Meta(min_length=3, max_length=3)]
+"""x, y [m], θ [rad]."""
+Speed = Annotated[float, Meta(ge=-1e3, le=1e3)]
+"""[m/s] or [rad/s]."""
+Cells = Annotated[tuple[Annotated[int, Meta(ge=0, le=4095)], ...], Meta(max_length=131_072)]
+"""Of the virtual environment, two numbers a cell: along x, along y."""
+
+
+class GridFacts(Wire, frozen=True, omit_defaults=True, gc=False):
+    """The cells of the virtual environment."""
+
+    shape: Annotated[list[Annotated[int, Meta(ge=1, le=4096)]], Meta(min_length=2, max_length=2)]
+    cell: Size
+    """Side of a cell [m]."""
+    origin: Place
+
+
+class DriveFacts(Wire, frozen=True, omit_defaults=True, gc=False):
+    """How a mobile robot's run was set up."""
+
+    body: Literal["ipr", "micro", "bare"]
+    architecture: Word
+    transport: Literal["stream", "datagrams"]
+    operator: Word
+    length: Seconds
+    """For how long the operator drove [s]."""
+    period: Seconds
+    """T: between two commands [s]."""
+    position: Word
+    """What told the real robot where it was."""
+    grid: GridFacts | None = None
+    """None where there was no virtual environment."""
+
+
+class ThingEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """A block, or a column where it has a radius."""
+
+    name: Word
+    x: Length
+    y: Length
+    height: Size
+    length: Size | None = None
+    width: Size | None = None
+    angle: Finite = 0.0
+    radius: Size | None = None
+    known: bool = True
+    start: Finite | None = None
+    """It stands there from then on [s]; None for ever."""
+    end: Finite | None = None
+
+
+class PersonEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Somebody who walks."""
+
+    name: Word
+    radius: Size
+    height: Size
+    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
+    x: Annotated[list[Length], Meta(min_length=1, max_length=1000)]
+    y: Annotated[list[Length], Meta(min_length=1, max_length=1000)]
+    repeat: bool = False
+
+
+class DoorEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """A door that opens and closes."""
+
+    name: Word
+    sliding: bool
+    x: Length
+    y: Length
+    length: Size
+    angle: Length
+    thickness: Size
+    height: Size
+    swing: Length
+    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
+    shares: Annotated[list[Annotated[float, Meta(ge=0, le=1)]], Meta(min_length=1, max_length=1000)]
+    repeat: bool = False
+
+
+class RoomEntry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind", tag="room"):
+    """Where it was: written at the beginning, and once more at the end."""
+
+    name: Word
+    length: Size
+    width: Size
+    things: Annotated[tuple[ThingEntry, ...], Meta(max_length=1000)] = ()
+    """Blocks, then columns."""
+    people: Annotated[tuple[PersonEntry, ...], Meta(max_length=1000)] = ()
+    doors: Annotated[tuple[DoorEntry, ...], Meta(max_length=1000)] = ()
+
+
+class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """An arc at constant speeds."""
+
+    duration: Seconds
+    posture: Posture
+    """At its start."""
+    v: Speed
+    """[m/s]."""
+    w: Speed
+    """[rad/s]."""
+    command_id: CommandId | None = None
+    """None for standing."""
+    start: Time | None = None
+    """[s]; None where the arc before ends."""
+
+
+class ArcHistory(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="arcs"):
+    """A part of the whole timeline with an edit; as `HistoryEntry`."""
+
+    edit: Count
+    at: Time
+    version: Count
+    initial: Posture
+    start: Time
+    total: Count
+    index: Count
+    segments: tuple[ArcEntry, ...] = ()
+
+
+class ArcChange(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="drive"):
+    """An edit of the timeline: its first `first` arcs stay, these follow."""
+
+    edit: Number
+    base: Count
+    at: Time
+    version: Count
+    first: Count
+    segments: tuple[ArcEntry, ...] = ()
+    end: Time
+    command_id: CommandId | None = None
+
+
+class PostureSample(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Where a robot is, or is thought to be, at a time."""
+
+    t: Time
+    x: Length
+    y: Length
+    theta: Length
+    """[rad]."""
+
+    @property
+    def q(self) -> list[float]:
+        """(x, y, θ)."""
+        return [self.x, self.y, self.theta]
+
+
+class VirtualPosture(PostureSample, frozen=True, omit_defaults=True, gc=False):
+    """The virtual robot as it's shown: a comfort for other readers, ours compute it."""
+
+    edit: Count = 0
+    """Number of the newest edit."""
+
+
+class RealPosture(PostureSample, frozen=True, omit_defaults=True, gc=False, kw_only=True):
+    """The real robot, truly; and what it's told to drive from then on."""
+
+    v: Speed
+    """[m/s]."""
+    w: Speed
+    """[rad/s]."""
+    D: Finite | None = None
+    """How far behind the operator it wants to be [s]; None where the architecture has no such thing."""
+
+    @property
+    def play(self) -> float:
+        """The time of the timeline that it wants to be at [s]; NaN where there's none."""
+        return math.nan if self.D is None else self.t - self.D
+
+    @property
+    def reference(self) -> list[float]:
+        """(v, ω)."""
+        return [self.v, self.w]
+
+
+class MeasuredPosture(PostureSample, frozen=True, omit_defaults=True, gc=False):
+    """Where the real robot takes itself to be."""
+
+    edit: ClassVar[int] = 0
+
+
+class EstimatedPosture(PostureSample, frozen=True, omit_defaults=True, gc=False):
+    """Where the operator's site thinks that the real robot will come to, as of the last command."""
+
+    edit: ClassVar[int] = 0
+
+
+class CellsEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """Cells of the virtual environment, beside the known map, that came and went since the entry before."""
+
+    t: Time
+    added: Cells = ()
+    gone: Cells = ()
+
+
+DriveMessage: TypeAlias = (
+    RoomEntry | ArcHistory | ArcChange | VirtualPosture | RealPosture | MeasuredPosture | EstimatedPosture
+    | CellsEntry
+)  # fmt: skip
+"""What a mobile robot's recording has besides."""
+
 
 FORMAT = "vrs-recording/1"
 """Name and version of what the messages mean."""
 OWN = "the robot's own"
 """`Begin.offset` and `Begin.link_loss` of a robot that somebody else started: it alone knows them."""
+COLLISION = "collision"
+"""`EventEntry.kind` of collisions."""
 
 _Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
 _Names = tuple[Number, ...]
@@ -360,3 +576,95 @@ def segments_of(dof: int, start: float, entries: Sequence[SegmentEntry]) -> tupl
 def joints(values: list[float]) -> Array:
     """A read-only array of a message's joints."""
     return frozen_array(values)
+
+
+def room_entry(room: Room) -> RoomEntry:
+    """A room for the file."""
+    people = tuple(
+        PersonEntry(
+            one.name,
+            one.radius,
+            one.height,
+            list(one.times),
+            [x for x, _ in one.places],
+            [y for _, y in one.places],
+            one.repeat,
+        )
+        for one in room.people
+    )
+    things = tuple(_thing_entry(one) for one in room.things)
+    return RoomEntry(room.name, room.length, room.width, things, people, tuple(map(_door_entry, room.doors)))
+
+
+def _door_entry(door: Door) -> DoorEntry:
+    return DoorEntry(
+        door.name, door.kind.value == "sliding", door.x, door.y, door.length, door.angle, door.thickness,
+        door.height, door.swing, list(door.times), list(door.shares), door.repeat,
+    )  # fmt: skip
+
+
+def _thing_entry(thing: Block | Column) -> ThingEntry:
+    start, end = (t if math.isfinite(t) else None for t in (thing.start, thing.end))
+    radius, length, width = (getattr(thing, name, None) for name in ("radius", "length", "width"))
+    at = thing.name, thing.x, thing.y, thing.height
+    return ThingEntry(*at, length, width, getattr(thing, "angle", 0.0), radius, thing.known, start, end)
+
+
+def room_of(entry: RoomEntry, where: str) -> Room:
+    """The room that an entry stands for.
+
+    Raises:
+        FormatError: If a thing or somebody in it makes no sense.
+    """
+    from robots.bullet.rooms import Door, DoorKind, Person, Room
+
+    things = [_thing(one, where) for one in entry.things]
+    people = []
+    for one in entry.people:
+        if not _ascend(one.times) or not len(one.times) == len(one.x) == len(one.y):
+            raise FormatError(where, f"{one.name!r} in its room walks no path")
+        places = tuple(zip(one.x, one.y, strict=True))
+        repeats = one.repeat and len(one.times) > 1
+        people.append(Person(one.name, one.radius, one.height, tuple(one.times), places, repeats))
+    doors = []
+    for leaf in entry.doors:
+        if not _ascend(leaf.times) or len(leaf.times) != len(leaf.shares):
+            raise FormatError(where, f"{leaf.name!r} in its room has no timetable")
+        kind = DoorKind.SLIDING if leaf.sliding else DoorKind.HINGED
+        doors.append(Door(
+            leaf.name, kind, leaf.x, leaf.y, leaf.length, leaf.angle, leaf.thickness, leaf.height, leaf.swing,
+            tuple(leaf.times), tuple(leaf.shares), leaf.repeat and len(leaf.times) > 1,
+        ))  # fmt: skip
+    blocks = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is None)
+    columns = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is not None)
+    size = entry.name, entry.length, entry.width
+    moving = {"people": tuple(people), "doors": tuple(doors)}
+    return Room(*size, blocks=blocks, columns=columns, **moving)  # type: ignore[arg-type]
+
+
+def _ascend(times: list[float]) -> bool:
+    return all(a < b for a, b in pairwise(times))
+
+
+def _thing(entry: ThingEntry, where: str) -> Block | Column:
+    from robots.bullet.rooms import Block, Column
+
+    start = -math.inf if entry.start is None else entry.start
+    end = math.inf if entry.end is None else entry.end
+    if entry.radius is not None:
+        return Column(entry.name, entry.x, entry.y, entry.radius, entry.height, entry.known, start, end)
+    if entry.length is None or entry.width is None:
+        raise FormatError(where, f"{entry.name!r} in its room has no size")
+    sides = entry.length, entry.width, entry.angle
+    return Block(entry.name, entry.x, entry.y, *sides, entry.height, entry.known, start, end)
+
+
+def grid_facts(grid: Grid) -> GridFacts:
+    """The cells of a virtual environment for the file."""
+    return GridFacts(list(grid.shape), grid.cell, grid.origin.tolist())
+
+
+def grid_of(facts: GridFacts) -> Grid:
+    """The cells that an entry stands for."""
+    m, n = facts.shape
+    return Grid((m, n), facts.cell, facts.origin)

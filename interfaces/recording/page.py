@@ -15,9 +15,9 @@ from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
 from interfaces.clients.playhead import Mode
-from interfaces.recording.kinds import shows
 from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack
+from interfaces.recording.recording import shows
 from interfaces.recording.stages import stage_of
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import HEADERS, Viewers, files

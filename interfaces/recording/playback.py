@@ -12,10 +12,9 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
-from interfaces.recording.driving.pursuit import Pursuit
-from interfaces.recording.kinds import ARM
+from interfaces.recording.figures import Pursuit
 from interfaces.recording.marks import Mark, MarkReader
-from interfaces.recording.recording import Recording, check_alike
+from interfaces.recording.recording import ARM, Recording, check_alike
 from interfaces.stream.meshcat.committed import Committed
 from vrs.commands import finite
 from vrs.errors import FormatError, InvalidValueError

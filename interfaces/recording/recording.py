@@ -1,10 +1,11 @@
-"""Recordings as they're read."""
+"""A recording that's open for reading, and the kinds of robots that recordings are of."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Literal
@@ -13,14 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from interfaces.recording.damage import Damage
-from interfaces.recording.driving.messages import CellsEntry, RoomEntry
+from interfaces.recording.errors import Damage
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
-from interfaces.recording.kinds import RecordingKind, kind_of, references
-from interfaces.recording.log import Log
+from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.messages import (
     Anchor,
     Begin,
+    CellsEntry,
     CommandEntry,
     Dropped,
     End,
@@ -29,15 +29,53 @@ from interfaces.recording.messages import (
     LinkEntry,
     PacketEntry,
     ReceiptEntry,
+    RoomEntry,
 )
-from interfaces.recording.scan import NUMBERS, Blocks
-from interfaces.recording.source import FileSource
-from interfaces.recording.track import SampleTrack, Tracks
+from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
 from interfaces.runs.twin_run import CommandPacket, RunEvent
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.segment import times
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingKind:
+    """A kind of robot, as recordings know it."""
+
+    name: str
+    """For people, with its article."""
+    word: str
+    """For programs."""
+    virtual: str
+    """Topic of the virtual robot's samples."""
+    real: str
+    """Topic of the real robot's."""
+    unit: str
+    """Of how far the real robot is from the virtual one: `rad` or `m`."""
+
+
+ARM: Final = RecordingKind("an arm", "arm", VIRTUAL, REAL, "rad")
+"""Joints, and polynomials on its timeline."""
+MOBILE: Final = RecordingKind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m")
+"""Postures, and arcs on its timeline."""
+
+
+def kind_of(begin: Begin) -> RecordingKind:
+    """The kind of a recording's robot."""
+    return ARM if begin.drive is None else MOBILE
+
+
+def references(begin: Begin) -> int:
+    """How many numbers the real robot was told at a time: a reference a joint; v and ω."""
+    return len(begin.q) if begin.drive is None else 2
+
+
+def shows(begin: Begin) -> list[str]:
+    """What a page shows besides both robots and the committed path: the paths, and what was learned of the room."""
+    if begin.drive is None:
+        return []
+    return ["driven"] if begin.drive.grid is None else ["driven", "learned"]
 
 
 def _puma560() -> RobotModel:

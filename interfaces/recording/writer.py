@@ -8,13 +8,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from interfaces.recording.block import LONGEST
 from interfaces.recording.channels import CHANNELS, NUMBER_OF, Message
 from interfaces.recording.errors import RecordingError
-from interfaces.recording.mcap_file import McapFile
+from interfaces.recording.mcap_file import McapFile, RawFile, Sink
+from interfaces.recording.mcap_reading import LONGEST
 from interfaces.recording.messages import FORMAT, Begin, End
 from interfaces.recording.poses import nanoseconds
-from interfaces.recording.sink import RawFile, Sink
 from vrs.errors import InvalidValueError
 
 FLUSH = 0.25

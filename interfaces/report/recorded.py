@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from interfaces.recording import figures as arms
-from interfaces.recording.driving import figures as drives
+from interfaces.recording import figures
 from interfaces.recording.recording import Recording
 from interfaces.report import drive, html
 from interfaces.runs.summary import summarize
@@ -17,7 +16,7 @@ def summary(recording: Recording) -> dict[str, Any]:
     Raises:
         FormatError: If the recording has too little of it.
     """
-    return arms.summary(recording) if recording.session.drive is None else drives.summary(recording)
+    return figures.summary(recording) if recording.session.drive is None else figures.drive_summary(recording)
 
 
 def render(recording: Recording) -> tuple[str, tuple[str, ...]]:
@@ -27,7 +26,7 @@ def render(recording: Recording) -> tuple[str, tuple[str, ...]]:
         FormatError: If the recording has too little of it.
     """
     if recording.session.drive is None:
-        arm = arms.figures(recording)
+        arm = figures.figures(recording)
         return html.render(arm.run, summarize(arm.run, arm.attributions, arm.offsets)), arm.missing
-    found = drives.driven(recording)
-    return drive.render(found.drive, drives.figures_of(recording, found), recording.events), found.missing
+    found = figures.driven(recording)
+    return drive.render(found.drive, figures.figures_of(recording, found), recording.events), found.missing

@@ -1,23 +1,74 @@
-"""The record of one run of the twins: what both robots did, in the user's time."""
+"""A run of the twins: its facts, its record in the user's time, who writes it down, and its events."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.teleop import Correction
+from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
+from interfaces.link.delay import MAX_DELAY
+from interfaces.teleop import Correction, OperatorSite
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
 from vrs.comparison import measured_rows
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
-from vrs.ledger import Receipt
+from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.timeline import Timeline
+
+QUANTILE = 0.95
+"""Share of packets that a fixed offset covers where it's taken from a random profile."""
+STEP = 0.02
+"""What that offset is rounded up to [s]."""
+ADAPTIVE = "adaptive"
+FIXED = "fixed"
+_ALLOWED = f"'adaptive', 'fixed', or 'fixed:S' with S seconds in [0, {MAX_DELAY:g}], as in fixed:0.5"
+
+
+def fixed_offset(text: str, profile: DelayProfile) -> float | None:
+    """Read a choice of offset.
+
+    Args:
+        text: `adaptive`; `fixed` for D = −D_f from the profile; `fixed:S` for D = −S.
+        profile: The link's delay.
+
+    Returns:
+        D [s], ≤ 0; None for an offset that adapts.
+
+    Raises:
+        InvalidValueError: If it's none of these.
+    """
+    if text == ADAPTIVE:
+        return None
+    if text == FIXED:
+        return -covered(profile)
+    kind, _, number = text.partition(":")
+    try:
+        behind = float(number) if kind == FIXED else math.nan
+    except ValueError:
+        behind = math.nan
+    if not 0 <= behind <= MAX_DELAY:
+        raise InvalidValueError("offset", text, _ALLOWED)
+    return -behind
+
+
+def covered(profile: DelayProfile) -> float:
+    """D_f [s]: the constant delay, or the 95 % quantile rounded up to a step of the record."""
+    if isinstance(profile, ConstantDelay):
+        return profile.delay
+    return STEP * math.ceil(profile.quantile(QUANTILE) / STEP - 1e-9)
+
+
+def spelled(D: float | None) -> str:
+    """The choice as the command line spells it."""
+    return ADAPTIVE if D is None else f"{FIXED}:{-D:.9g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,3 +238,145 @@ def carried_out(
         with suppress(VrsError):
             engine.undo() if command is None else engine.execute(command)  # type: ignore[arg-type]
     return engine.timeline
+
+
+NEAR = 0.3
+"""Waits that are nearer than this [s] are told as one."""
+LEAST = 0.02
+"""A wait by which D grew less than this [s] isn't told."""
+_SAME = 1e-9
+"""Times nearer than this [s] are one."""
+
+
+def command_events(
+    packet: CommandPacket, sent: Receipt, answer: Receipt | None, *, play_at: Callable[[float], float]
+) -> Iterator[RunEvent]:
+    """Tell where a command was lost, late or refused at the robot.
+
+    Args:
+        packet: Its way across the link.
+        sent: What the operator's engine answered.
+        answer: What the robot's engine answered; None where it wasn't carried out.
+        play_at: Play time of the robot at a user time [s].
+    """
+    command = packet.command_id
+    if packet.lost:
+        fate = (
+            "" if packet.arrived is None else f", and came {packet.arrived - packet.sent:.3f} s after it was sent"
+        )
+        yield RunEvent(packet.sent, "lost", f"the message with command {command} was lost on the link{fate}")
+    if answer is None or packet.arrived is None:
+        return
+    asked = sent.execute_at
+    if answer.status is Status.REJECTED or answer.execute_at is None or asked is None:
+        text = f"the real robot rejected command {command}: {answer.reason}"
+        yield RunEvent(packet.arrived, "diverged", text)
+    elif answer.execute_at > asked + _SAME:
+        late = play_at(packet.arrived) - asked
+        why = f"came {late:.3f} s too late" if late > 0 else "met a plan that had changed"
+        text = f"command {command} {why}: executed at {answer.execute_at:.3f} s instead of {asked:.3f} s"
+        yield RunEvent(packet.arrived, "late", text)
+
+
+def waits(t: Array, play: Array, q_reference: Array, *, slowest: float) -> Iterator[RunEvent]:
+    """Tell when the robot slowed down or waited, since messages were late.
+
+    Args:
+        t: User time [s], (k,), evenly spaced.
+        play: Play time [s], (k,).
+        q_reference: What was asked of the body [rad], (k, n).
+        slowest: Pace that correcting D alone doesn't fall below.
+    """
+    step = float(t[1] - t[0])
+    slow = np.diff(play) < (slowest - 1e-6) * step
+    begun = np.flatnonzero(np.diff(play) > 0)
+    slow[: begun[0] if len(begun) else len(slow)] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
+    spans: list[tuple[int, int]] = []
+    for low, high in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if spans and t[low] - t[spans[-1][1]] < NEAR:
+            spans[-1] = spans[-1][0], high
+        else:
+            spans.append((low, high))
+    for low, high in spans:
+        grown = float((t[high] - t[low]) - (play[high] - play[low]))
+        if grown < LEAST:
+            continue
+        moving = (q_reference[high] != q_reference[low]).any()
+        what = "slowed down" if moving else "waited at rest"
+        text = (
+            f"messages were late: the real robot {what} until {t[high]:.2f} s, and is {grown:.3f} s further behind"
+        )
+        yield RunEvent(float(t[low]), "slowed" if moving else "waited", text)
+
+
+def correction_events(corrections: Sequence[Correction]) -> Iterator[RunEvent]:
+    """Tell when the virtual robot was put where the real one was going."""
+    for made in corrections:
+        yield RunEvent(made.t, "corrected", correction_text(made.end, made.error, made.reason))
+
+
+def correction_text(end: float, error: Array, reason: str) -> str:
+    """Say that the virtual robot was put where the real one was going.
+
+    Args:
+        end: Until when it took [s].
+        error: By how much it was off [rad], (n,).
+        reason: Why.
+    """
+    joint = int(np.abs(error).argmax())
+    off = float(np.degrees(np.abs(error[joint])))
+    where = f"joint {joint + 1} was {off:.3g}° off"
+    return f"the virtual robot joined the real one's plan until {end:.2f} s ({where}): {reason}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunFacts:
+    """What is known of a run before it begins; the fields of `TwinRun` of the same names."""
+
+    model: RobotModel
+    start: Array
+    """Joints at the start [rad], (n,)."""
+    title: str
+    seed: int
+    delay: str
+    offset: str
+    service: str
+    link_loss: str
+    step: float
+    """Period of the record [s]."""
+
+
+class Turn(NamedTuple):
+    """What has become known of a run since the turn before."""
+
+    now: float
+    """User time reached [s]."""
+    first: int
+    """Number of the first row; row k is of the user time k · step."""
+    play: Array
+    """Play time in each row [s], (k,)."""
+    q_real: Array
+    """Measured joints [rad], (k, n)."""
+    q_reference: Array
+    """What was asked of the body [rad], (k, n)."""
+    there: tuple[PacketRecord, ...]
+    """What became of messages to the robot."""
+    back: tuple[PacketRecord, ...]
+    """The same of those to the operator."""
+    events: tuple[RunEvent, ...]
+    packets: tuple[tuple[int, CommandPacket], ...]
+    """Of commands that the robot has answered, with their places in the order of sending, from 1."""
+
+
+class RunKeeper(Protocol):
+    """Writes a run down. It may listen to the operator's site."""
+
+    def begin(self, facts: RunFacts, operator: OperatorSite) -> None:
+        """A run begins: nothing was commanded yet."""
+
+    def turn(self, turn: Turn) -> None:
+        """Some time has passed."""
+
+    def end(self, run: TwinRun) -> None:
+        """The run is over."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from interfaces.link import ConstantDelay, DelayProfile, Service
-from interfaces.runs.attribution import OffsetOutcome, measures
-from interfaces.runs.keeper import RunKeeper
-from interfaces.runs.twin_run import TwinRun
+from interfaces.runs.summary import OffsetOutcome, measures
+from interfaces.runs.twin_run import RunKeeper, TwinRun
 from interfaces.runtime.bodies import exact_arm, simulated_puma
 from interfaces.runtime.plan import RunPlan
 from interfaces.runtime.session import Progress

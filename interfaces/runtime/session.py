@@ -14,10 +14,19 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link import LinkConditions, PacketRecord
-from interfaces.runs.events import command_events, correction_events, waits
-from interfaces.runs.keeper import RunFacts, RunKeeper, Turn
-from interfaces.runs.offset import spelled
-from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun, commands_alone
+from interfaces.runs.twin_run import (
+    CommandPacket,
+    RunEvent,
+    RunFacts,
+    RunKeeper,
+    Turn,
+    TwinRun,
+    command_events,
+    commands_alone,
+    correction_events,
+    spelled,
+    waits,
+)
 from interfaces.runtime.laboratory import Laboratory, RobotBody
 from interfaces.runtime.plan import PlannedCommand
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from interfaces.link import LinkConditions
-from interfaces.runs.offset import QUANTILE
+from interfaces.runs.twin_run import QUANTILE
 
 
 def too_slow(conditions: LinkConditions, max_age: float) -> str:

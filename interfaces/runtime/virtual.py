@@ -8,9 +8,7 @@ Zikos, Delopoulos, section IV-A): commands that take longer are then postponed.
 from __future__ import annotations
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
-from interfaces.runs.keeper import RunKeeper
-from interfaces.runs.offset import QUANTILE
-from interfaces.runs.twin_run import TwinRun
+from interfaces.runs.twin_run import QUANTILE, RunKeeper, TwinRun
 from interfaces.runtime.plan import PlannedMotion, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from vrs import Receipt, Status

@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
-from interfaces.runs.keeper import RunKeeper
-from interfaces.runs.offset import QUANTILE
-from interfaces.runs.twin_run import TwinRun
+from interfaces.runs.twin_run import QUANTILE, RunKeeper, TwinRun
 from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from interfaces.val2.errors import ValError

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from interfaces.link import Service, delay_profile
-from interfaces.runs.attribution import CAUSES, Measures, attribute, measures
-from interfaces.runs.offset import fixed_offset
-from interfaces.runs.summary import summarize, to_json
+from interfaces.runs.summary import CAUSES, Measures, attribute, measures, summarize, to_json
+from interfaces.runs.twin_run import fixed_offset
 from interfaces.runtime.attribution import run_without
 from interfaces.runtime.bodies import exact_arm, simulated_puma
 from interfaces.runtime.plan import default_plan, parse_plan

@@ -15,8 +15,7 @@ from interfaces.lab.driving.attribution import CAUSES, DriveAttribution
 from interfaces.lab.driving.sweep import Group, grouped, paired
 from interfaces.lab.output import write_files
 from interfaces.lab.statistics import LEVEL, RANGE, Estimate
-from interfaces.runs.drive_row import COLUMNS, KEYS, METRICS, Row, cell, values_of
-from interfaces.runs.drive_run import DriveCase
+from interfaces.runs.drive_run import COLUMNS, KEYS, METRICS, DriveCase, Row, cell, values_of
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable

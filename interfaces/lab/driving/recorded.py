@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from interfaces.lab.driving.run import run
-from interfaces.runs.drive_row import Row, row_of
-from interfaces.runs.drive_run import DriveCase, DriveRun
+from interfaces.runs.drive_run import DriveCase, DriveRun, Row, row_of
 
 FOLDER: Final = "runs"
 """Where recordings are, below the results."""
@@ -36,7 +35,7 @@ def measure_recorded(case: DriveCase, keep: bool, path: Path | None) -> Kept:
     if path is None:
         drive, problem = run(case), ""
     else:
-        from interfaces.recording.driving.recorder import DriveRecorder
+        from interfaces.recording.run_recorders import DriveRecorder
 
         recorder = DriveRecorder(path)
         drive = run(case, witness=recorder)

@@ -11,8 +11,7 @@ import numpy as np
 from interfaces.lab.driving.run import run
 from interfaces.lab.pool import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
-from interfaces.runs.drive_row import Row, row_of
-from interfaces.runs.drive_run import DriveCase
+from interfaces.runs.drive_run import DriveCase, Row, row_of
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 

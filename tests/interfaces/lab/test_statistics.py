@@ -15,8 +15,7 @@ from interfaces.lab.driving.output import rich_table, summary
 from interfaces.lab.driving.recorded import name_of, paths
 from interfaces.lab.driving.sweep import comparable, grouped, paired
 from interfaces.lab.statistics import bootstrap, clustered, interval_name, median
-from interfaces.runs.drive_row import Row
-from interfaces.runs.drive_run import DriveCase
+from interfaces.runs.drive_run import DriveCase, Row
 from vrs.comparison import PathComparison
 from vrs.errors import InvalidValueError
 

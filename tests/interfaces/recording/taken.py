@@ -10,10 +10,9 @@ import numpy as np
 from interfaces.link import Service, delay_profile
 from interfaces.recording.capture import Capture
 from interfaces.recording.messages import Begin, End
-from interfaces.recording.runs import RunRecorder
+from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.writer import RecordingWriter
-from interfaces.runs.offset import fixed_offset
-from interfaces.runs.twin_run import TwinRun
+from interfaces.runs.twin_run import TwinRun, fixed_offset
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins

@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
-from interfaces.recording import sink
 from interfaces.recording.capture import Paced
 from interfaces.recording.figures import summary
+from interfaces.recording.mcap_file import Sink
 from interfaces.recording.messages import HistoryEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
-from interfaces.recording.runs import RunRecorder
+from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.track import REAL, VIRTUAL
-from interfaces.runs.keeper import RunFacts, Turn
 from interfaces.runs.summary import summarize, to_json
-from interfaces.runs.twin_run import RunEvent
+from interfaces.runs.twin_run import RunEvent, RunFacts, Turn
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.virtual import run_twins
@@ -189,7 +188,7 @@ class Small:
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(sink.Sink, "create", classmethod(lambda cls, path: cls(Small(path), str(path))))
+    monkeypatch.setattr(Sink, "create", classmethod(lambda cls, path: cls(Small(path), str(path))))
 
 
 @pytest.mark.usefixtures("small")

@@ -17,10 +17,9 @@ import zstandard
 
 from interfaces.recording import messages as m
 from interfaces.recording import open_recording
-from interfaces.recording.block import HEAD, MARK, MARK_AT, head_of
 from interfaces.recording.history import Chain
-from interfaces.recording.log import DECODERS
-from interfaces.recording.scan import MAGIC, NUMBERS
+from interfaces.recording.mcap_reading import HEAD, MAGIC, MARK, MARK_AT, NUMBERS, head_of
+from interfaces.recording.track import DECODERS
 from tests.interfaces.recording import recorded
 from vrs.errors import FormatError
 

@@ -13,9 +13,8 @@ from interfaces.link import Service, delay_profile
 from interfaces.recording.figures import differences, figures, summary, twin_run
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
-from interfaces.recording.runs import RunRecorder, extras_of
-from interfaces.runs.attribution import Attribution, OffsetOutcome
-from interfaces.runs.summary import summarize, to_json
+from interfaces.recording.run_recorders import RunRecorder, extras_of
+from interfaces.runs.summary import Attribution, OffsetOutcome, summarize, to_json
 from interfaces.runs.twin_run import commands_alone
 from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan

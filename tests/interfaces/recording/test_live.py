@@ -15,9 +15,10 @@ import pytest
 from interfaces import connect
 from interfaces.cli.main import _status
 from interfaces.link import Conditions, LinkConditions, TraceDelay, delay_profile
-from interfaces.recording import Recorder, sink
+from interfaces.recording import Recorder
 from interfaces.recording.figures import figures, summary
 from interfaces.recording.live import LiveRecorder, LiveRecording
+from interfaces.recording.mcap_file import Sink
 from interfaces.recording.messages import EventEntry, HistoryEntry, ReceiptEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
@@ -125,7 +126,7 @@ def test_a_disk_that_fills_up_is_told_and_nothing_else_happens(tmp_path, monkeyp
         def close(self):
             self.file.close()
 
-    monkeypatch.setattr(sink.Sink, "create", classmethod(lambda cls, path, **_: cls(Small(path), str(path))))
+    monkeypatch.setattr(Sink, "create", classmethod(lambda cls, path, **_: cls(Small(path), str(path))))
     told = []
 
     async def main():

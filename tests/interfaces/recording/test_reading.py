@@ -10,7 +10,7 @@ import pytest
 
 from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording import messages as m
-from interfaces.recording.source import FileSource
+from interfaces.recording.mcap_reading import FileSource
 from tests.interfaces.recording import recorded
 from vrs.errors import FormatError, InvalidValueError, NonFiniteTimeError, VrsError
 

@@ -13,7 +13,7 @@ import pytest
 
 from interfaces.recording import Recorder, RecordingError, RecordingWriter, open_recording
 from interfaces.recording import messages as m
-from interfaces.recording.sink import Sink
+from interfaces.recording.mcap_file import Sink
 from tests.interfaces.recording import recorded
 from tests.interfaces.recording.disks import Disk, Failing, Hanging, Slow
 from vrs import ManualClock

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from interfaces.lab.driving.run import run
-from interfaces.recording.driving.recorder import DriveRecorder
+from interfaces.recording.run_recorders import DriveRecorder
 from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import Transport
 

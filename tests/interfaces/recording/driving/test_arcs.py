@@ -10,9 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from interfaces.recording.driving.arcs import changed, edit_entries, whole, whole_entries
-from interfaces.recording.driving.messages import ArcChange
-from interfaces.recording.history import Chain
+from interfaces.recording.history import Chain, changed_arcs, edit_entries, whole, whole_entries
+from interfaces.recording.messages import ArcChange
 from robots import ipr
 from vrs import DriveCommand, Engine, ManualClock, Stop
 from vrs.errors import FormatError, InvalidValueError
@@ -81,14 +80,14 @@ def test_a_change_that_fits_nothing_is_refused() -> None:
     base, after = driven(3), driven(5)
     (entry,) = edit_entries(base, after, 1, 0.0, None)
     assert isinstance(entry, ArcChange)
-    assert changed(base, entry) == after
+    assert changed_arcs(base, entry) == after
     for wrong in (
         replace(entry, first=9),
         replace(entry, end=7.0),
         replace(entry, segments=(replace(entry.segments[0], v=0.2), *entry.segments[1:])),
     ):
         with pytest.raises(InvalidValueError):
-            changed(base, wrong)
+            changed_arcs(base, wrong)
 
 
 def test_edits_of_an_arm_and_of_a_mobile_robot_dont_mix() -> None:

@@ -12,11 +12,11 @@ import pytest
 from interfaces.cli.main import _status
 from interfaces.lab.driving.recorded import measure_recorded, name_of
 from interfaces.recording import open_recording
-from interfaces.recording.driving.figures import driven, summary
+from interfaces.recording.figures import drive_summary as summary
+from interfaces.recording.figures import driven
 from interfaces.recording.playback import Playback
 from interfaces.report.recorded import render
-from interfaces.runs.drive_row import COLUMNS, METRICS, facts_of, row_of
-from interfaces.runs.drive_run import DriveCase
+from interfaces.runs.drive_run import COLUMNS, METRICS, DriveCase, facts_of, row_of
 from interfaces.station.shelf import checked_name
 from interfaces.teleop.architectures import Transport
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded

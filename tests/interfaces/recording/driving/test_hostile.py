@@ -10,8 +10,7 @@ from msgspec.structs import replace
 
 from interfaces.cli.main import _status
 from interfaces.recording import RecordingWriter, open_recording
-from interfaces.recording.driving.messages import ArcEntry, ArcHistory, DriveFacts, RealPosture
-from interfaces.recording.messages import Begin, End
+from interfaces.recording.messages import ArcEntry, ArcHistory, Begin, DriveFacts, End, RealPosture
 from interfaces.recording.playback import Playback
 from vrs.errors import FormatError
 

@@ -12,10 +12,10 @@ import pytest
 from interfaces.cli.main import _status
 from interfaces.clients.appearance import parts_at
 from interfaces.recording import open_recording
-from interfaces.recording.driving.stage import DriveStage
-from interfaces.recording.engines import mobile_model
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
+from interfaces.recording.rerun import mobile_model
+from interfaces.recording.stages import DriveStage
 from tests.interfaces.pages import until, wait
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
 from tests.interfaces.recording.test_page import near, served
