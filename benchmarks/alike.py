@@ -13,13 +13,11 @@ import numpy as np
 
 from interfaces.lab.statistics import bootstrap, interval_name
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.plan import PlannedMotion, RunPlan
-from interfaces.runtime.session import SETTLE
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import SETTLE, run_twins, simulated_puma
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.control import Role

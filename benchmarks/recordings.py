@@ -25,10 +25,9 @@ import uvloop
 from interfaces import connect
 from interfaces.recording.recording import open_recording
 from interfaces.recording.track import REAL
-from interfaces.runtime.feeder import Feeder
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
-from interfaces.runtime.physics import TICK, ProcessEnded, Silent
+from interfaces.runtime.physics import TICK, Feeder, ProcessEnded, Silent
 from interfaces.runtime.physics_messages import Fault, Measurement, PhysicsReady
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts

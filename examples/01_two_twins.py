@@ -6,9 +6,8 @@ import numpy as np
 
 from interfaces.link import delay_profile
 from interfaces.runs.summary import measures
-from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import run_twins, simulated_puma
 from robots import puma560
 
 PLAN = b"""{"issue": 0.0, "execute": 0.5, "move": [20, 50, -160, 0, 30, 0], "speed": 0.6}

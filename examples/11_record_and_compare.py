@@ -12,9 +12,8 @@ from interfaces.recording.figures import summary
 from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import RunRecorder
 from interfaces.runs.summary import summarize
-from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import exact_arm, run_twins
 from robots import puma560
 
 model = puma560.model()

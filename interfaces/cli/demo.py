@@ -122,7 +122,7 @@ def explained(
 
     from interfaces.runs.summary import CAUSES, attribute, measures
     from interfaces.runs.twin_run import FIXED, TwinRun, fixed_offset, spelled
-    from interfaces.runtime.attribution import offset_outcome, run_without
+    from interfaces.runtime.session import offset_outcome, run_without
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), redirect_stdout=False) as bar:

@@ -194,9 +194,9 @@ async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eo
     from interfaces.link.proxy import Address
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
-    from interfaces.runtime.priority import hasten
     from interfaces.stream import sockets
     from interfaces.stream.server import application
+    from interfaces.system import hasten
 
     end_on_signal(robot.ended)
     robot.met = saying_policy()

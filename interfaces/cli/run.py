@@ -52,7 +52,7 @@ def run(
     from interfaces.recording.run_recorders import RunRecorder
     from interfaces.runs.summary import summarize
     from interfaces.runs.twin_run import fixed_offset
-    from interfaces.runtime.bodies import simulated_puma
+    from interfaces.runtime.session import simulated_puma
     from interfaces.val2.playing import Listeners
     from interfaces.val2.twins import play
     from robots import puma560

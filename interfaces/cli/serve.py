@@ -157,8 +157,8 @@ def serve(
     from interfaces.recording.mcap_file import Sink
     from interfaces.recording.messages import OWN
     from interfaces.runs.twin_run import fixed_offset, spelled
+    from interfaces.runtime.live.emulation import late_often, too_slow
     from interfaces.runtime.physics_messages import BodyKind
-    from interfaces.runtime.staleness import late_often, too_slow
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes

@@ -71,7 +71,7 @@ async def _serve(
     from interfaces.rsp.live.robot_server import RspServer
     from interfaces.rsp.robot import RobotCore
     from interfaces.runtime.live.process import READY
-    from interfaces.runtime.priority import hasten
+    from interfaces.system import hasten
     from robots.cubo.body import MOVES, CuboBody
     from vrs.clock import WallClock
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from interfaces.media.aloud import Aloud
 from interfaces.media.camera import CameraConfig, CameraError, LiveCamera
 from interfaces.media.door import MediaDoor
 from interfaces.media.live import LiveMedia
 from interfaces.media.presenter import Presenter
-from interfaces.media.speech import SpeechConfig, SpeechError
+from interfaces.media.speech import Aloud, SpeechConfig, SpeechError
 
 __all__ = [
     "Aloud",

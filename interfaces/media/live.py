@@ -8,11 +8,10 @@ from collections.abc import AsyncIterator, Callable, Hashable
 from typing import TYPE_CHECKING, Any, Final
 
 from interfaces.media.camera import CameraConfig, LiveCamera, Stand
-from interfaces.media.coding import missing
+from interfaces.media.coding import VoicePlayout, missing
 from interfaces.media.offer import OfferError
 from interfaces.media.presenter import Presenter
 from interfaces.media.speech import PROGRAM, SpeechError, cleaned, program
-from interfaces.media.voice import VoicePlayout
 from robots.bullet.rooms import Room
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError

@@ -24,10 +24,9 @@ from aiortc.mediastreams import MediaStreamError
 from av.packet import Packet
 
 from interfaces.media.camera import LiveCamera
-from interfaces.media.coding import SOUND_PERIOD, SOUND_RATE, VIDEO_CLOCK
+from interfaces.media.coding import SOUND_PERIOD, SOUND_RATE, VIDEO_CLOCK, VoicePlayout
 from interfaces.media.messages import Taken
 from interfaces.media.offer import OfferError, canonical
-from interfaces.media.voice import VoicePlayout
 from vrs.clock import Clock
 
 VIDEO: Final = "video/VP8"

@@ -6,9 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from interfaces.media.coding import encode_sound
+from interfaces.media.coding import VoicePlayout, encode_sound
 from interfaces.media.speech import SpeechConfig, SpeechError, cleaned, reading_time, shortened, spoken
-from interfaces.media.voice import VoicePlayout
 from vrs.clock import Clock
 
 MOST_WAITING: Final = 8

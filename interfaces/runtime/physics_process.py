@@ -24,8 +24,8 @@ from interfaces.runtime.physics_messages import (
     decode_order,
     encode,
 )
-from interfaces.runtime.priority import hasten
 from interfaces.runtime.tick_loop import Moved, TickBody, TickLoop
+from interfaces.system import hasten
 from vrs.clock import WallClock
 from vrs.errors import FormatError
 from vrs.model import Array

@@ -1,20 +1,25 @@
-"""A run of both twins in the laboratory, whoever operates: a plan, or a program.
+"""Runs of both twins in the laboratory: of a plan, or of a program; and counterfactual ones that attribute errors.
 
-The operator's site takes each command at once and sends it on; the robot's site carries it out, plays its timeline,
-and its body follows at 1 kHz.
+Virtual time, as fast as the processor goes, repeatable from a seed. The operator's site takes each command at once
+and sends it on; the robot's site carries it out, plays its timeline, and its body follows at 1 kHz. How far behind
+it plays adapts to the network, or is fixed as in the paper (Doulgeri, Zikos, Delopoulos, section IV-A): commands
+that take longer are then postponed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import AbstractContextManager
-from typing import Protocol, TypeAlias
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link import LinkConditions, PacketRecord
+from interfaces.link import Conditions, ConstantDelay, DelayProfile, LinkConditions, PacketRecord, Service
+from interfaces.runs.summary import OffsetOutcome, measures
 from interfaces.runs.twin_run import (
+    QUANTILE,
     CommandPacket,
     RunEvent,
     RunFacts,
@@ -28,12 +33,15 @@ from interfaces.runs.twin_run import (
     waits,
 )
 from interfaces.runtime.laboratory import Laboratory, RobotBody
-from interfaces.runtime.plan import PlannedCommand
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
+from interfaces.teleop import JointReference, OperatorSite, RobotSite, RobotSiteConfig
 from interfaces.wire.fields import text
-from vrs import Lateness, Receipt
+from vrs import Lateness, Receipt, Status
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
+
+if TYPE_CHECKING:
+    from robots.puma560.body import RealArm
 
 TICK = 0.001
 """Period of the real robot's servo [s]."""
@@ -296,3 +304,168 @@ class TwinSession:
 
 def unheard(t: float) -> None:
     """Report no progress."""
+
+
+class ExactArm:
+    """A body with no dynamics: it is where its reference is, whatever it holds."""
+
+    def follow(self, reference: JointReference) -> Array:
+        """Return the references (m, n) [rad]."""
+        return reference.q
+
+    def attach(self, mass: float) -> None:
+        """Take a load, which changes nothing."""
+
+    def release(self) -> None:
+        """Drop the load, which changes nothing."""
+
+
+class _Puma:
+    """The PyBullet PUMA 560 behind the driver's interface."""
+
+    def __init__(self, arm: RealArm) -> None:
+        self._arm = arm
+
+    def follow(self, reference: JointReference) -> Array:
+        return self._arm.run(*reference).q
+
+    def attach(self, mass: float) -> None:
+        from robots.bullet import Payload
+
+        self._arm.attach(Payload(mass=mass))
+
+    def release(self) -> None:
+        self._arm.release()
+
+
+@contextmanager
+def exact_arm(q: Array) -> Iterator[ArmBody]:  # noqa: ARG001
+    """Make a body that follows exactly."""
+    yield ExactArm()
+
+
+def simulated_puma(*, friction: bool = True) -> ArmFactory:
+    """Say how to make a PyBullet PUMA 560, with or without friction in its joints."""
+
+    @contextmanager
+    def make(q: Array) -> Iterator[ArmBody]:
+        from robots.bullet import Reality
+        from robots.puma560.body import RealArm
+
+        with RealArm(reality=Reality(friction=friction), q=q) as arm:
+            yield _Puma(arm)
+
+    return make
+
+
+def run_twins(
+    plan: RunPlan,
+    model: RobotModel,
+    profile: DelayProfile,
+    arm: ArmFactory,
+    *,
+    seed: int,
+    offset: float | None = None,
+    service: Service = Service.DATAGRAM,
+    progress: Progress | None = None,
+    keeper: RunKeeper | None = None,
+) -> TwinRun:
+    """Run a plan on both twins.
+
+    Args:
+        plan: What the operator does.
+        model: The robot.
+        profile: The link's delay, either way.
+        arm: Makes the real robot's body.
+        seed: Seed of the link, ≥ 0.
+        offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
+        service: Order of delivery on the link.
+        progress: Called now and then with the user time reached [s].
+        keeper: Who writes the run down while it goes on.
+
+    Returns:
+        The record, every 20 ms of user time, until both robots have been at rest for 2 s.
+    """
+    conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
+    with arm(plan.start) as body:
+        session = TwinSession(
+            plan.start, model, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
+        )
+        for motion in plan.motions:
+            session.lab.schedule(motion.registered_at, lambda now, motion=motion: _register(session, motion, now))  # type: ignore[misc]
+        for item in plan.payloads:
+            session.hand(item.t, item.mass)
+        session.last_action = max((motion.registered_at for motion in plan.motions), default=0.0)
+        end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or unheard)
+    return session.record(end)
+
+
+def _register(session: TwinSession, item: PlannedMotion, now: float) -> None:
+    receipt = session.operator.execute(item.command, now=now)
+    # What the virtual robot refused isn't sent.
+    if isinstance(receipt, Receipt) and receipt.status is not Status.REJECTED:
+        session.sent(now, item.command, receipt)
+
+
+def run_without(
+    causes: frozenset[str],
+    plan: RunPlan,
+    model: RobotModel,
+    profile: DelayProfile,
+    *,
+    seed: int,
+    offset: float | None = None,
+    service: Service = Service.DATAGRAM,
+    progress: Progress | None = None,
+    keeper: RunKeeper | None = None,
+) -> TwinRun:
+    """Run a plan with some causes of error switched off.
+
+    Args:
+        causes: Any of CAUSES. Without `network` every command arrives at once and D is 0; without
+            `payload_and_friction` the hand stays empty and the joints turn freely; without `servo` the body
+            is where its reference is.
+        plan: What the operator does.
+        model: The robot.
+        profile: The link's delay, unless it is switched off.
+        seed: Seed of the link.
+        offset: A fixed D [s], ≤ 0, unless the network is switched off; None adapts it.
+        service: Order of delivery on the link.
+        progress: Called now and then with the user time reached [s].
+        keeper: Who writes the run down while it goes on.
+    """
+    if "network" in causes:
+        profile, offset = ConstantDelay("none", 0.0), 0.0
+    free = "payload_and_friction" in causes
+    if free:
+        plan = replace(plan, payloads=())
+    arm = exact_arm if "servo" in causes else simulated_puma(friction=not free)
+    return run_twins(
+        plan, model, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
+    )
+
+
+def offset_outcome(
+    plan: RunPlan,
+    model: RobotModel,
+    profile: DelayProfile,
+    *,
+    seed: int,
+    offset: float | None,
+    service: Service = Service.DATAGRAM,
+    progress: Progress | None = None,
+) -> OffsetOutcome:
+    """Run a plan for the sake of its offset: see `interfaces.runtime.session.run_twins`."""
+    run = run_twins(
+        replace(plan, payloads=()), model, profile, exact_arm,
+        seed=seed, offset=offset, service=service, progress=progress,
+    )  # fmt: skip
+    kinds = [event.kind for event in run.events]
+    return OffsetOutcome(
+        run.offset,
+        float(-run.D.mean()),
+        float(-run.D.min()),
+        kinds.count("late") + kinds.count("diverged"),
+        kinds.count("slowed") + kinds.count("waited"),
+        measures(run).tool_rms_timeline_m,
+    )

@@ -3,7 +3,7 @@
 A late tick is made good at once, up to `PAUSE`. After a longer pause the missed ticks are left out: they'd be a
 burst. Where the references end in mid-motion, jump or were left out, each joint brakes within its limits from the
 last reference, and the arm holds until the parent has acknowledged that. Where it rests and the first rows of a
-motion come too late, by up to `row_buffer.KEPT` ticks, it begins late, and is on time again when it rests next.
+motion come too late, by up to `KEPT` ticks, it begins late, and is on time again when it rests next.
 Where it moves and rows come too late, or rests where none of them do, it goes over onto them within its limits, if
 it isn't too far from them.
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -35,12 +35,168 @@ from interfaces.runtime.physics_messages import (
     Rows,
     TickCounter,
 )
-from interfaces.runtime.reference_blending import ReferenceBlending
-from interfaces.runtime.row_buffer import RowBuffer
 from robots.onboard.following import SensorMonitor
 from robots.onboard.stops import from_measured
 from vrs.errors import FormatError, VrsError
 from vrs.model import Array, Limits
+
+KEPT = 300
+"""For how many ticks rows are kept that are over."""
+_BLOCKS_MOST = 1024
+"""Most blocks that are kept; a parent sends one every few ticks, and each cuts the one before."""
+
+
+class _RowBlock(NamedTuple):
+    start: int
+    """Tick of the first row."""
+    rows: Array
+    """(k, 3, n)."""
+
+
+class RowBuffer:
+    """Rows (q, qd, qdd) by tick; it keeps what is still to come, and a little of what was."""
+
+    def __init__(self) -> None:
+        self._blocks: deque[_RowBlock] = deque()
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._blocks.clear()
+
+    def put(self, start: int, rows: Array) -> bool:
+        """Take rows, (k, 3, n), for ticks from `start` on, instead of all those for these and later ticks.
+
+        Returns:
+            Whether there was room.
+        """
+        blocks = self._blocks
+        while blocks and blocks[-1].start >= start:
+            blocks.pop()
+        if len(blocks) >= _BLOCKS_MOST:
+            return False
+        if blocks and blocks[-1].start + len(blocks[-1].rows) > start:
+            last = blocks.pop()
+            blocks.append(_RowBlock(last.start, np.array(last.rows[: start - last.start])))
+        blocks.append(_RowBlock(start, rows))
+        return True
+
+    def take(self, tick: int, most: int) -> Array | None:
+        """Rows for this tick and those after it, (1 to most, 3, n).
+
+        After a block that ended at rest its last position is held, a row at a time. Ticks more than `KEPT` before
+        this one won't be asked for again.
+
+        Returns:
+            The rows; None if there are none for this tick.
+        """
+        blocks = self._blocks
+        while len(blocks) > 1 and blocks[1].start <= tick - KEPT:
+            blocks.popleft()
+        block = next((block for block in reversed(blocks) if block.start <= tick), None)
+        if block is None:
+            return None
+        start, rows = block
+        if tick - start < len(rows):
+            return rows[tick - start : tick - start + most]
+        if rows[-1, 1].any():
+            return None
+        held = np.array(rows[-1:])
+        held[0, 2] = 0.0
+        return held
+
+    def kept(self, tick: int) -> Iterator[tuple[int, Array]]:
+        """What there is for this tick and up to `KEPT` before it, a block at a time, the latest first.
+
+        Yields:
+            The tick of the first row, and the rows, (k, 3, n), k ≥ 1.
+        """
+        for start, rows in reversed(self._blocks):
+            low, high = max(start, tick - KEPT), min(start + len(rows), tick + 1)
+            if low < high:
+                yield low, rows[low - start : high - start]
+
+
+BEGIN = 0.05
+"""Two motions that were one until so long ago [s], at most, can be merged."""
+ASTRAY = 0.15
+"""On the way a joint may get as far from its references as twice its acceleration brings it in so long [s]."""
+_SHARE = 1.0
+"""Twice the share of the acceleration that's left with which a joint counts for coming to rest beside them."""
+_PACE = 8.0
+"""Share of what is left that it takes off at most [1/s]: the references may turn away meanwhile."""
+_LITTLE = 1e-3
+"""What is left is little [rad]."""
+_SOFT = 4.0
+"""In so many ticks it takes off what is left, where that's little."""
+_SAME_POSITION = 1e-11
+"""Positions nearer than this [rad] are one: their change in a tick is a speed."""
+
+
+class ReferenceBlending:
+    """Brings joints onto references that came late, a tick at a time, within their limits.
+
+    An arm in motion followed what it had until they came, so they begin elsewhere than it is. Each joint turns onto
+    them: at each tick it takes the speed at which it could still brake relative to them, as far as its own limits
+    let it. Where the references need all of its acceleration themselves, it waits until they don't.
+    """
+
+    def __init__(self, limits: Limits, tick: float) -> None:
+        """Keep to limits, in ticks of a length [s]."""
+        self._tick = tick
+        self._speeds, self._accelerations = limits.qd_max.tolist(), limits.qdd_max.tolist()
+        self._low, self._high = limits.q_min.tolist(), limits.q_max.tolist()
+
+    def near(self, q: Sequence[float], qd: Sequence[float], row: Array, *, begun: bool) -> bool:
+        """Whether references, (3, n), can be gone over to from positions [rad] and speeds [rad/s].
+
+        Args:
+            q: Positions, a tick before.
+            qd: Speeds.
+            row: The references.
+            begun: Whether the arm is on the way to them.
+        """
+        far, fast = (ASTRAY, math.inf) if begun else (BEGIN, BEGIN)
+        return all(
+            abs(b - a) <= most * far**2 and abs(w - v) <= 2.0 * most * fast
+            for a, v, b, w, most in zip(q, qd, *row[:2].tolist(), self._accelerations, strict=True)
+        )
+
+    def there(self, q: Sequence[float], qd: Sequence[float], row: Array) -> bool:
+        """Whether references, (3, n), go on from the positions [rad] and speeds [rad/s] of the tick before."""
+        h = self._tick
+        return all(
+            abs(a + 0.5 * h * (v + w) - b) <= _SAME_POSITION and abs(w - v) <= acceleration * h + _SAME
+            for a, v, b, w, acceleration in zip(q, qd, *row[:2].tolist(), self._accelerations, strict=True)
+        )
+
+    def step(self, q: Sequence[float], qd: Sequence[float], row: Array) -> tuple[list[float], list[float]]:
+        """Positions [rad] and speeds [rad/s] of the next tick, whose references are a row, (3, n)."""
+        h, positions, speeds = self._tick, [], []
+        bounds = zip(self._speeds, self._accelerations, self._low, self._high, strict=True)
+        for a, v, b, w, g, (fastest, most, low, high) in zip(q, qd, *row.tolist(), bounds, strict=True):
+            ahead = a + 0.5 * h * (v + w) - b
+            # What the references take of the acceleration isn't there for coming to rest beside them.
+            left = max(most - math.copysign(g, ahead * g), 0.0)
+            pace = _PACE if abs(ahead) > _LITTLE else 1.0 / (_SOFT * h)
+            wanted = w - math.copysign(min(abs(ahead) * pace, math.sqrt(_SHARE * left * abs(ahead))), ahead)
+            up, down = self._stoppable(high - a, v, most), self._stoppable(a - low, -v, most)
+            wanted = min(max(wanted, -fastest, -down), fastest, up)
+            new = min(max(wanted, v - most * h), v + most * h)
+            positions.append(a + 0.5 * h * (v + new))
+            speeds.append(new)
+        return positions, speeds
+
+    def _stoppable(self, room: float, v: float, most: float) -> float:
+        """The speed [rad/s] of the next tick with which a joint can still stop before an end.
+
+        Args:
+            room: To the end [rad].
+            v: Its speed towards it [rad/s]: until the tick is over it goes on at the mean of both.
+            most: Its acceleration [rad/s²].
+        """
+        change = most * self._tick
+        return 0.5 * (math.sqrt(max(change**2 + 4.0 * (2.0 * most * room - change * v), 0.0)) - change)
+
 
 PAUSE = 0.05
 """Longest time [s] without ticks that is made good."""

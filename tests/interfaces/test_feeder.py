@@ -7,7 +7,7 @@ import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.link.round_trip import Pong
-from interfaces.runtime.feeder import Feeder
+from interfaces.runtime.physics import Feeder
 from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import TickLoop

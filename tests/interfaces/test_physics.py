@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.runtime.bodies import simulated_puma
 from interfaces.runtime.physics import Event, PhysicsConfig, PhysicsProcess, ProcessEnded, References, Silent
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
@@ -31,6 +30,7 @@ from interfaces.runtime.physics_messages import (
     decode_news,
 )
 from interfaces.runtime.physics_process import _Parent, tick_body
+from interfaces.runtime.session import simulated_puma
 from interfaces.teleop import JointReference, RobotSite
 from tests.interfaces.test_teleop import laboratory
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from interfaces.runtime.reference_blending import ASTRAY, BEGIN, ReferenceBlending
+from interfaces.runtime.tick_loop import ASTRAY, BEGIN, ReferenceBlending
 from vrs.model import Array, Limits
 
 TICK = 0.001

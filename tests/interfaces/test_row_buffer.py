@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.runtime.row_buffer import KEPT, RowBuffer
+from interfaces.runtime.tick_loop import KEPT, RowBuffer
 from vrs.model import Array
 
 

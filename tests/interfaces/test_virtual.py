@@ -10,10 +10,8 @@ import pytest
 from interfaces.link import Service, delay_profile
 from interfaces.runs.summary import CAUSES, Measures, attribute, measures, summarize, to_json
 from interfaces.runs.twin_run import fixed_offset
-from interfaces.runtime.attribution import run_without
-from interfaces.runtime.bodies import exact_arm, simulated_puma
 from interfaces.runtime.plan import default_plan, parse_plan
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import exact_arm, run_twins, run_without, simulated_puma
 from robots import puma560
 from vrs import Status
 from vrs.errors import InvalidValueError

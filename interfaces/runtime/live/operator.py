@@ -19,8 +19,8 @@ from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN as RECORD
 from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.runtime.live.emulation import LiveEmulation
+from interfaces.runtime.live.process import warm
 from interfaces.runtime.live.robot_client import RobotClient
-from interfaces.runtime.live.warm import warm
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached, Role, State
 from interfaces.stream.hub import Hub, HubConfig

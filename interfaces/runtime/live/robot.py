@@ -15,11 +15,11 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
-from interfaces.runtime.feeder import Feeder
+from interfaces.runtime.live.process import warm
 from interfaces.runtime.live.robot_server import RobotServer
-from interfaces.runtime.live.warm import warm
 from interfaces.runtime.physics import (
     TICK,
+    Feeder,
     PhysicsConfig,
     PhysicsProcess,
     ProcessEnded,

@@ -18,10 +18,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interfaces.media import Aloud, Presenter, SpeechConfig, SpeechError
-from interfaces.media.coding import SOUND_PERIOD, encode_sound
+from interfaces.media.coding import LEAD, SILENCE, SOUND_PERIOD, VoicePlayout, encode_sound
 from interfaces.media.presenter import MOST_WAITING
 from interfaces.media.speech import LONGEST, cleaned, reading_time, samples_of, shortened, spoken
-from interfaces.media.voice import LEAD, SILENCE, VoicePlayout
 from vrs.clock import ManualClock, WallClock
 from vrs.errors import FormatError, InvalidValueError
 

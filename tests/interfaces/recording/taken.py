@@ -13,9 +13,8 @@ from interfaces.recording.messages import Begin, End
 from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.twin_run import TwinRun, fixed_offset
-from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.system import software
 from interfaces.teleop import OperatorSite, PlanPart, Report
 from robots import puma560

@@ -20,9 +20,8 @@ from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.track import REAL, VIRTUAL
 from interfaces.runs.summary import summarize, to_json
 from interfaces.runs.twin_run import RunEvent, RunFacts, Turn
-from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.teleop import OperatorSite
 from tests.interfaces.recording import shown
 from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken

@@ -16,9 +16,8 @@ from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import RunRecorder, extras_of
 from interfaces.runs.summary import Attribution, OffsetOutcome, summarize, to_json
 from interfaces.runs.twin_run import commands_alone
-from interfaces.runtime.bodies import exact_arm
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.virtual import run_twins
+from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.teleop import OperatorSite
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play

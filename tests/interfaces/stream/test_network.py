@@ -8,8 +8,7 @@ import pytest
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
 from interfaces.link.round_trip import Ping
 from interfaces.recording.marks import OF_EVENTS, MarkKind
-from interfaces.runtime.live.emulation import LiveEmulation
-from interfaces.runtime.staleness import late_often
+from interfaces.runtime.live.emulation import LiveEmulation, late_often
 from interfaces.stream import control
 from interfaces.stream.control import Attached, DirectionConditions, Impair, ProblemCode, Role, Survey
 from interfaces.teleop import OperatorSite, RobotLine

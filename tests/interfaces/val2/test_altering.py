@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
-from interfaces.runtime.bodies import exact_arm
+from interfaces.runtime.session import exact_arm
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm
 from interfaces.val2.motion.remote import RemoteRobot

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
-from interfaces.runtime.bodies import simulated_puma
+from interfaces.runtime.session import simulated_puma
 from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play

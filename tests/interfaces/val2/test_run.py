@@ -9,7 +9,7 @@ import pytest
 
 from interfaces.cli import main
 from interfaces.link import delay_profile
-from interfaces.runtime.bodies import exact_arm
+from interfaces.runtime.session import exact_arm
 from interfaces.val2.errors import ValError
 from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
