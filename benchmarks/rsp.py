@@ -11,10 +11,9 @@ from interfaces.lab.kim2006.following import cubo_model
 from interfaces.rsp import header
 from interfaces.rsp.header import Header, PacketType
 from interfaces.rsp.layout import Layout, PacketDirection
-from interfaces.rsp.local import LocalConfig, LocalCore, LocalState
-from interfaces.rsp.period import PeriodConfig
+from interfaces.rsp.local import LocalConfig, LocalCore, LocalState, PeriodConfig
 from interfaces.rsp.robot import RobotCore
-from interfaces.rsp.security import Keyring, Rank
+from interfaces.rsp.session import Keyring, Rank
 from robots.cubo.body import CuboBody
 
 if TYPE_CHECKING:

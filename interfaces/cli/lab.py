@@ -131,10 +131,10 @@ def lab(
     from interfaces.lab.driving.pictures import drawn, pictures
     from interfaces.lab.driving.recorded import Kept, measure_recorded, paths
     from interfaces.lab.driving.sweep import cases
-    from interfaces.link.profiles import delay_profile
+    from interfaces.link.delays import delay_profile
     from interfaces.runs.drive_run import ROBOTS
     from interfaces.teleop.architectures import Constants, Transport, controller
-    from interfaces.teleop.architectures.equipment import POSITIONS
+    from interfaces.teleop.architectures.compositions import POSITIONS
     from robots.onboard.driving import Posture
 
     architectures = architecture or ["III", "timeline"]

@@ -87,7 +87,7 @@ def _trained(config: TrainingConfig, seed: int) -> GainNetwork:
 def _tested(network: GainNetwork) -> dict[str, Errors]:
     import numpy as np
 
-    from interfaces.middleware.training import errors, examples
+    from interfaces.middleware.network import errors, examples
 
     chosen = examples(network.ranges, EXAMPLES, np.random.default_rng([network.seed, 1]))
     return {kind: errors(network, *given) for kind, given in chosen.items()}

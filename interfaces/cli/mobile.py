@@ -255,7 +255,7 @@ def run_mobile(
     from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
     from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes
-    from interfaces.teleop.architectures.equipment import CONTROL
+    from interfaces.teleop.architectures.compositions import CONTROL
     from interfaces.teleop.driving import DrivenConfig, Hands
     from interfaces.val2.val_arm import ValArm, in_a_thread
     from robots.onboard import LossPolicy, WatchdogConfig

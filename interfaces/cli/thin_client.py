@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import socket
 
     from interfaces.rsp.model import RobotModel
-    from interfaces.rsp.security import Keyring
+    from interfaces.rsp.session import Keyring
     from robots.bullet.rooms import Room
 
 
@@ -38,7 +38,7 @@ def thin_client(address: str, model: Path | None, room: Room, token_file: Path |
     import uvloop
 
     from interfaces.link.proxy import parse_address
-    from interfaces.rsp.live.robot_server import bind
+    from interfaces.rsp.live import bind
     from interfaces.rsp.model import read_model
     from robots.cubo.parameters import MODEL_FILE
 
@@ -53,7 +53,7 @@ def thin_client(address: str, model: Path | None, room: Room, token_file: Path |
 
 
 def _keys(host: str, token_file: Path | None) -> Keyring | None:
-    from interfaces.rsp.live.opening import keys_of
+    from interfaces.rsp.live import keys_of
     from interfaces.stream.access import make_tokens, read_tokens
 
     if token_file is None:
@@ -68,7 +68,7 @@ async def _serve(
 ) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.rsp.host import RspHost
-    from interfaces.rsp.live.robot_server import RspServer
+    from interfaces.rsp.live import RspServer
     from interfaces.rsp.robot import RobotCore
     from interfaces.runtime.live.process import READY
     from interfaces.system import hasten

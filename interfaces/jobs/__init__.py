@@ -1,6 +1,6 @@
 """Lists of jobs for a personal robot: what is to be done, how far it is, and the machine that gets it done."""
 
-from interfaces.jobs.carrying import (
+from interfaces.jobs.devices import (
     ArmControl,
     NoArm,
     Screen,
@@ -11,24 +11,39 @@ from interfaces.jobs.carrying import (
 )
 from interfaces.jobs.file import JobFile, digest, read_jobs, written_jobs
 from interfaces.jobs.forecast import Forecast, JobForecast, dry_run
-from interfaces.jobs.messages import (
+from interfaces.jobs.runner import (
     Done,
     EndJob,
     Input,
     Interrupted,
     JobFailed,
+    JobRunner,
     ListCommand,
     Load,
     MoveTo,
     OperatorLost,
     Request,
     RunArm,
+    RunnerConfig,
     Show,
     Speak,
+    carried_over,
 )
-from interfaces.jobs.progress import POLICY_SAYS, JobProgress, JobStage, OperatorLoss, Progress
-from interfaces.jobs.runner import JobRunner, RunnerConfig, carried_over
-from interfaces.jobs.values import ArmJob, Job, JobEntry, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.jobs.values import (
+    POLICY_SAYS,
+    ArmJob,
+    Job,
+    JobEntry,
+    JobList,
+    JobProgress,
+    JobStage,
+    MessageJob,
+    MoveJob,
+    OperatorLoss,
+    Progress,
+    VoiceJob,
+    WaitJob,
+)
 
 __all__ = [
     "POLICY_SAYS",

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from interfaces.jobs.carrying import speaking_time
+from interfaces.jobs.devices import speaking_time
 from interfaces.jobs.values import ArmJob, Job, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Journey, JourneyState

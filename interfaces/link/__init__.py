@@ -1,20 +1,23 @@
 """The emulated network between operator and robot."""
 
-from interfaces.link.channel import Channel, Delivery
 from interfaces.link.clock_sync import ClockEstimate, ClockEvidence, ClockSync, ClockSyncConfig, DriftEstimate
-from interfaces.link.conditions import Conditions, LinkConditions, Service
-from interfaces.link.delay import ConstantDelay, DelayProfile, DelaySource
-from interfaces.link.gamma import GammaDelay
-from interfaces.link.gauge import Gauge, LinkFigures
-from interfaces.link.lane import Lane
-from interfaces.link.link import Direction, Link, LinkTotals, direction
+from interfaces.link.conditions import Conditions, LinkConditions, LinkPath, PacketOutcome, Service
+from interfaces.link.delays import (
+    ConstantDelay,
+    DelayProfile,
+    DelaySource,
+    GammaDelay,
+    HeavyTailedDelay,
+    Hop,
+    RouteDelay,
+    TraceDelay,
+    delay_profile,
+)
+from interfaces.link.delivery import Bundle, Repeater, RepeatReceiver
+from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, LinkTotals, Stream, direction
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
-from interfaces.link.measured import HeavyTailedDelay
-from interfaces.link.packets import LossReason, PacketLog, PacketRecord, Totals
-from interfaces.link.path import LinkPath, PacketOutcome
-from interfaces.link.profiles import delay_profile
+from interfaces.link.packets import Gauge, LinkFigures, LossReason, PacketLog, PacketRecord, Totals
 from interfaces.link.quantiles import SlidingQuantiles
-from interfaces.link.repeater import Bundle, Repeater, RepeatReceiver
 from interfaces.link.round_trip import (
     DelayStatistics,
     Echo,
@@ -27,9 +30,6 @@ from interfaces.link.round_trip import (
     RoundTripEstimator,
     WindowConfig,
 )
-from interfaces.link.route import Hop, RouteDelay
-from interfaces.link.stream import Stream
-from interfaces.link.trace import TraceDelay
 
 __all__ = [
     "BernoulliLoss",

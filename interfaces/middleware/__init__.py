@@ -3,21 +3,30 @@
 Source: Tipsuwan, Chow, *Model Predictive Path Tracking via Middleware for Networked Mobile Robot over IP Network*.
 """
 
-from interfaces.middleware.action_agent import ActionAgent, ActionAgentConfig
-from interfaces.middleware.messages import DriveFeedback, DriveSetpoint
-from interfaces.middleware.middleware import Controller, GainSchedulingMiddleware, MiddlewareConfig
+from interfaces.middleware.middleware import (
+    ActionAgent,
+    ActionAgentConfig,
+    Controller,
+    DriveFeedback,
+    DriveSetpoint,
+    GainScheduler,
+    GainSchedulingMiddleware,
+    MiddlewareConfig,
+    ScheduleCounts,
+    predicted,
+)
 from interfaces.middleware.network import (
+    Errors,
     Formulation,
     GainNetwork,
     Ranges,
+    TrainingConfig,
     default_network,
     load_network,
     read_network,
+    train,
 )
 from interfaces.middleware.performance import drive_measure, measure, optimal_gain, optimal_way
-from interfaces.middleware.predictor import predicted
-from interfaces.middleware.scheduler import GainScheduler, ScheduleCounts
-from interfaces.middleware.training import Errors, TrainingConfig, train
 
 __all__ = [
     "ActionAgent",

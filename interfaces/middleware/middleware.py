@@ -9,15 +9,211 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from interfaces.link.round_trip import Echo, Probe, ProbeConfig, RoundTripEstimator, WindowConfig
-from interfaces.middleware.messages import DriveFeedback, DriveSetpoint
 from interfaces.middleware.network import GainNetwork
-from interfaces.middleware.performance import tolerance
-from interfaces.middleware.predictor import predicted
-from interfaces.middleware.scheduler import GainScheduler, ScheduleCounts, checked
-from robots.onboard.driving import Drive, Posture
+from interfaces.middleware.performance import drive_measure, optimal_gain, tolerance
+from robots.onboard.driving import STAND, Drive, Posture
+from vrs.checks import validated, within
+from vrs.errors import InvalidValueError
+from vrs.mobile import advanced
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSetpoint:
+    """What the robot is to drive until it hears otherwise."""
+
+    number: int
+    """It rises from command to command: one that arrives behind a newer one is stale."""
+    drive: Drive
+
+    size = 28
+    """What it takes on the wire [byte]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveFeedback:
+    """What the robot reports at each of its sampling times."""
+
+    number: int
+    """It rises from report to report."""
+    posture: Posture
+    """Where the robot takes itself to be."""
+    drive: Drive
+    """What it drives from then on; A and K of eq. (20) follow from it."""
+
+    size = 52
+    """What it takes on the wire [byte]."""
+
+
+def predicted(posture: Posture, drive: Drive, tau: float) -> Posture:
+    """Return where a robot will be when a command reaches it, from where it was a round trip before.
+
+    The robot keeps the drive that it reported. Equations (21) and (22) divide by A and are the exact arc of
+    `vrs.mobile.advanced`, which has the straight line as its limit.
+
+    Args:
+        posture: Where it was when it reported.
+        drive: What it was driving then.
+        tau: Time from the report to when a command that is sent now reaches it [s]: the median round trip.
+
+    Source: Tipsuwan, Chow, eq. (19)–(22).
+    """
+    return Posture(*advanced(posture, drive.v, drive.w, tau))
+
+
+_STRAIGHTEST_PIVOT = 1e9
+"""From this |A| on [1/m] a drive is a turn on the spot: its curve has a radius under a nanometre."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScheduleCounts:
+    """What a scheduler has done so far."""
+
+    drives: int
+    """All that it was given."""
+    slowed: int
+    """Of which J would have been over ε."""
+    exact: int
+    """Of these, those whose gain is the exact root, as the network's broke J ≤ ε, or it isn't trained on them."""
+
+
+class GainScheduler:
+    """Passes on drives with J ≤ ε to rounding, whatever it is given and whatever its network says.
+
+    It slows a drive down as far as the delay demands, and keeps its curve.
+
+    Source: Tipsuwan, Chow, section VI, 3).
+    """
+
+    def __init__(self, epsilon: float = 0.25, network: GainNetwork | None = None) -> None:
+        """Take the tolerance.
+
+        Args:
+            epsilon: ε of J, in [1e-6, 3].
+            network: What says the gain; the exact root, unless given.
+
+        Raises:
+            InvalidValueError: If the network was trained for another tolerance.
+        """
+        self.epsilon = tolerance(epsilon)
+        if network is not None and network.epsilon != self.epsilon:
+            raise InvalidValueError("network", network.epsilon, f"one that was trained for ε = {self.epsilon:g}")
+        self._network = network
+        self._drives = self._slowed = self._exact = 0
+
+    @property
+    def counts(self) -> ScheduleCounts:
+        """What it has done so far."""
+        return ScheduleCounts(self._drives, self._slowed, self._exact)
+
+    def schedule(self, drive: Drive, tau: float) -> Drive:
+        """Return the drive itself, or a slower one on the same curve.
+
+        Args:
+            drive: What a controller wants.
+            tau: Predicted delay [s]: the mean round trip.
+
+        Raises:
+            InvalidValueError: If the drive isn't made of finite numbers, or the delay is negative or not finite.
+        """
+        v, w = checked(drive)
+        if not 0 <= tau < math.inf:
+            raise InvalidValueError("tau", tau, "finite seconds, 0 or more")
+        self._drives += 1
+        if drive_measure(drive, tau) <= self.epsilon:
+            return drive
+        self._slowed += 1
+        if abs(w) >= 2 * _STRAIGHTEST_PIVOT * abs(v):
+            self._exact += 1
+            return _scaled(drive, self.epsilon / (tau * math.hypot(v, w)))
+        A, network = 0.5 * w / v, self._network
+        if network is not None and network.covers(A, tau):
+            slowed = _scaled(drive, network.gain(A, tau) / abs(v))
+            if abs(slowed.v) > 0.0 and drive_measure(slowed, tau) <= self.epsilon:
+                return slowed
+        self._exact += 1
+        return _scaled(drive, optimal_gain(A, tau, self.epsilon) / abs(v))
+
+
+def checked(drive: Drive) -> Drive:
+    """Return a drive.
+
+    Raises:
+        InvalidValueError: If it isn't made of finite numbers.
+    """
+    if not (math.isfinite(drive.v) and math.isfinite(drive.w)):
+        raise InvalidValueError("drive", tuple(drive), "v and ω, two finite numbers, from the controller")
+    return drive
+
+
+def _scaled(drive: Drive, share: float) -> Drive:
+    return Drive(drive.v * share, drive.w * share)
+
+
+@dataclass(frozen=True, slots=True)
+@validated
+class ActionAgentConfig:
+    """How the robot's end works."""
+
+    period: Annotated[float, within(1e-4, 1.0, "s")] = 0.01
+    """T: between two sampling times [s], in [1e-4, 1]."""
+    starved: Annotated[float, within(1e-3, 60.0, "s")] = 0.5
+    """How long a command holds when no other comes [s], in [1e-3, 60]."""
+
+
+class ActionAgent:
+    """The robot's end: drives the newest command, echoes probes, reports where it is; it reads no clock.
+
+    It takes messages as they arrive, and has its turn once a period. The policy of the link is `hold`: a starved
+    robot stops, and goes on with the next command; there's no age gate.
+    """
+
+    def __init__(self, config: ActionAgentConfig | None = None) -> None:
+        """Stand until the first command."""
+        self.config = ActionAgentConfig() if config is None else config
+        self._newest: DriveSetpoint | None = None
+        self._since = -math.inf
+        self._reports = 0
+        self.stale = 0
+        """Commands that were dropped, as they came behind a newer one."""
+
+    def receive(self, message: DriveSetpoint | Probe, *, now: float) -> Echo | None:
+        """Take a message from the control agent.
+
+        Args:
+            message: A command, or a probe.
+            now: When it arrived [s], by the robot's clock.
+
+        Returns:
+            What answers a probe, at once; None for a command.
+        """
+        if isinstance(message, Probe):
+            return message.echo(now)
+        if self._newest is not None and message.number <= self._newest.number:
+            self.stale += 1
+            return None
+        if all(map(math.isfinite, message.drive)):
+            self._newest, self._since = message, now
+        return None
+
+    def sample(self, posture: Posture, *, now: float) -> DriveFeedback:
+        """Have a turn: what to drive from now on is in the report that goes back.
+
+        Args:
+            posture: Where the robot takes itself to be.
+            now: By the robot's clock [s].
+        """
+        self._reports += 1
+        return DriveFeedback(self._reports - 1, posture, self.driving(now=now))
+
+    def driving(self, *, now: float) -> Drive:
+        """What the robot drives now [s], by its own clock."""
+        if self._newest is None or now - self._since > self.config.starved:
+            return STAND
+        return self._newest.drive
+
 
 Controller: TypeAlias = Callable[[Posture], tuple[float, float]]
 """Makes v [m/s] and ω [rad/s] of where the robot is."""

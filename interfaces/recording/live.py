@@ -20,7 +20,7 @@ from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
 from interfaces.teleop import CommandRecord, Correction, Report, RobotLine, Sample
-from interfaces.teleop.measured import PERIOD
+from interfaces.teleop.samples import PERIOD
 from interfaces.wire import fields
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel

@@ -42,7 +42,7 @@ from interfaces.runs.twin_run import CommandPacket, RunEvent, RunFacts, Turn, Tw
 from interfaces.system import software
 from interfaces.teleop import CommandRecord, OperatorSite
 from interfaces.teleop.architectures import ArchitectureOperatorSite
-from interfaces.teleop.architectures.equipment import CONTROL, grid_of
+from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from interfaces.wire.fields import text
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import MobileRobot

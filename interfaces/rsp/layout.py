@@ -36,10 +36,10 @@ from interfaces.rsp.model.elements import (
     MemoryEvent,
     Module,
     Monitor,
+    RobotModel,
     Sensor,
 )
-from interfaces.rsp.model.robot_model import RobotModel
-from interfaces.rsp.security import OVERHEAD
+from interfaces.rsp.session import OVERHEAD
 from vrs.errors import InvalidValueError
 
 ID: Final = struct.Struct("!H")

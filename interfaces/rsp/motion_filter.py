@@ -17,8 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from interfaces.rsp.model.elements import Effector, Filling
-from interfaces.rsp.model.robot_model import RobotModel
+from interfaces.rsp.model.elements import Effector, Filling, RobotModel
 from vrs.checks import validated, within
 
 Values = tuple[float, ...]

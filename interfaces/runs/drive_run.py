@@ -15,7 +15,7 @@ from interfaces.teleop.architectures import (
     Constants,
     Transport,
 )
-from interfaces.teleop.architectures.equipment import CONTROL, POSITIONS
+from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
 from robots.ipr.reality import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot

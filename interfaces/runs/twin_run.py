@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
-from interfaces.link.delay import MAX_DELAY
+from interfaces.link.delays import MAX_DELAY
 from interfaces.teleop import Correction, OperatorSite
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime

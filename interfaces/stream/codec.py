@@ -21,7 +21,7 @@ from interfaces.stream.wire import messages as message_wires
 from interfaces.stream.wire import mobile as mobile_wires
 from interfaces.stream.wire import sites
 from interfaces.stream.wire.segments import Packed, Plain
-from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
+from interfaces.teleop.driving.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
 from interfaces.wire.fields import Message as Wire
 from interfaces.wire.fields import check_normal, plain

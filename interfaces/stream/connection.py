@@ -32,7 +32,7 @@ from interfaces.stream.control import (
 )
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
-from interfaces.teleop.tasks import Doing, Go
+from interfaces.teleop.driving.messages import Doing, Go
 from robots.onboard.journey import Goal
 from vrs.clock import WallClock
 from vrs.commands import DriveCommand, Stop

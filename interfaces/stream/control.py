@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, TypeAlias
 
-from interfaces.link.gauge import LinkFigures
+from interfaces.link.packets import LinkFigures
 from interfaces.link.round_trip import Ping, Pong
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import FormatError

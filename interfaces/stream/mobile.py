@@ -8,7 +8,7 @@ from typing import ClassVar, TypeAlias
 
 from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
 from interfaces.stream.control import PROTOCOL, Lease, Role
-from interfaces.teleop.tasks import Doing, Go, Point
+from interfaces.teleop.driving.messages import Doing, Go, Point
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from vrs.mobile import DriveLimits

@@ -1,13 +1,24 @@
 """Both sites of a teleoperated robot: messages, the operator's, the robot's."""
 
-from interfaces.teleop.host import RobotHost, RobotHostConfig
-from interfaces.teleop.line import RobotLine
-from interfaces.teleop.measured import Sample
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.observers import CommandRecord, Correction, SiteObserver
-from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
-from interfaces.teleop.operator import OperatorSite, OperatorSiteConfig
-from interfaces.teleop.robot import JointReference, RobotSite, RobotSiteConfig
+from interfaces.teleop.operator import (
+    CommandRecord,
+    Correction,
+    OperatorSite,
+    OperatorSiteConfig,
+    RobotLine,
+    SiteObserver,
+)
+from interfaces.teleop.robot import (
+    AdaptiveOffset,
+    JointReference,
+    OffsetConfig,
+    RobotHost,
+    RobotHostConfig,
+    RobotSite,
+    RobotSiteConfig,
+)
+from interfaces.teleop.samples import Sample
 
 __all__ = [
     "AdaptiveOffset",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from interfaces.teleop.measured import Ranges, Sample
+from interfaces.teleop.samples import Ranges, Sample
 from vrs.commands import Command
 from vrs.ledger import Receipt
 from vrs.model import Array
@@ -46,7 +46,7 @@ class Orders:
     entries: tuple[LogEntry, ...] = ()
     """New ones, and older ones that may have been lost."""
     wanted: Ranges = ()
-    """Samples that are missing; see `interfaces.teleop.measured`."""
+    """Samples that are missing; see `interfaces.teleop.samples`."""
     halted: str = ""
     """Why the operator's site commands no more until somebody resumes: the robot is to stop and wait for that."""
 

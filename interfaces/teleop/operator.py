@@ -3,27 +3,162 @@
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
-from interfaces.teleop.logged_engine import LoggedEngine, resolved
-from interfaces.teleop.measured import Gathering, Sample
+from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.observers import CommandRecord, Correction, SiteObserver
+from interfaces.teleop.samples import Gathering, Sample
 from interfaces.wire.commands import check_crosses
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
-from vrs.commands import Command, Lateness, Position
+from vrs.commands import (
+    Cancel,
+    Command,
+    InsertVia,
+    JointTarget,
+    Lateness,
+    Motion,
+    MotionCommand,
+    Position,
+    PositionQuery,
+    Resume,
+    Retime,
+    ScaleTime,
+    SteerCommand,
+    Stop,
+)
 from vrs.engine import Engine
 from vrs.errors import PlanningError, VrsError
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
+
+
+class Correction(NamedTuple):
+    """The virtual robot was put where the real one is going."""
+
+    t: float
+    """When, by the operator's clock [s]."""
+    end: float
+    """Until when it takes [s]."""
+    error: Array
+    """By how much it was off [rad], (n,)."""
+    reason: str
+
+
+class CommandRecord(NamedTuple):
+    """A command that the operator's engine was given, and what became of it."""
+
+    at: float
+    """The engine's time when it was [s]."""
+    command: Command | None
+    """None took back the newest."""
+    receipt: Receipt | None
+    """None where there's none, as for a parameter."""
+    refused: bool
+    """Whether the site refused it, so that it was never tried."""
+
+
+class SiteObserver(Protocol):
+    """Who is told of all that happens, at once: it must not take long, and changes nothing."""
+
+    def commanded(self, deed: CommandRecord) -> None:
+        """The engine was given a command. What raised isn't told: it changed nothing, and took no id."""
+
+    def corrected(self, correction: Correction, truth: Timeline) -> None:
+        """The engine's timeline has joined another one."""
+
+    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
+        """The robot's engine has answered a command of the operator's: its id there, and the answer."""
+
+    def reported(self, report: Report, *, now: float) -> None:
+        """A report has come that is newer than all before."""
+
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
+        """Samples of the robot have come that weren't known: mostly the newest, some of them late."""
+
+    def failed(self, error: Exception) -> None:
+        """Being told raised this: nothing more is told."""
+
+
+class LoggedEngine(Engine):
+    """An engine that asks whether it may, and tells what it was given; if that raises, nothing has happened."""
+
+    def __init__(
+        self,
+        refusal: Callable[[], str],
+        told: Callable[[CommandRecord, int], None],
+        model: RobotModel,
+        *,
+        q: Array,
+        clock: ManualClock,
+        lateness: Lateness,
+    ) -> None:
+        """Make an engine.
+
+        Args:
+            refusal: Says why commands are refused now; empty if they aren't.
+            told: Is told what it was given, and the newest id before that.
+            model: See `Engine`, as for the rest.
+            q: Initial joints.
+            clock: The operator's.
+            lateness: What happens to late commands.
+        """
+        super().__init__(model, q=q, clock=clock, lateness=lateness)
+        self._refusal, self._tell = refusal, told
+
+    def execute(self, command: Command) -> Any:
+        """Carry out a command; see `Engine.execute`."""
+        if isinstance(command, PositionQuery):
+            return super().execute(command)
+        with self.atomic():
+            reason, newest = self._refusal(), self.newest
+            answer: Receipt | None = self.refuse(command, reason) if reason else super().execute(command)  # type: ignore[arg-type]
+            self._tell(CommandRecord(self.now(), command, answer, bool(reason)), newest)
+            return answer
+
+    def undo(self) -> Receipt | None:
+        """Take back the newest command; see `Engine.undo`."""
+        if self._refusal():
+            return None
+        with self.atomic():
+            newest = self.newest
+            answer = super().undo()
+            if answer is not None:
+                self._tell(CommandRecord(self.now(), None, answer, False), newest)
+            return answer
+
+    def undo_refusal(self) -> str:
+        """Why nothing is taken back now; see `Engine.undo_refusal`."""
+        return self._refusal() or super().undo_refusal()
+
+
+def resolved(command: Command, answer: Receipt, now: float) -> Command:
+    """The command with the stamps that it got, and joints for a pose."""
+    issued = getattr(command, "issued_at", None)
+    issued = now if issued is None else issued
+    if isinstance(command, MotionCommand):
+        target = command.target
+        if command.motion is Motion.JOINT and answer.q is not None:
+            target = JointTarget(answer.q)
+        when = answer.execute_at if command.deviation == 0 else command.execute_at
+        return replace(command, target=target, issued_at=issued, execute_at=when)
+    if isinstance(command, (Cancel, InsertVia)) and command.execute_at is None:
+        return replace(command, issued_at=issued, execute_at=max(now, issued))
+    if isinstance(command, SteerCommand):
+        return replace(command, issued_at=issued, execute_at=max(now, issued, command.execute_at or now))
+    if isinstance(command, (ScaleTime, Stop, Resume)):
+        return replace(command, issued_at=issued, execute_at=answer.execute_at)
+    if isinstance(command, (Retime, Cancel, InsertVia)):
+        return replace(command, issued_at=issued)
+    return command
+
 
 NOT_FOLLOWING = "the robot doesn't follow"
 """How refusals begin while the real robot has stopped by itself."""
@@ -387,3 +522,7 @@ def _differs(mine: Timeline, other: Timeline, t: float) -> bool:
     middle = 0.5 * (moments[1:] + moments[:-1])
     moments = np.concatenate([moments, middle])
     return bool(np.abs(mine.sample(moments) - other.sample(moments)).max() > _SAME)
+
+
+RobotLine: TypeAlias = SiteLine[OperatorSite, Orders, Report]
+"""To an arm."""

@@ -11,18 +11,18 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from interfaces.engine_server.site import engine_time
-from interfaces.teleop.hosting import lost
-from interfaces.teleop.measured import SampleLog
+from interfaces.link.delays import share_of
+from interfaces.link.round_trip import RelativeDelays, WindowConfig
+from interfaces.teleop.connection import Host, HostConfig, lost
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
-from interfaces.teleop.received import ReceivedLog
+from interfaces.teleop.samples import SampleLog
 from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
 from robots.onboard.stamps import Stamp, Verdict
@@ -39,6 +39,95 @@ from vrs.model import Array, RobotModel
 from vrs.planning.jerk_limited import stop
 from vrs.segment import HOLD, State
 from vrs.timeline import Timeline
+
+
+@dataclass(frozen=True, slots=True)
+@validated
+class OffsetConfig:
+    """How much delay is hidden."""
+
+    share: float = 0.95
+    """Share of the messages that come early enough, in (0, 1)."""
+    margin: Annotated[float, within(0.0, 60.0)] = 0.05
+    """Added to the quantile [s], in [0, 60]: for what the window hasn't seen."""
+    window: Annotated[int, within(10, 100_000)] = 2000
+    """Messages that count, in [10, 100000]."""
+    horizon: Annotated[float, within(1.0, 86_400.0)] = 120.0
+    """Age at which a message counts no more [s], in [1, 86400]."""
+
+    def __post_init__(self) -> None:
+        share_of(self.share)
+
+
+class AdaptiveOffset:
+    """D = −(quantile of the age of completeness + margin), by the robot's own clock.
+
+    The age is how far the newest complete time lay behind the robot's clock just before a message came: delay,
+    heartbeat period, losses and an unknown difference of the clocks are all in it, so that none need be known.
+    """
+
+    def __init__(self, config: OffsetConfig | None = None) -> None:
+        self._config = OffsetConfig() if config is None else config
+        self._ages = RelativeDelays(WindowConfig(self._config.window, self._config.horizon))
+
+    def heard(self, complete_until: float, *, now: float) -> None:
+        """A message came.
+
+        Args:
+            complete_until: Up to where the timeline was known to be complete before it [s].
+            now: By the robot's clock [s].
+        """
+        self._ages.receive(complete_until, now=now)
+
+    @property
+    def D(self) -> float | None:
+        """Timeline time less the robot's clock [s]; None before the first message."""
+        age = self._ages.quantile(self._config.share)
+        return None if age is None else -(age + self._config.margin)
+
+
+WAITING_MOST = 4096
+"""Most entries that wait for earlier ones."""
+
+
+class ReceivedLog:
+    """Which entries came, and up to when the timeline is complete with those that were carried out."""
+
+    def __init__(self, complete_until: float) -> None:
+        self.executed = 0
+        self.complete_until = complete_until
+        self._waiting: dict[int, LogEntry] = {}
+        self._early: set[int] = set()
+        self._claims: deque[tuple[int, float]] = deque(maxlen=WAITING_MOST)
+
+    def due(self, entries: tuple[LogEntry, ...], *, as_they_come: bool) -> list[LogEntry]:
+        """Entries to be carried out now, each once."""
+        new = [e for e in entries if e.number > self.executed and e.number not in self._early]
+        if as_they_come:
+            due = list({e.number: e for e in new}.values())
+            self._early.update(e.number for e in due)
+            while self.executed + 1 in self._early:
+                self._early.remove(self.executed + 1)
+                self.executed += 1
+            return due
+        for entry in new:
+            if len(self._waiting) < WAITING_MOST:
+                self._waiting.setdefault(entry.number, entry)
+        due = []
+        while self.executed + 1 in self._waiting:
+            self.executed += 1
+            due.append(self._waiting.pop(self.executed))
+        return due
+
+    def claim(self, newest: int, complete_until: float) -> None:
+        """A message said that with all entries up to the newest nothing changes before a time."""
+        self._claims.append((newest, complete_until))
+        held = [c for c in self._claims if c[0] > self.executed]
+        if len(held) < len(self._claims):
+            kept = max(c[1] for c in self._claims if c[0] <= self.executed)
+            self.complete_until = max(self.complete_until, kept)
+            self._claims = deque(held, maxlen=WAITING_MOST)
+
 
 _TELL_MOST = 4096
 """Most receipts that wait to be reported."""
@@ -405,3 +494,86 @@ class RobotSite:
         since = timeline.start_of(low) if low < len(timeline) else timeline.end
         segments = tuple(timeline.segment(i) for i in range(low, high))
         return PlanPart(timeline.version, since, timeline.sample(since), segments)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotHostConfig(HostConfig):
+    """How an arm's end of a connection behaves."""
+
+    site: RobotSiteConfig = field(default_factory=RobotSiteConfig)
+    """How its site behaves."""
+
+    def decided(self) -> RobotSiteConfig:
+        """How the site behaves that decides a lead ahead: a stop at T_loss is decided that much sooner."""
+        watchdog = self.site.watchdog
+        if watchdog is None:
+            return self.site
+        return replace(self.site, watchdog=replace(watchdog, timeout=max(watchdog.timeout - self.lead, 0.1)))
+
+
+class RobotHost(Host[RobotSite, Orders, Report]):
+    """An arm's end of a connection: what its body is to do are joints.
+
+    Everything is decided some `lead` ahead of the robot's clock: what the body has been given for the next ticks
+    never changes.
+    """
+
+    def __init__(
+        self, model: RobotModel, q: Array, *, now: float, config: RobotHostConfig | None = None, seed: int = 0
+    ) -> None:
+        """Stand at rest, and wait for an operator.
+
+        Args:
+            model: The robot.
+            q: Joints [rad], (n,).
+            now: By the robot's clock [s].
+            config: How to behave.
+            seed: Random number in [0, 2**32), new for each life of the robot: echoes of an earlier one don't count.
+        """
+        self.config = RobotHostConfig() if config is None else config
+        super().__init__(self.config, now=now, seed=seed)
+        self._model = model
+        self._q = np.array(q, float)
+
+    def _make(self, t: float) -> RobotSite:
+        site = replace(self.config.site, watchdog=self.watchdog(self.config.site.watchdog))
+        config = replace(self.config, site=site).decided()
+        reported = max(0, math.floor(1000.0 * t))
+        return RobotSite(self._model, self._q, now=t, config=config, reported=reported)
+
+    def _left(self, site: RobotSite, now: float) -> None:  # noqa: ARG002 - it's this site's
+        self._q = self.reference(np.array([now])).q[0]
+
+    def reference(self, t: Array) -> JointReference:
+        """What the body is to do, (k, n) each, at ascending times of the robot's clock [s] if no more is heard."""
+        if self.site is None:
+            still = np.zeros((len(t), len(self._q)))
+            return JointReference(still + self._q, still, still)
+        play = self.site.foreseen(np.asarray(t, float) + self.offset)
+        return self.site.reference(play)
+
+    def measured(self, q: Array, *, at: float, now: float) -> bool:
+        """Take in measured joints.
+
+        Args:
+            q: Joints [rad], (n,).
+            at: When they were to be there, by the robot's clock [s].
+            now: By the robot's clock [s].
+
+        Returns:
+            Whether one is too far away, so that the robot stops and is to be held where it was measured.
+        """
+        return self.site is not None and self.site.measured(q, now=self.site_time(now), at=at + self.offset)
+
+    def fault(self, reason: str, q: Array, *, now: float) -> None:
+        """Stop, for the body has left its references by itself.
+
+        Args:
+            reason: What to report.
+            q: Where it will rest [rad], (n,).
+            now: By the robot's clock [s].
+        """
+        if self.site is None:
+            self._q = np.array(q, float)
+        else:
+            self.site.halt(reason, now=self.site_time(now), measured=q)

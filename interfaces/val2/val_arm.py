@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from typing_extensions import override
 
-from interfaces.jobs.carrying import ArmControl
+from interfaces.jobs.devices import ArmControl
 from interfaces.jobs.values import ArmJob
 from vrs.model import Array
 

@@ -33,9 +33,9 @@ from interfaces.stream.connection import MobileConnection
 from interfaces.stream.control import Lease, Problem, Role
 from interfaces.stream.mobile import Tasks
 from interfaces.stream.server import application
-from interfaces.teleop.architectures.equipment import CONTROL
+from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving import DrivenConfig
-from interfaces.teleop.tasks import Doing
+from interfaces.teleop.driving.messages import Doing
 from robots import ipr
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place

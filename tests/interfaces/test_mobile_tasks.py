@@ -12,8 +12,8 @@ from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
 from interfaces.stream.mobile import Plan, Tasks, Trial
 from interfaces.stream.session import News
+from interfaces.teleop.driving.messages import Doing, Go
 from interfaces.teleop.driving.operator import NOT_MET
-from interfaces.teleop.tasks import Doing, Go
 from robots.bullet.rooms import Place, Room
 from robots.ipr.chassis import chassis
 from robots.onboard.journey import Goal

@@ -11,7 +11,7 @@ from interfaces import Supervisor
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import LogEntry, OperatorSite, Orders, RobotSite, RobotSiteConfig
-from interfaces.teleop.received import ReceivedLog
+from interfaces.teleop.robot import ReceivedLog
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop

@@ -9,8 +9,8 @@ import numpy as np
 
 from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
+from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
-from interfaces.link.profiles import delay_profile
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.teleop.architectures import (
     ArchitectureOperatorSite,
@@ -19,7 +19,7 @@ from interfaces.teleop.architectures import (
     Transport,
     controller,
 )
-from interfaces.teleop.architectures.equipment import (
+from interfaces.teleop.architectures.compositions import (
     CONTROL,
     POSITIONS,
     SENSING,

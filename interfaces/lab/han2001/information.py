@@ -11,7 +11,7 @@ from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
 from interfaces.lab.drawing import REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
 from interfaces.link import Channel, Conditions, Service, delay_profile
-from interfaces.link.delay import DelaySource
+from interfaces.link.delays import DelaySource
 from vrs.model import Array
 
 if TYPE_CHECKING:

@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.link.conditions import Conditions, LinkConditions
+from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
 from interfaces.link.losses import loss_model
-from interfaces.link.profiles import delay_profile
 from interfaces.rsp.model import RobotModel, read_model
-from interfaces.rsp.schemes import scheme
-from interfaces.rsp.schemes.ends import LocalEnd, ReportedPosition, Rims, RobotEnd
-from interfaces.rsp.schemes.scheme import SchemeConfig
+from interfaces.rsp.schemes import LocalEnd, ReportedPosition, Rims, RobotEnd, SchemeConfig, scheme
 from robots.cubo import parameters as p
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses

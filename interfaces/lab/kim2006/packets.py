@@ -12,10 +12,9 @@ from interfaces.lab.drawing import GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.kim2006.following import cubo_model
 from interfaces.rsp import header
 from interfaces.rsp.header import PacketType
-from interfaces.rsp.local import LocalConfig, LocalCore, LocalState
-from interfaces.rsp.period import PeriodConfig
+from interfaces.rsp.local import LocalConfig, LocalCore, LocalState, PeriodConfig
 from interfaces.rsp.robot import RobotCore
-from interfaces.rsp.security import OVERHEAD, Keyring, Rank
+from interfaces.rsp.session import OVERHEAD, Keyring, Rank
 
 T: Final = 0.02
 """The paper's period [s]."""

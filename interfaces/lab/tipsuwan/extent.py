@@ -14,7 +14,7 @@ from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent
 from interfaces.lab.tipsuwan.s_paths import s_path
 from interfaces.lab.tipsuwan.success import MOST_RATIO, SuccessResult, seen, succeeds
 from interfaces.link import DelayProfile
-from interfaces.link.delay import CORRELATION_TIME
+from interfaces.link.delays import CORRELATION_TIME
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

@@ -19,7 +19,7 @@ from interfaces.middleware import (
     drive_measure,
     train,
 )
-from interfaces.middleware.training import Errors, errors, examples
+from interfaces.middleware.network import Errors, errors, examples
 from robots.onboard.driving import Drive, Posture
 from vrs.clock import WallClock
 from vrs.model import Array

@@ -12,7 +12,7 @@ import numpy as np
 from interfaces.lab.tipsuwan.predictive import PredictiveConfig, PredictiveController
 from interfaces.lab.tipsuwan.s_paths import START
 from interfaces.link import Channel, Conditions, ConstantDelay, DelayProfile, Echo, HeavyTailedDelay, Probe
-from interfaces.link.delay import CORRELATION_TIME
+from interfaces.link.delays import CORRELATION_TIME
 from interfaces.middleware import (
     ActionAgent,
     ActionAgentConfig,

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from interfaces.link.conditions import Conditions, Service
+from interfaces.link.conditions import Conditions, LinkPath, Service
+from interfaces.link.link import Stream
 from interfaces.link.packets import PacketLog
-from interfaces.link.path import LinkPath
-from interfaces.link.stream import Stream
 from interfaces.timer import Timer, TimerLateness
 from vrs.clock import Clock
 

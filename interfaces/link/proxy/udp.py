@@ -7,7 +7,7 @@ import socket
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from interfaces.link.channel import Channel
+from interfaces.link.link import Channel
 from interfaces.timer import Timer, TimerLateness
 from vrs.clock import Clock
 

@@ -11,10 +11,11 @@ from interfaces.rsp.model.elements import (
     Module,
     Monitor,
     OnLoss,
+    RobotModel,
     Scalar,
     Sensor,
+    example,
 )
-from interfaces.rsp.model.robot_model import RobotModel, example
 from interfaces.rsp.model.xmi import parse_model, read_model, write_model
 
 __all__ = [

@@ -15,8 +15,18 @@ from pathlib import Path
 from typing import Any, Final
 from xml.parsers import expat
 
-from interfaces.rsp.model.elements import KINDS, Effector, Element, Filling, Module, Monitor, OnLoss, Scalar
-from interfaces.rsp.model.robot_model import MOST_ELEMENTS, RobotModel
+from interfaces.rsp.model.elements import (
+    KINDS,
+    MOST_ELEMENTS,
+    Effector,
+    Element,
+    Filling,
+    Module,
+    Monitor,
+    OnLoss,
+    RobotModel,
+    Scalar,
+)
 from interfaces.system import read_within
 from vrs.errors import FormatError, InvalidValueError
 

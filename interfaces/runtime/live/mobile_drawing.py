@@ -12,7 +12,7 @@ import numpy as np
 from interfaces.stream.meshcat import Committed, MobileScene
 from interfaces.stream.meshcat.driving import PIECE
 from interfaces.teleop.driving import DrivingOperator
-from interfaces.teleop.tasks import Doing, Point
+from interfaces.teleop.driving.messages import Doing, Point
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
 from vrs.mobile import ArcPiece, ArcTimeline, Grid, MobileModel, wrapped

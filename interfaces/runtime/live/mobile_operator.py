@@ -28,11 +28,11 @@ from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.mobile import Postures, Tasks, Wanted
 from interfaces.stream.server import HubServer
-from interfaces.teleop.architectures import DriveReport, OperatorSurroundings
-from interfaces.teleop.architectures.equipment import grid_of, operator_surroundings
+from interfaces.teleop.architectures import OperatorSurroundings
+from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator
+from interfaces.teleop.driving.messages import Doing, DriveReport
 from interfaces.teleop.driving.operator import BY_ITSELF, FREE, STOPPED
-from interfaces.teleop.tasks import Doing
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import chassis

@@ -28,8 +28,8 @@ from interfaces.jobs.values import LONGEST_NAME, MOST_PLACES
 from interfaces.stream.mobile import Plan, Seen, Tasks, Trial, Wanted
 from interfaces.stream.session import News
 from interfaces.teleop.driving import DrivingOperator
+from interfaces.teleop.driving.messages import Doing, Go, SensedPoints, TaskReport
 from interfaces.teleop.driving.operator import NOT_MET
-from interfaces.teleop.tasks import Doing, Go, SensedPoints, TaskReport
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.navigation import outline_of, route_map

@@ -18,7 +18,7 @@ from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.control import Attached, Hello, Problem, ProtocolError, Role
 from interfaces.teleop import Report
-from interfaces.teleop.line import SiteLine
+from interfaces.teleop.connection import SiteLine
 from robots.onboard import LossPolicy
 from vrs.clock import Clock
 from vrs.errors import VrsError

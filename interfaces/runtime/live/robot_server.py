@@ -19,7 +19,7 @@ from interfaces.stream.control import PROTOCOL, Attached, Hello, Problem, Proble
 from interfaces.stream.server import Endpoint
 from interfaces.stream.sockets import let_stay
 from interfaces.teleop import Orders
-from interfaces.teleop.hosting import Host
+from interfaces.teleop.connection import Host
 from robots.onboard import LossPolicy
 from vrs.checks import one_of
 from vrs.clock import Clock

@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.link.gauge import LinkFigures
+from interfaces.link.packets import LinkFigures
 from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control
 from interfaces.stream.control import ProblemCode, Role

@@ -8,15 +8,25 @@ from msgspec import Meta
 from typing_extensions import override
 
 from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
-from interfaces.jobs.forms import GoalForm, JobListForm, ProgressForm
+from interfaces.jobs.file import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
 from interfaces.stream import mobile
 from interfaces.stream.control import Role
 from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
 from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
-from interfaces.teleop.architectures.messages import DriveOrders, DriveReport
-from interfaces.teleop.architectures.segments import MOST_REPEATED
-from interfaces.teleop.tasks import MOST_POINTS, Doing, Errand, Go, Halt, SensedPoints, Task, TaskReport
+from interfaces.teleop.architectures.sites import MOST_REPEATED
+from interfaces.teleop.driving.messages import (
+    MOST_POINTS,
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    Task,
+    TaskReport,
+)
 from interfaces.wire.fields import (
     Count,
     Epoch,

@@ -8,8 +8,8 @@ from msgspec import Meta
 from typing_extensions import override
 
 from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
-from interfaces.teleop.measured import AGAIN, NEW, RANGES, Sample
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
+from interfaces.teleop.samples import AGAIN, NEW, RANGES, Sample
 from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.wire.fields import (
     Count,

@@ -12,20 +12,22 @@ from interfaces.teleop.architectures.compositions import (
     controller,
 )
 from interfaces.teleop.architectures.controllers import (
-    DriveController,
     Filtered,
     FollowingController,
     Immediate,
     PlayerConfig,
     TimelineController,
 )
-from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
-from interfaces.teleop.architectures.segments import ArcPacket, Receiver, Sender, Transport
 from interfaces.teleop.architectures.sites import (
     ArchitectureOperatorSite,
     ArchitectureReport,
     ArchitectureRobotSite,
+    ArcPacket,
+    DriveController,
     PositionSource,
+    Receiver,
+    Sender,
+    Transport,
 )
 from interfaces.teleop.architectures.surroundings import (
     Aim,
@@ -46,8 +48,6 @@ __all__ = [
     "CellChanges",
     "Constants",
     "DriveController",
-    "DriveOrders",
-    "DriveReport",
     "Filtered",
     "FollowingController",
     "Immediate",
@@ -62,5 +62,4 @@ __all__ = [
     "Transport",
     "architecture",
     "controller",
-    "is_still",
 ]

@@ -1,23 +1,39 @@
-"""The architectures by name: which controller each is, with one set of constants for every network."""
+"""The architectures by name, with one set of constants for every network, and what they take from a real robot."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Final, TypeAlias
 
+import numpy as np
+from typing_extensions import override
+
 from interfaces.system import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
-    DriveController,
     Filtered,
     FollowingController,
     Immediate,
     PlayerConfig,
     TimelineController,
 )
+from interfaces.teleop.architectures.sites import DriveController, PositionSource
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings, Sonar
+from robots.bullet.rooms import EMPTY, Room
+from robots.ipr.chassis import Chassis
+from robots.ipr.floor_plan import FloorPlan
+from robots.ipr.navigation import mounts_of, outline_of
+from robots.ipr.parameters import CELL, CELLS
+from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
+from robots.ipr.robot import MobileRobot
+from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
+from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
+from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
 from vrs.checks import number_in, one_of, validated, within
+from vrs.mobile import Avoidance, Grid, MobileModel, VirtualEnvironment
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,3 +105,95 @@ def controller(name: str, posture: Posture, constants: Constants) -> DriveContro
     made = architecture(name)(constants, posture)
     checked("architecture", name, made, ("receive", "control", "executed"))
     return made
+
+
+CONTROL = 0.05
+"""Period of the real robot's control [s]."""
+SENSING = ("extended",)
+"""Architectures whose robot has sonars, and whose operator has the map of the room."""
+POSITIONS: Final[dict[str, Callable[[MobileRobot], PositionSource]]] = {
+    "fused": FusedPosition,
+    "laser": LaserPosition,
+    "odometry": OdometryPosition,
+    "truth": TruePosition,
+}
+"""What can tell a robot where it is."""
+_ROUNDING = 1e-9
+MARGIN = 0.02
+"""Of the virtual robot's circle round the real one's outline [m]."""
+
+
+class BodySonar(Sonar):
+    """A real robot's sonars."""
+
+    def __init__(self, body: MobileRobot, since: float = 0.0) -> None:
+        """Take the robot; times count from `since` [s] of its own."""
+        self._body, self._since = body, since
+
+    @override
+    def scan(self) -> tuple[float, Sequence[float]] | None:
+        scan = self._body.sonar
+        return None if scan is None else (scan.time - self._since, scan.ranges.tolist())
+
+
+def grid_of(room: Room, start: Posture) -> Grid:
+    """Cells of a room; where there's none, the paper's number of them around the start."""
+    if room is EMPTY:
+        return Grid(CELLS, CELL, (start.x - CELLS[0] * CELL / 2, start.y - CELLS[1] * CELL / 2))
+    m, n = (math.ceil(size / CELL - _ROUNDING) for size in (room.length, room.width))
+    return Grid((m, n), CELL)
+
+
+def operator_surroundings(room: Room, chassis: Chassis, start: Posture, model: MobileModel) -> OperatorSurroundings:
+    """The virtual environment with the room's known map, and what keeps the virtual robot out of it.
+
+    Args:
+        room: Where the real robot drives.
+        chassis: Its size.
+        start: Where both robots begin.
+        model: The virtual robot.
+    """
+    grid = grid_of(room, start)
+    known = _known(room, grid, 0.0)
+    environment = VirtualEnvironment(grid.shape, cell=grid.cell, origin=grid.origin, walls=known)
+    outline = outline_of(chassis)
+    radius = math.hypot(max(outline.front, outline.rear), chassis.width / 2) + MARGIN
+    return OperatorSurroundings(environment, Avoidance(model.limits, radius, period=model.period))
+
+
+def robot_surroundings(
+    body: MobileRobot, start: Posture, controller: DriveController, period: float, *, since: float = 0.0
+) -> RobotSurroundings:
+    """What the real robot has on board of it.
+
+    Args:
+        body: The real robot, with sonars.
+        start: Where it begins.
+        controller: What drives it.
+        period: Between two drives [s].
+        since: The body's time that is 0 of the drive's [s].
+    """
+    near, far = body.chassis.sonar_reach
+    mounts = mounts_of(body)
+    sonar = body.senses.sonar
+    half_cone = 0.0 if sonar is None else sonar.half_angle
+    grid = grid_of(body.room, start)
+    seen = SupervisorConfig(mounts, half_cone=half_cone, range_min=near, range_max=far)
+    outline = outline_of(body.chassis)
+    careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
+    avoidance = ObstacleAvoidance(careful)
+    return RobotSurroundings(
+        BodySonar(body, since),
+        EnvironmentSupervisor(grid, _known(body.room, grid, body.chassis.sonar_height), seen),
+        avoidance,
+        MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
+        Yielding(YieldingConfig(outline), avoidance),
+        controller if isinstance(controller, FollowingController) else None,
+    )
+
+
+def _known(room: Room, grid: Grid, height: float) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    """Cells of the known map's things that are at least so high [m]; none where there's no room."""
+    if room is EMPTY:
+        return np.zeros(grid.shape, bool)
+    return FloorPlan(room.known(), height).grid(grid.cell, grid.shape, 0.0)

@@ -9,10 +9,9 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
-from interfaces.teleop.architectures.segments import ArcPacket
-from interfaces.teleop.offset import AdaptiveOffset, OffsetConfig
+from interfaces.teleop.architectures.sites import ArcPacket
+from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import MovingPath, PathGenerator, PathGeneratorConfig
@@ -24,32 +23,6 @@ STARVED = 0.5
 """Architecture I holds a command until the next, but no longer than this [s]: the robot's watchdog."""
 _ROUNDING = 1e-9
 """Times nearer than this [s] are one."""
-
-
-class DriveController(Protocol):
-    """Drives the robot by what comes from the operator; it knows no clock and is called once a control period."""
-
-    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
-        """Take in a packet.
-
-        Args:
-            arcs: The operator's arcs whose turn it is now, in order, each once.
-            packet: What they came in.
-            now: By the robot's clock [s].
-        """
-
-    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
-        """Say what to drive until the next call.
-
-        Args:
-            posture: Where the robot takes itself to be.
-            now: By the robot's clock [s].
-            v_before: Linear speed that it was told to drive last [m/s].
-        """
-
-    @property
-    def executed(self) -> int:
-        """Index j of eq. (9): how many of the operator's commands the robot has executed."""
 
 
 class Immediate:

@@ -1,11 +1,8 @@
 """Both sites of a mobile robot that is driven live, round the parts of `interfaces.teleop.architectures`."""
 
-from interfaces.teleop.driving.autonomy import Autonomy, Hands
-from interfaces.teleop.driving.deviation import Deviation, PathDeviation
-from interfaces.teleop.driving.host import DrivenHost
-from interfaces.teleop.driving.operator import DriveLine, DrivingOperator
-from interfaces.teleop.driving.pilot import JourneyPilot, Pilot
-from interfaces.teleop.driving.robot import DrivenConfig, DrivenRobot
+from interfaces.teleop.driving.autonomy import Autonomy, Hands, JourneyPilot, Pilot
+from interfaces.teleop.driving.operator import Deviation, DriveLine, DrivingOperator, PathDeviation
+from interfaces.teleop.driving.robot import DrivenConfig, DrivenHost, DrivenRobot
 
 __all__ = [
     "Autonomy",

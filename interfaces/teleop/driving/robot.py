@@ -8,10 +8,18 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
-from interfaces.teleop.architectures.messages import DriveOrders, DriveReport, is_still
+from interfaces.teleop.connection import LOST, Host, HostConfig, lost
 from interfaces.teleop.driving.autonomy import Autonomy
-from interfaces.teleop.hosting import LOST, lost
-from interfaces.teleop.tasks import Doing, Errand, SensedPoints, TaskReport, stops
+from interfaces.teleop.driving.messages import (
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    SensedPoints,
+    TaskReport,
+    is_still,
+    stops,
+)
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.sensor_watch import SoundPosition
@@ -305,3 +313,31 @@ class DrivenRobot:
             return None
         self._told = now, report
         return report
+
+
+class DrivenHost(Host[DrivenRobot, DriveOrders, DriveReport]):
+    """See `Host`; what the body is to do is a drive for each control period."""
+
+    def __init__(
+        self, make: Callable[[float], DrivenRobot], config: HostConfig, *, now: float, seed: int = 0
+    ) -> None:
+        """Stand at rest, and wait for an operator.
+
+        Args:
+            make: Makes the robot's site for an operator's time [s].
+            config: How to behave.
+            now: By the robot's clock [s].
+            seed: See `Host`.
+        """
+        super().__init__(config, now=now, seed=seed)
+        self._make_site = make
+
+    def _make(self, t: float) -> DrivenRobot:
+        return self._make_site(t)
+
+    def _left(self, site: DrivenRobot, now: float) -> None:
+        """Nothing is to be kept: the next site finds the robot where it stands."""
+
+    def drive(self, *, now: float) -> Drive:
+        """What to drive for the next period, from the robot's time now [s] on."""
+        return STAND if self.site is None else self.site.drive(now=self.site_time(now))

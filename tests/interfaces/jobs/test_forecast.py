@@ -19,7 +19,7 @@ from interfaces.jobs import (
     dry_run,
 )
 from interfaces.jobs.values import ArmJob
-from interfaces.teleop.tasks import Doing
+from interfaces.teleop.driving.messages import Doing
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteConfig, RouteMap

@@ -11,8 +11,7 @@ from interfaces.lab.claims import Study
 from interfaces.lab.kim2006 import PAPER, links, narrow, packets
 from interfaces.lab.kim2006.following import Followed, FollowingCase, PathLeader, course, run
 from interfaces.lab.kim2006.links import LinkResult, Pair, pair
-from interfaces.rsp.schemes import SCHEMES
-from interfaces.rsp.schemes.ends import ReportedPosition
+from interfaces.rsp.schemes import SCHEMES, ReportedPosition
 from vrs.errors import InvalidValueError
 
 SMALL = Study(seed=0, runs=2, length=3.0)

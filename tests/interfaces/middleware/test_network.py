@@ -16,12 +16,18 @@ from interfaces.middleware.network import (
     Formulation,
     GainNetwork,
     Ranges,
+    TrainingConfig,
+    _jacobian,
+    _output,
     default_network,
+    errors,
+    examples,
+    lessons,
     load_network,
     read_network,
+    train,
 )
 from interfaces.middleware.performance import optimal_gain
-from interfaces.middleware.training import TrainingConfig, _jacobian, _output, errors, examples, lessons, train
 from vrs.errors import FormatError, InvalidValueError
 
 SMALL = TrainingConfig(neurons=8, epochs=60, factors=41, delays=7)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
+from interfaces.middleware.middleware import predicted
 from interfaces.middleware.performance import (
     LARGEST_EPSILON,
     drive_measure,
@@ -20,7 +21,6 @@ from interfaces.middleware.performance import (
     optimal_ways,
     tolerance,
 )
-from interfaces.middleware.predictor import predicted
 from robots.onboard.driving import Drive, Posture
 from vrs.errors import InvalidValueError
 

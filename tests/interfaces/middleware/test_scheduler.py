@@ -10,10 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.middleware.network import Formulation, default_network
+from interfaces.middleware.middleware import GainScheduler, ScheduleCounts
+from interfaces.middleware.network import Formulation, TrainingConfig, default_network, examples, train
 from interfaces.middleware.performance import drive_measure, optimal_gain
-from interfaces.middleware.scheduler import GainScheduler, ScheduleCounts
-from interfaces.middleware.training import TrainingConfig, examples, train
 from robots.onboard.driving import Drive
 from vrs.errors import InvalidValueError
 

@@ -11,8 +11,7 @@ from interfaces.rsp.model import RobotModel
 from interfaces.rsp.outbox import DeliveryOutcome, Settled
 from interfaces.rsp.outputs import Commanded, LinkLost, Occurred, Stored
 from interfaces.rsp.robot import RobotCore
-from interfaces.rsp.round_trip import PacketRoundTrip
-from interfaces.rsp.security import Keyring, Rank
+from interfaces.rsp.session import Keyring, PacketRoundTrip, Rank
 
 ADDRESS = b"local"
 KEYS = Keyring({Rank.OPERATOR: b"o" * 32, Rank.ADMIN: b"a" * 32})

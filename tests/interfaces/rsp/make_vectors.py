@@ -13,7 +13,7 @@ from typing import Any
 from interfaces.rsp.local import LocalCore
 from interfaces.rsp.model import RobotModel, example, write_model
 from interfaces.rsp.robot import RobotCore
-from interfaces.rsp.security import Keyring, Rank
+from interfaces.rsp.session import Keyring, Rank
 
 PATH = Path(__file__).with_name("vectors.json")
 SECRET = bytes(range(32))

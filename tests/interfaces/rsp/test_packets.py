@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from interfaces.rsp import header
 from interfaces.rsp.errors import PacketError
-from interfaces.rsp.header import Header, PacketType
+from interfaces.rsp.header import MODULUS, Header, PacketType, unwrapped, up_to
 from interfaces.rsp.layout import Layout, PacketDirection
 from interfaces.rsp.model import Effector, MemoryCommand, Module, Monitor, RobotModel, Sensor, example
-from interfaces.rsp.numbers import MODULUS, unwrapped, up_to
 from tests.memory import values_held
 
 HEADERS = st.builds(

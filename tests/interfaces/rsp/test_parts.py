@@ -11,14 +11,12 @@ import pytest
 
 from interfaces.rsp.devices import EffectorDevice
 from interfaces.rsp.errors import FullError
-from interfaces.rsp.local import LocalCore
+from interfaces.rsp.local import LocalCore, PeriodConfig, PeriodControl
 from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import Effector, Filling, RobotModel, example
 from interfaces.rsp.motion_filter import Fastest, MotionFilter, MotionFilterConfig
-from interfaces.rsp.outbox import CommandOutbox, DeliveryOutcome, MemoryOutbox, Settled
+from interfaces.rsp.outbox import CommandOutbox, DeliveryOutcome, MemoryOutbox, Settled, StreamInbox, StreamOutbox
 from interfaces.rsp.outputs import Occurred
-from interfaces.rsp.period import PeriodConfig, PeriodControl
-from interfaces.rsp.streams import StreamInbox, StreamOutbox
 from tests.interfaces.rsp.joined import Network, Pair
 from tests.memory import values_held
 from vrs.clock import ManualClock

@@ -16,8 +16,7 @@ from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import Command, Effector, Filling, MemoryCommand, MemoryEvent, OnLoss, RobotModel
 from interfaces.rsp.outputs import Began, Commanded, SessionEnded, Stored
 from interfaces.rsp.robot import RobotCore
-from interfaces.rsp.security import Rank
-from interfaces.rsp.session import DropReason
+from interfaces.rsp.session import DropReason, Rank
 from tests.interfaces.rsp.joined import ADDRESS, KEYS, Network, Pair
 from vrs.clock import ManualClock
 from vrs.errors import InvalidValueError

@@ -14,8 +14,7 @@ from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.model import example
 from interfaces.rsp.outputs import EndReason, Refused, SessionEnded
 from interfaces.rsp.robot import RobotConfig, RobotCore
-from interfaces.rsp.security import Keyring, Rank
-from interfaces.rsp.session import DropReason
+from interfaces.rsp.session import DropReason, Keyring, Rank
 from tests.interfaces.rsp.joined import ADDRESS, KEYS, Network, Pair
 from vrs.errors import InvalidValueError
 
@@ -281,7 +280,7 @@ def test_the_derivation_is_hkdf() -> None:
     from cryptography.hazmat.primitives.hashes import SHA256
     from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
-    from interfaces.rsp.security import _derived
+    from interfaces.rsp.session import _derived
 
     for length in (16, 32, 64, 70):
         theirs = HKDF(SHA256(), length, b"salt", b"info").derive(b"secret" * 9)

@@ -29,9 +29,18 @@ from interfaces.link.round_trip import Ping, Pong
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.teleop.architectures import ArchitectureReport as Followed
-from interfaces.teleop.architectures import ArcPacket, CellChanges, DriveOrders, DriveReport
+from interfaces.teleop.architectures import ArcPacket, CellChanges
+from interfaces.teleop.driving.messages import (
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    TaskReport,
+)
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.tasks import Doing, Errand, Go, Halt, SensedPoints, TaskReport
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState

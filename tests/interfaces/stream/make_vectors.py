@@ -37,10 +37,19 @@ from interfaces.stream import Encoding, encode
 from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.teleop.architectures import ArchitectureReport as Followed
-from interfaces.teleop.architectures import ArcPacket, CellChanges, DriveOrders, DriveReport
-from interfaces.teleop.measured import Sample
+from interfaces.teleop.architectures import ArcPacket, CellChanges
+from interfaces.teleop.driving.messages import (
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    TaskReport,
+)
 from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.tasks import Doing, Errand, Go, Halt, SensedPoints, TaskReport
+from interfaces.teleop.samples import Sample
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState

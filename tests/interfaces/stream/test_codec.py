@@ -20,7 +20,7 @@ from interfaces.stream import LARGEST, Encoding, ProblemCode, ProtocolError, Sha
 from interfaces.stream import control as c
 from interfaces.stream.codec import TYPES, WIRES
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.teleop.architectures import DriveOrders, DriveReport
+from interfaces.teleop.driving.messages import DriveOrders, DriveReport
 from interfaces.teleop.messages import Orders, Report
 from interfaces.wire.commands import ReceiptWire
 from interfaces.wire.fields import MOST_NAMES

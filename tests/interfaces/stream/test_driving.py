@@ -17,7 +17,7 @@ from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.mobile import Postures, Seen, Tasks, Wanted
 from interfaces.stream.session import HubSession
-from interfaces.teleop.tasks import Go
+from interfaces.teleop.driving.messages import Go
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease

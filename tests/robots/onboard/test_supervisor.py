@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from interfaces.teleop.architectures import Immediate
-from interfaces.teleop.architectures.equipment import robot_surroundings
+from interfaces.teleop.architectures.compositions import robot_surroundings
 from robots.ipr.bare import BareBody
 from robots.ipr.position import FusedPosition
 from robots.ipr.robot import place

@@ -13,7 +13,7 @@ import pytest
 from interfaces.lab.driving.run import run
 from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import ArchitectureReport, CellChanges, OperatorSurroundings, RobotSurroundings
-from interfaces.teleop.architectures.equipment import BodySonar, grid_of
+from interfaces.teleop.architectures.compositions import BodySonar, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import IPR, SonarModel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.teleop.architectures.segments import MOST_REPEATED, ArcPacket, Receiver, Sender, Transport
+from interfaces.teleop.architectures.sites import MOST_REPEATED, ArcPacket, Receiver, Sender, Transport
 from vrs.segment import ArcSegment
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from interfaces.jobs import ArmControl, RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, controller
+from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.driving import (
     Autonomy,
     DriveLine,
@@ -20,7 +21,6 @@ from interfaces.teleop.driving import (
     Hands,
     JourneyPilot,
 )
-from interfaces.teleop.hosting import HostConfig
 from robots import ipr
 from robots.ipr.bare import BareBody
 from robots.ipr.position import FusedPosition

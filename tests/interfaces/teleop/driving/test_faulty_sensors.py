@@ -14,8 +14,8 @@ from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRob
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.stream.control import Role
-from interfaces.teleop.architectures import DriveReport
-from interfaces.teleop.architectures.equipment import CONTROL
+from interfaces.teleop.architectures.compositions import CONTROL
+from interfaces.teleop.driving.messages import DriveReport
 from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.robot import place

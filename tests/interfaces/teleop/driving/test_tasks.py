@@ -22,9 +22,9 @@ from interfaces.jobs import (
     WaitJob,
 )
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.teleop.architectures import ArcPacket, DriveOrders
+from interfaces.teleop.architectures import ArcPacket
+from interfaces.teleop.driving.messages import Doing, DriveOrders, Go, Halt
 from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
-from interfaces.teleop.tasks import Doing, Go, Halt
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig

@@ -1,0 +1,380 @@
+"""Ways to send commands and positions, for comparison with RSP on the same links."""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Final, NamedTuple, Protocol
+
+from typing_extensions import override
+
+from interfaces.link.conditions import Service
+from interfaces.rsp.local import LocalConfig, LocalCore, LocalState, PeriodConfig
+from interfaces.rsp.model.elements import Effector, RobotModel, Sensor
+from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig
+from interfaces.rsp.outputs import Commanded, Told
+from interfaces.rsp.robot import RobotConfig, RobotCore
+from interfaces.rsp.session import SLACK
+from vrs.checks import one_of, validated, within
+
+Rims = tuple[int, int]
+"""Speeds of the left and the right wheel at the rim [mm/s]."""
+
+
+class ReportedPosition(NamedTuple):
+    """The newest position that the local system has."""
+
+    x: float
+    """[m]."""
+    y: float
+    """[m]."""
+    theta: float
+    """[rad]."""
+
+
+class LocalEnd(Protocol):
+    """The local system's end."""
+
+    seen: ReportedPosition | None
+    """Newest position that came."""
+
+    def write(self, rims: Rims, *, now: float) -> None:
+        """Set what the wheels are to do."""
+
+    def fire(self, *, now: float) -> None:
+        """Give a command: something that is to be done once."""
+
+    def receive(self, data: bytes, *, now: float) -> None:
+        """Take a packet."""
+
+    def to_send(self, *, now: float) -> list[bytes]:
+        """Packets that are due by now [s]."""
+
+
+class RobotEnd(Protocol):
+    """The robot's end."""
+
+    def receive(self, data: bytes, *, now: float) -> None:
+        """Take a packet."""
+
+    def drive(self, *, now: float) -> Rims:
+        """What the wheels do from now on [s]."""
+
+    def fired(self) -> list[int]:
+        """Numbers of the commands that came since the last call, from 0."""
+
+    def measure(self, position: ReportedPosition) -> None:
+        """Set where the robot is."""
+
+    def to_send(self, *, now: float) -> list[bytes]:
+        """Packets that are due by now [s]."""
+
+    @property
+    def stamp(self) -> float | None:
+        """When what the wheels do was given, on the local system's clock [s]; None before anything came."""
+
+
+_HEAD: Final = struct.Struct("!IIB")
+"""Number of the newest input, its stamp [ms], how many inputs follow."""
+_INPUT: Final = struct.Struct("!hhi")
+"""Left and right rim [mm/s], number of the command or −1."""
+_UP: Final = struct.Struct("!Iddd")
+"""Number, x, y, θ."""
+FIXED_DOWN: Final = 1992
+"""Size of a packet of one size to the robot [byte]: the paper's largest."""
+FIXED_UP: Final = 96
+"""And from it [byte]: all of CUBO's sensors."""
+
+
+class PlainLocal(LocalEnd):
+    """The local system's end of a scheme without a simulacrum: inputs are repeated, nobody acknowledges anything.
+
+    A packet down has all that RSP's largest could have, whether it's needed or not; the repeated inputs are as
+    small as they can be.
+    """
+
+    def __init__(self, period: float, repeat: int, size: int) -> None:
+        """Begin at time 0.
+
+        Args:
+            period: T [s].
+            repeat: Inputs in a packet, 1 to 255: each is sent as often.
+            size: Of every packet [byte]; 0 for as small as it can be.
+        """
+        self.seen: ReportedPosition | None = None
+        self._T, self._size = period, size
+        self._recent: deque[bytes] = deque(maxlen=repeat)
+        self._rims: Rims = (0, 0)
+        self._fires: deque[int] = deque()
+        self._number = self._count = 0
+        self._next = 0.0
+        self._newest = -1
+
+    @override
+    def write(self, rims: Rims, *, now: float) -> None:
+        self._rims = rims
+
+    @override
+    def fire(self, *, now: float) -> None:
+        self._fires.append(self._count)
+        self._count += 1
+
+    def receive(self, data: bytes, *, now: float) -> None:  # noqa: ARG002 - as other ends
+        """See `LocalEnd`; what is older than the newest is of no use."""
+        number, x, y, theta = _UP.unpack_from(data)
+        if number > self._newest:
+            self._newest, self.seen = number, ReportedPosition(x, y, theta)
+
+    @override
+    def to_send(self, *, now: float) -> list[bytes]:
+        if now < self._next - SLACK:
+            return []
+        self._next = max(self._next + self._T, now + 0.5 * self._T)
+        self._recent.append(_INPUT.pack(*self._rims, self._fires.popleft() if self._fires else -1))
+        self._number += 1
+        head = _HEAD.pack(self._number, round(1000 * now), len(self._recent))
+        return [(head + b"".join(self._recent)).ljust(self._size, b"\0")]
+
+
+class PlainRobot(RobotEnd):
+    """The robot's end."""
+
+    def __init__(
+        self, model: RobotModel, period: float, size: int, loss: float, config: MotionFilterConfig
+    ) -> None:
+        """Begin at time 0.
+
+        Args:
+            model: Of the robot, for its filter.
+            period: T [s].
+            size: Of every packet [byte]; 0 for as small as it can be.
+            loss: T_loss [s]: after so long without a packet the wheels stop.
+            config: Of the filter.
+        """
+        self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
+        assert isinstance(model.elements[self._left], Effector)
+        self._filter = MotionFilter(model, config)
+        self._T, self._size, self._loss = period, size, loss
+        self._heard: float | None = None
+        self._newest = self._told = 0
+        self._commands: list[int] = []
+        self._position = ReportedPosition(0.0, 0.0, 0.0)
+        self._number = 0
+        self._next = 0.0
+
+    def receive(self, data: bytes, *, now: float) -> None:
+        """See `RobotEnd`; inputs that came are skipped, those that were lost and are repeated aren't."""
+        number, stamp, count = _HEAD.unpack_from(data)
+        if number <= self._newest:
+            return
+        for k in range(max(self._newest + 1, number - count + 1), number + 1):
+            at = _HEAD.size + (count - 1 - (number - k)) * _INPUT.size
+            left, right, command = _INPUT.unpack_from(data, at)
+            if command >= 0:
+                self._commands.append(command)
+            told = {self._left: (float(left),), self._right: (float(right),)}
+            self._filter.receive(1e-3 * stamp - (number - k) * self._T, told, now=now, fresh=k == number)
+        self._newest, self._heard = number, now
+
+    @override
+    def drive(self, *, now: float) -> Rims:
+        self._filter.play(now)
+        if self._heard is None or now - self._heard >= self._loss:
+            return 0, 0
+        left, right = (self._filter.given(index)[0] for index in (self._left, self._right))
+        return int(left), int(right)
+
+    @override
+    def fired(self) -> list[int]:
+        found, self._commands = self._commands, []
+        return found
+
+    @override
+    def measure(self, position: ReportedPosition) -> None:
+        self._position = position
+
+    @override
+    def to_send(self, *, now: float) -> list[bytes]:
+        if self._heard is None or now < self._next - SLACK:
+            return []
+        self._next = max(self._next + self._T, now + 0.5 * self._T)
+        self._number += 1
+        return [_UP.pack(self._number, *self._position).ljust(self._size, b"\0")]
+
+    @property
+    @override
+    def stamp(self) -> float | None:
+        return self._filter.playing
+
+
+_ADDRESS: Final = b"local"
+
+
+class RspLocal(LocalEnd):
+    """The local system's end."""
+
+    def __init__(self, model: RobotModel, random_bytes: Callable[[int], bytes], config: LocalConfig) -> None:
+        """Open a session at time 0, and ask for the position."""
+        self.core = LocalCore(model, random_bytes, config)
+        self.core.open(now=0.0)
+        self.seen: ReportedPosition | None = None
+        self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
+        self._fire, self._position = model.index("ir_fire"), model.index("position")
+        self.core.request(self._position, True)
+        sensor = model.elements[self._position]
+        assert isinstance(sensor, Sensor)
+        self._sensor = sensor
+        self._number = 0
+        self._waiting: list[bytes] = []
+
+    @override
+    def write(self, rims: Rims, *, now: float) -> None:
+        for index, rim in zip((self._left, self._right), rims, strict=True):
+            self.core.write(index, rim.to_bytes(2, "big", signed=True))
+
+    def fire(self, *, now: float) -> None:  # noqa: ARG002 - as other ends
+        """See `LocalEnd`; before there's a session it waits."""
+        self._waiting.append(bytes([self._number % 256]))
+        self._number += 1
+
+    @override
+    def receive(self, data: bytes, *, now: float) -> None:
+        self.core.receive(data, now=now)
+        for output in self.core.take():
+            if isinstance(output, Told) and output.index == self._position:
+                scale = self._sensor.scale
+                x, y, theta = self._sensor.format.unpack(output.payload)
+                self.seen = ReportedPosition(scale * x, scale * y, scale * theta)
+
+    @override
+    def to_send(self, *, now: float) -> list[bytes]:
+        if self.core.state is LocalState.OPEN:
+            for values in self._waiting:
+                self.core.command(self._fire, values)
+            self._waiting.clear()
+        return self.core.to_send(now=now)
+
+
+class RspRobot(RobotEnd):
+    """The robot's end."""
+
+    def __init__(self, model: RobotModel, random_bytes: Callable[[int], bytes], config: RobotConfig) -> None:
+        """Wait for a session."""
+        self.core = RobotCore(model, random_bytes, config)
+        self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
+        self._position = model.index("position")
+        sensor = model.elements[self._position]
+        assert isinstance(sensor, Sensor)
+        self._sensor = sensor
+        self._commands: list[int] = []
+
+    @override
+    def receive(self, data: bytes, *, now: float) -> None:
+        self.core.receive(data, _ADDRESS, now=now)
+
+    @override
+    def drive(self, *, now: float) -> Rims:
+        self.core.effectors(now=now)
+        self._commands += [output.id for output in self.core.take() if isinstance(output, Commanded)]
+        left, right = (self.core.motion.given(index)[0] for index in (self._left, self._right))
+        return int(left), int(right)
+
+    @override
+    def fired(self) -> list[int]:
+        found, self._commands = self._commands, []
+        return found
+
+    @override
+    def measure(self, position: ReportedPosition) -> None:
+        raw = (round(value / self._sensor.scale) for value in position)
+        self.core.measure(self._position, self._sensor.format.pack(*raw))
+
+    @override
+    def to_send(self, *, now: float) -> list[bytes]:
+        return [data for data, _ in self.core.to_send(now=now)]
+
+    @property
+    def stamp(self) -> float | None:
+        """See `RobotEnd`: an effector that isn't in a packet is as it was when that was made."""
+        return self.core.motion.playing
+
+
+UDP_HEADER: Final = 28
+"""IPv4 and UDP [byte]."""
+TCP_HEADER: Final = 40
+"""IPv4 and TCP without options [byte]."""
+
+
+@dataclass(frozen=True, slots=True)
+@validated
+class SchemeConfig:
+    """What all schemes share."""
+
+    period: Annotated[float, within(1e-3, 1.0, "s")] = 0.02
+    """T [s], in [0.001, 1]; the paper's 20 ms."""
+    loss: Annotated[float, within(0.1, 2.0, "s")] = 0.5
+    """T_loss [s], in [0.1, 2]."""
+    repeat: Annotated[int, within(1, 255)] = 8
+    """How often inputs are sent where they're repeated, 1 to 255."""
+    adaptive: bool = False
+    """Whether RSP fits T to the link."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """A way to send."""
+
+    name: str
+    service: Service
+    header: int
+    """What the network adds to a packet [byte]."""
+    ends: Callable[[RobotModel, SchemeConfig, Callable[[int], bytes]], tuple[LocalEnd, RobotEnd]]
+    """Makes both ends; the last argument gives random bytes."""
+
+
+def _rsp(
+    model: RobotModel, config: SchemeConfig, random_bytes: Callable[[int], bytes]
+) -> tuple[LocalEnd, RobotEnd]:
+    period = PeriodConfig(least=config.period, adaptive=config.adaptive)
+    local = RspLocal(model, random_bytes, LocalConfig(period=period, lifetime=120.0))
+    robot = RspRobot(model, random_bytes, RobotConfig(loss=config.loss, period=config.period, lifetime=120.0))
+    # The session is opened beforehand, as a TCP connection is: the comparison begins after that.
+    for _ in range(2):
+        for data in local.to_send(now=0.0):
+            robot.receive(data, now=0.0)
+        for data in robot.to_send(now=0.0):
+            local.receive(data, now=0.0)
+    return local, robot
+
+
+def _plain(
+    repeat: bool, down: int, up: int
+) -> Callable[[RobotModel, SchemeConfig, Callable[[int], bytes]], tuple[LocalEnd, RobotEnd]]:
+    def made(model: RobotModel, config: SchemeConfig, _: object) -> tuple[LocalEnd, RobotEnd]:
+        local = PlainLocal(config.period, config.repeat if repeat else 1, down)
+        return local, PlainRobot(model, config.period, up, config.loss, MotionFilterConfig())
+
+    return made
+
+
+SCHEMES: Final[dict[str, Scheme]] = {
+    each.name: each
+    for each in (
+        Scheme("rsp", Service.DATAGRAM, UDP_HEADER, _rsp),
+        Scheme("fixed", Service.DATAGRAM, UDP_HEADER, _plain(False, FIXED_DOWN, FIXED_UP)),
+        Scheme("tcp", Service.IN_ORDER, TCP_HEADER, _plain(False, FIXED_DOWN, FIXED_UP)),
+        Scheme("repeated", Service.DATAGRAM, UDP_HEADER, _plain(True, 0, 0)),
+    )
+}
+"""RSP; packets of one size on UDP, on TCP; inputs repeated without acknowledgement."""
+
+
+def scheme(name: str) -> Scheme:
+    """The scheme of a name.
+
+    Raises:
+        InvalidValueError: If there's none.
+    """
+    return SCHEMES[one_of("scheme", name, SCHEMES)]
