@@ -12,7 +12,6 @@ import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +62,8 @@ def write_whole(path: Path, data: bytes) -> None:
 
 def software() -> str:
     """Name and version of this program."""
+    from importlib import metadata
+
     return f"vrs-teleop {metadata.version('vrs-teleop')}"
 
 

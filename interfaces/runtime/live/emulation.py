@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile, loss_model, spelled_loss
-from interfaces.link.delays import DelayProfile
+from interfaces.link.delays import ALLOWED, DelayProfile
 from interfaces.link.packets import LinkFigures
-from interfaces.link.delays import ALLOWED
 from interfaces.runs.twin_run import QUANTILE
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.control import DirectionConditions, Impair, Network

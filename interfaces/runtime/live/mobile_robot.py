@@ -27,15 +27,14 @@ from interfaces.stream.control import Attached
 from interfaces.teleop.architectures import (
     ArchitectureRobotSite,
     Constants,
-    DriveOrders,
     PositionSource,
     architecture,
     controller,
 )
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, SENSING, robot_surroundings
-from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands, JourneyPilot
 from interfaces.teleop.connection import HostConfig
-from interfaces.teleop.driving.messages import SensedPoints
+from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands, JourneyPilot
+from interfaces.teleop.driving.messages import DriveOrders, SensedPoints
 from interfaces.timer import Turning
 from robots.bullet.rooms import Room
 from robots.ipr.body import MobileBody
@@ -151,8 +150,8 @@ class LiveMobileConfig:
     hands: Hands = field(default_factory=Hands)
     """Who speaks, shows and lets an arm work; nobody aloud, and no arm, unless given."""
     position: str = ""
-    """What tells it where it is: a name of `interfaces.teleop.architectures.compositions.POSITIONS`. Unless given, its
-    laser where the map has walls or other blocks for it to see, else the camera."""
+    """What tells it where it is: a name of `interfaces.teleop.architectures.compositions.POSITIONS`. Unless given,
+    its laser where the map has walls or other blocks for it to see, else the camera."""
     halting: WatchdogConfig = field(default_factory=lambda: HostConfig().halting)
     """The watchdog for an operator who asks for `halt`."""
     constants: Constants = field(default_factory=Constants)
