@@ -22,7 +22,7 @@ from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 
-def unanswered(question: str) -> str | None:  # noqa: ARG001
+def unanswered(_question: str) -> str | None:
     """Nobody answers."""
     return None
 

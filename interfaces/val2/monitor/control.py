@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, Protocol
 
+from typing_extensions import override
+
 from interfaces.stream.control import Lease, Problem
 from interfaces.val2.context import Event
 from interfaces.val2.controller import Controller
@@ -72,27 +74,29 @@ class Free(Control):
     kept = True
     """It's there."""
 
-    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:  # noqa: ARG002 - it's always there
-        """It's there."""
+    @override
+    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         return ""
 
+    @override
     def lapsed(self) -> str:
-        """It hasn't."""
         return ""
 
+    @override
     def release(self, *, now: float) -> None:
         """It stays."""
 
+    @override
     def resume(self, *, now: float) -> None:
         """It doesn't stop by itself."""
 
-    def trouble(self, *, now: float) -> ValError | None:  # noqa: ARG002 - there's never any
-        """Nothing."""
+    @override
+    def trouble(self, *, now: float) -> ValError | None:
         return None
 
     @property
+    @override
     def looks(self) -> float:
-        """Never."""
         return math.inf
 
 
@@ -213,7 +217,7 @@ _LOOKS: Final = 0.1
 """Time between two looks at how the robot is [s]."""
 
 
-class LeaseControl:
+class LeaseControl(Control):
     """The lease of a connection, kept by the connection until it's released; or the share of a person's lease."""
 
     def __init__(self, connection: Connection) -> None:
@@ -234,6 +238,7 @@ class LeaseControl:
         self._lapses = connection.lapses
         self._resumed = self._resume_until = -math.inf
 
+    @override
     def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         """Ask for the lease: empty if it's there, why not, or None while nothing is known yet.
 
@@ -311,33 +316,34 @@ class LeaseControl:
         return self._connection.lapses == self._given_back
 
     @property
+    @override
     def kept(self) -> bool:
-        """Whether commands count, as far as it's known."""
         lease = self._connection.lease
         return not self._connection.is_connected or (lease is not None and lease.commands and not self._ends)
 
+    @override
     def lapsed(self) -> str:
-        """Why commands have ceased to count since this was asked last; empty where they haven't."""
         lease, lapses = self._connection.lease, self._connection.lapses
         if lapses == self._lapses:
             return ""
         self._lapses = lapses
         return TAKEN if lease is not None and lease.state is LeaseState.HELD else "control has ended"
 
-    def release(self, *, now: float) -> None:  # noqa: ARG002 - the connection has its clock
-        """Give the lease back, and the robot stops; or the share."""
+    @override
+    def release(self, *, now: float) -> None:
         connection = self._connection
         if connection.lease is not None and connection.lease.commands:
             self._given_back = connection.lapses
         connection.release(wait=0.0)
 
+    @override
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself, as soon as it can within a while."""
         self._resumed, self._resume_until = -math.inf, now + PATIENCE
         self.trouble(now=now)
 
+    @override
     def trouble(self, *, now: float) -> ValError | None:
-        """What is wrong with the robot or the way to it."""
         connection, state, lease = self._connection, self._connection.state, self._noted(now)
         if not connection.is_connected:
             return ValError("No connection", "to the robot's server; it's taken up again by itself")
@@ -351,6 +357,6 @@ class LeaseControl:
         return robot_halted(state.halted, commanded=commanded)
 
     @property
+    @override
     def looks(self) -> float:
-        """How often it's to be asked for trouble [s]."""
         return _LOOKS

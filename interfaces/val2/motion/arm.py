@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.stream.control import OVERRULED
 from interfaces.teleop.operator import NOT_FOLLOWING
@@ -32,7 +33,7 @@ from interfaces.val2.motion.places import (
 )
 from interfaces.val2.motion.robot import CommandOutcome, RobotPort
 from interfaces.val2.motion.speeds import Manners, MonitorSpeed, MotionSettings, Speed, bounded
-from interfaces.val2.ports import Where
+from interfaces.val2.ports import ArmPort, Where
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
@@ -53,7 +54,7 @@ _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
 
 
-class Arm:
+class Arm(ArmPort):
     """An `ArmPort` over a robot.
 
     With CP on, a motion begins while the one before it brakes. One motion is asked for ahead of the one under way.
@@ -108,22 +109,22 @@ class Arm:
 
     # Where it is.
 
+    @override
     def here(self, *, now: float) -> Where:
-        """Where the operator's arm is."""
         return self.past(now, now=now)
 
+    @override
     def destination(self, *, now: float) -> Where:
-        """Where it goes."""
         self._look(now)
         return self._frames.where(self._goal(), self._hand.goal)
 
+    @override
     def real(self, *, now: float) -> Where | None:
-        """Where the other twin was measured last."""
         q = self.robot.real(now=now)
         return None if q is None else self._frames.where(q, self._hand.opening(now))
 
+    @override
     def past(self, t: float, *, now: float) -> Where:
-        """Where the arm was, or will be, at a time [s]: with the tool, the base and the hand as they were then."""
         self._look(now)
         frames = self._framed[max(bisect_right(self._framed, t, key=lambda since: since[0]) - 1, 0)][1]
         return frames.where(self.robot.timeline.sample(t), self._hand.opening(t, self._begins))
@@ -137,8 +138,8 @@ class Arm:
         """Joints at the destination [rad], (6,)."""
         return self.robot.timeline.final() if self._dry is None else self._dry
 
+    @override
     def reaches(self, location: Location, *, now: float) -> bool:
-        """Whether a motion could go there."""
         self._look(now)
         try:
             self._frames.solve(location, self._goal(), ())
@@ -171,8 +172,8 @@ class Arm:
         begin = max(earliest, self.robot.timeline.end)
         return begin, begin + seconds
 
+    @override
     def answered(self, *, now: float) -> bool:
-        """Whether all that was asked has been answered."""
         self._look(now)
         while self._open:
             number, straight = self._open[0]
@@ -230,16 +231,16 @@ class Arm:
         self._recent.clear()
         self._delay = self._at = self._bound = None
 
+    @override
     def ready(self, *, now: float) -> bool:
-        """Whether the next motion may be asked for: the last has begun, and all has been answered."""
         return self.answered(now=now) and self._begun(now)
 
     def _begun(self, now: float) -> bool:
         last = self._begins(self._recent[-1][0]) if self._recent else -math.inf
         return last is not None and last <= now and self._delay_span()[0] <= now
 
+    @override
     def settled(self, *, now: float) -> bool:
-        """Whether the arm stands at its destination, and the hand has done what it was told."""
         if not self.answered(now=now) or self._hand.waits:
             return False
         return now >= max(self._end(), self._hand.end) and self._nulled(now)
@@ -255,8 +256,8 @@ class Arm:
         allowed = (_FINE if self._made.fine else _COARSE) * self._made.tolerance / 100.0
         return bool(np.abs(q - self.robot.timeline.final()).max() <= allowed)
 
+    @override
     def next_deadline(self) -> float:
-        """When any of these may change by itself [s]; infinity for never."""
         now, (delayed, ends) = self._now, self._delay_span()
         times = [self.robot.timeline.end, self._hand.end, self._pace.next_deadline(), delayed, ends]
         if self._bound is not None:
@@ -285,20 +286,20 @@ class Arm:
 
     # Motions.
 
+    @override
     def move(self, target: Location, *, straight: bool, hand: float | bool | None = None, now: float) -> None:
-        """MOVE, MOVES, MOVET, MOVEST."""
         self._move(target, straight, now, hand=hand)
 
+    @override
     def approach(self, target: Location, distance: float, *, straight: bool, now: float) -> None:
-        """APPRO, APPROS."""
         self._move(behind(self._frames.place(target), distance), straight, now)
 
+    @override
     def depart(self, distance: float, *, straight: bool, now: float) -> None:
-        """DEPART, DEPARTS."""
         self._move(behind(self.destination(now=now).tool, distance), straight, now)
 
+    @override
     def drive(self, joint: int, change: float, speed: float, *, now: float) -> None:
-        """DRIVE."""
         if joint not in range(1, 7):
             raise ValError("Illegal joint number", f"{joint}: 1 to 6")
         if not 0 < speed < math.inf:
@@ -307,36 +308,37 @@ class Arm:
         joints[joint - 1] += change
         self._move(PrecisionPoint(tuple(joints)), False, now, speed=Speed(speed))
 
+    @override
     def draw(self, dx: float, dy: float, dz: float, *, now: float) -> None:
-        """DRAW."""
         self._move(shifted(self.destination(now=now).tool, dx, dy, dz), True, now)
 
+    @override
     def go_ready(self, *, now: float) -> None:
-        """READY."""
         self._move(READY, False, now)
 
+    @override
     def nest(self, *, now: float) -> None:
-        """NEST."""
         self._move(NEST, False, now)
 
+    @override
     def align(self, *, now: float) -> None:
-        """ALIGN."""
         self._move(aligned(self.destination(now=now).tool), False, now)
 
+    @override
     def delay(self, seconds: float, *, now: float) -> None:
-        """DELAY."""
         if not 0 <= seconds < math.inf:
             raise ValError("Illegal value", f"{seconds:g}: a delay is 0 or above")
         self._look(now)
         if self._dry is None:
             self._delay = max(now, self._delay_span()[1]), seconds
 
+    @override
     def actuate(self, hand: bool | None, *, now: float) -> None:
-        """OPENI, CLOSEI, RELAXI."""
         self._look(now)
         if self._dry is None:
             self._hand.actuate(hand, now)
 
+    @override
     def alter(self, values: tuple[float, ...], *, now: float) -> None:
         """ALTOUT; the arm must not be on another motion.
 
@@ -438,6 +440,7 @@ class Arm:
         share = min(1.0, taken / duration) if taken > 0 else 1.0
         return replace(command, pace=bounded(command.pace * share))
 
+    @override
     def brake(self, *, now: float) -> None:
         """BRAKE, REACTI, ABORT; what was asked for a motion that hasn't begun is for the next one again."""
         self._look(now)
@@ -445,6 +448,7 @@ class Arm:
         if now < self.robot.timeline.end or self._open:
             self._send(Stop(), False, now)
 
+    @override
     def give_up(self, *, now: float) -> None:
         """Somebody else commands the arm: what isn't over is for RETRY, and no answer is waited for any more."""
         self._look(now)
@@ -454,6 +458,7 @@ class Arm:
         self._give_up(now, math.inf if end is None else end)
         self._open.clear()
 
+    @override
     def withdraw(self, *, now: float) -> None:
         """Take out of the plan what `give_up` found asked for ahead, as far as it has been accepted."""
         ahead, self._ahead = self._ahead, ()
@@ -463,8 +468,8 @@ class Arm:
             if receipt is not None and receipt.stands:
                 self._taken_out.append(self.robot.ask(Cancel(receipt.command_id), now=now))
 
+    @override
     def retry(self, *, now: float) -> bool:
-        """Ask again for the motion that `brake` interrupted; False if there was none."""
         self._look(now)
         interrupted, self._interrupted = self._interrupted, ()
         for command in interrupted:
@@ -476,8 +481,8 @@ class Arm:
 
     # The timeline.
 
+    @override
     def undo(self, *, now: float) -> str:
-        """UNDO."""
         self._look(now)
         self._interrupted, self._delay, self._bound = (), None, None
         self._hand.forget()
@@ -490,6 +495,7 @@ class Arm:
             return "Nothing was taken back" + (f": {fate.reason}" if fate.reason else "")
         return f"Command {fate.receipt.command_id} was taken back"
 
+    @override
     def timeline(self, *, now: float) -> list[str]:
         """TIMELINE: number, begin, end and destination of what is scheduled."""
         self._look(now)
@@ -507,60 +513,61 @@ class Arm:
 
     # For the next motion, or those after it.
 
+    @override
     def set_hand(self, hand: bool | None) -> None:
-        """OPEN, CLOSE, RELAX."""
         self._hand.wanted, self._hand.relax = hand, hand is None
 
+    @override
     def set_speed(self, speed: float, *, turn: float | None, unit: str, always: bool) -> None:
-        """SPEED."""
         self._manners.set_speed(speed, turn, unit, always)
 
+    @override
     def fastest(self, unit: str) -> float:
-        """The greatest program speed that counts."""
         return 1.0 / Speed(1.0, unit).linear_share(self.robot.model)
 
+    @override
     def set_acceleration(self, up: float, down: float) -> None:
-        """ACCEL."""
         self._manners.set_acceleration(up, down)
 
+    @override
     def set_duration(self, seconds: float, *, always: bool) -> None:
-        """DURATION."""
         self._manners.set_duration(seconds, always)
 
+    @override
     def set_tolerance(self, percent: float | None, *, fine: bool, always: bool) -> None:
-        """COARSE, FINE."""
         self._manners.set_tolerance(percent, fine, always)
 
+    @override
     def tolerance(self) -> tuple[bool, float]:
-        """Whether it's FINE, and its percentage."""
         return self._manners.next.fine, self._manners.next.tolerance
 
+    @override
     def set_nulling(self, on: bool, *, always: bool) -> None:
-        """NULL, NONULL."""
         self._manners.set_nulling(on, always)
 
+    @override
     def set_configuration(self, word: str) -> None:
-        """RIGHTY, LEFTY, ABOVE, BELOW, FLIP, NOFLIP."""
         self._words = with_word(self._words, word)
 
     # At once.
 
+    @override
     def set_tool(self, tool: Transformation) -> None:
-        """TOOL."""
         self._frame(self._frames.with_tool(tool))
 
+    @override
     def tool(self) -> Transformation:
-        """The tool transformation."""
         return self._frames.tool
 
+    @override
     def set_base(self, base: Transformation) -> None:
-        """BASE."""
         self._frame(self._frames.with_base(base))
 
+    @override
     def base(self) -> Transformation:
-        """The base transformation."""
         return self._frames.base
 
+    @override
     def set_monitor_speed(self, percent: float, *, now: float) -> None:
         """Monitor speed, at most 100: time alone is stretched."""
         if not 0 < percent < math.inf:
@@ -568,34 +575,34 @@ class Arm:
         self._look(now)
         self._pace.set(percent, now=now)
 
+    @override
     def monitor_speed(self) -> float:
-        """The monitor speed [%]."""
         return self._pace.wanted
 
+    @override
     def set_continuous_path(self, on: bool) -> None:
-        """ENABLE CP, DISABLE CP."""
         self._continuous = on
 
+    @override
     def set_dry_run(self, on: bool) -> None:
-        """ENABLE DRY.RUN."""
         if on and self._dry is None:
             self._dry = self.robot.timeline.final()
         elif not on:
             self._dry = None
 
+    @override
     def at(self, t: float | None) -> None:
-        """AT."""
         if t is not None and not math.isfinite(t):
             raise ValError("Illegal value", "a time is finite")
         self._at = t
 
+    @override
     def set_alter(self, mode: int | None, *, now: float) -> None:
-        """ALTER, NOALTER."""
         self._look(now)
         self._alterations.set(mode)
 
+    @override
     def begin_program(self) -> None:
-        """EXECUTE."""
         self._manners.reset()
         self._hand.wanted, self._hand.relax = None, False
         self._words, self._at, self._interrupted = (), None, ()

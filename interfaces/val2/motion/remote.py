@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.clients.designer import Issued
-from interfaces.val2.motion.robot import CommandOutcome, standing
+from interfaces.val2.motion.robot import CommandOutcome, RobotPort, standing
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt
@@ -28,7 +29,7 @@ _SAME: Final = 1e-6
 """Times [s] and joints [rad] nearer than this are one."""
 
 
-class RemoteRobot:
+class RemoteRobot(RobotPort):
     """An engine at the other end of a connection. Nothing waits: what was asked for is answered later."""
 
     def __init__(self, connection: Connection, model: RobotModel) -> None:
@@ -54,13 +55,13 @@ class RemoteRobot:
         self._timeline = self._newest()
 
     @property
+    @override
     def model(self) -> RobotModel:
-        """Its kinematics and limits."""
         return self._model
 
     @property
+    @override
     def timeline(self) -> Timeline:
-        """The engine's, as far as it has come."""
         return self._newest()
 
     def _newest(self) -> Timeline:
@@ -70,8 +71,8 @@ class RemoteRobot:
             self._timeline = timeline
         return self._timeline
 
-    def ask(self, command: Command | None, *, now: float) -> int:  # noqa: ARG002 - the connection has its clock
-        """Send a command, or an undo."""
+    @override
+    def ask(self, command: Command | None, *, now: float) -> int:
         before = self.timeline
         designer = self._connection.designer
         number = (designer.undo() if command is None else designer.issue(command)).number
@@ -79,6 +80,7 @@ class RemoteRobot:
         self._open = number
         return number
 
+    @override
     def fate(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it, once the timeline shows it."""
         try:
@@ -121,28 +123,28 @@ class RemoteRobot:
         q = None if receipt is None else receipt.q
         return q is None or bool(np.abs(self.timeline.final() - q).max() <= _SAME)
 
+    @override
     def trouble(self) -> str:
-        """Why the real robot stopped by itself, as far as it's known."""
         state = self._connection.state
         return "" if state is None or state is self._outdated else state.halted
 
     @property
+    @override
     def lost(self) -> bool:
-        """Whether there's no connection to its server."""
         return not self._connection.is_connected
 
     @property
+    @override
     def looks(self) -> float:
-        """Nobody else asks."""
         return _LOOKS
 
+    @override
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
-        """Receipts of this client's commands that aren't over."""
         receipts = (issued.receipt for issued in self._connection.designer.history)
         return standing((receipt for receipt in receipts if receipt is not None), now)
 
-    def real(self, *, now: float) -> Array | None:  # noqa: ARG002 - the newest state counts
-        """Joints as the server heard of them last."""
+    @override
+    def real(self, *, now: float) -> Array | None:
         state = self._connection.state
         return None if state is None else state.q
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
+from typing_extensions import override
+
 from interfaces.teleop.operator import OperatorSite
 from vrs.clock import ManualClock
 from vrs.commands import Command
@@ -80,7 +82,7 @@ _LOOKED: Final = 256
 """Newest receipts that are looked through for what isn't over."""
 
 
-class EngineRobot:
+class EngineRobot(RobotPort):
     """An engine in this process; a manual clock of it is set to the time of each call."""
 
     def __init__(self, engine: Engine) -> None:
@@ -89,17 +91,17 @@ class EngineRobot:
         self._fates: OrderedDict[int, CommandOutcome] = OrderedDict()
 
     @property
+    @override
     def model(self) -> RobotModel:
-        """Its kinematics and limits."""
         return self.engine.model
 
     @property
+    @override
     def timeline(self) -> Timeline:
-        """The engine's."""
         return self.engine.timeline
 
+    @override
     def ask(self, command: Command | None, *, now: float) -> int:
-        """Carry out a command, or an undo, at once."""
         self._number += 1
         try:
             answer = self._do(command, now)
@@ -124,7 +126,8 @@ class EngineRobot:
             return self.engine.undo()
         return self.engine.execute(command)  # type: ignore[arg-type]
 
-    def fate(self, number: int, *, now: float) -> CommandOutcome | None:  # noqa: ARG002 - answers come at once
+    @override
+    def fate(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it; of one that's long over, nothing but that it's over."""
         fate = self._fates.get(number)
         if fate is None:
@@ -134,28 +137,28 @@ class EngineRobot:
             return fate
         return CommandOutcome(self.engine.receipt(receipt.command_id))
 
+    @override
     def trouble(self) -> str:
-        """None: there's no other twin."""
         return ""
 
     @property
+    @override
     def lost(self) -> bool:
-        """It's here."""
         return False
 
     @property
+    @override
     def looks(self) -> float:
-        """It's never in trouble."""
         return math.inf
 
+    @override
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
-        """Receipts of what isn't over."""
         newest = self.engine.newest
         numbers = range(max(newest - _LOOKED, 0) + 1, newest + 1)
         return standing((self.engine.receipt(number) for number in numbers), now)
 
-    def real(self, *, now: float) -> Array | None:  # noqa: ARG002 - there's never one
-        """None: there's no other twin."""
+    @override
+    def real(self, *, now: float) -> Array | None:
         return None
 
 
@@ -181,12 +184,12 @@ class SiteRobot(EngineRobot):
             self._told(now, command, answer)
         return answer
 
+    @override
     def trouble(self) -> str:
-        """Why the real robot stopped by itself."""
         return self._site.halted
 
-    def real(self, *, now: float) -> Array | None:  # noqa: ARG002 - the newest report counts
-        """Joints that the newest report gives."""
+    @override
+    def real(self, *, now: float) -> Array | None:
         report = self._site.report
         return None if report is None else report.q
 
