@@ -105,14 +105,14 @@ def _converse(arm: Arm, control: Control, clock: Clock, files: Path, what: str) 
     import asyncio
 
     from interfaces.val2.controller import Controller
-    from interfaces.val2.monitor.control import Switchboard
+    from interfaces.val2.monitor.control import SharedController
     from interfaces.val2.monitor.files import Files
     from interfaces.val2.monitor.monitor import TerminalMonitor
 
     controller = Controller(arm, parameters=arm.parameters, now=clock.now())
     typed = sys.stdin.isatty() and sys.stdout.isatty()
-    board = Switchboard(controller, control)
-    monitor = TerminalMonitor(board, Files(files, anywhere=True), what, patient=not typed)
+    shared = SharedController(controller, control)
+    monitor = TerminalMonitor(shared, Files(files, anywhere=True), what, queues_commands=not typed)
     asyncio.run(_typed(monitor, clock) if typed else _piped(monitor, clock))
 
 

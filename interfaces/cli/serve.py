@@ -321,7 +321,7 @@ async def _serve(
         from interfaces.stream.access import Access, make_token
         from interfaces.stream.control import Role
         from interfaces.stream.server import application
-        from interfaces.val2.pages import PageDoor
+        from interfaces.val2.pages import PageTerminalServer
         from interfaces.val2.served import HOST, ServedVal
         from robots import puma560
         from robots.onboard.lease import LeaseState
@@ -337,7 +337,7 @@ async def _serve(
         shown = Address(host, port)
         near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}/ws", doors.own_token, access, doors.val_files, software())
-        terminals = PageDoor(val.enter).route
+        terminals = PageTerminalServer(val.enter).route
         facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
         recordings = Recordings(operator, Shelf(shelved.directory), access, facts)
         routes = [*operator.routes, terminals, *recordings.routes, *station.routes]

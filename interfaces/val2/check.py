@@ -19,7 +19,7 @@ from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
 from interfaces.val2.signals import legal, settable
 from interfaces.val2.source import SourceFile, read_all, words_of
-from interfaces.val2.structure import stray, survey
+from interfaces.val2.structure import standalone_error, survey
 from interfaces.val2.syntax import (
     Apply,
     Assign,
@@ -181,7 +181,7 @@ class _Checker:
             errors += kinds.mistakes(expression, wanted, known)
         if isinstance(statement, For) and statement.variable.prefix:
             errors.append(mismatch(statement.variable))
-        if not errors and stray(step, step.at) is None:
+        if not errors and standalone_error(step, step.at) is None:
             # What is no mistake here and can't be compiled would stop the program when it comes there.
             uncompilable = refusal(step, self._context)
             errors += [] if uncompilable is None else [uncompilable]

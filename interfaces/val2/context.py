@@ -108,7 +108,7 @@ class Code:
 
 SPECIAL: Final = -1
 """What a step returns instead of the next step's index when `Context.pending` holds what is to be done."""
-DEAR: Final = 9
+EXTRA_STEP_COST: Final = 9
 MOST_PERCENT: Final = 100.0
 """Of speeds and accelerations: more counts as this."""
 TIMERS: Final = range(16)
@@ -191,7 +191,7 @@ class Context:
     pending: Action = 0
     stop_first: bool = False
     """Whether the next motion begins at rest: a configuration was asked for."""
-    charged: int = 0
+    extra_steps: int = 0
     """Steps for which a dear one stands in addition."""
     dropped: int = 0
     """How often a REACTI braked before the motion that was asked for last had begun."""
@@ -220,7 +220,7 @@ class Context:
 
     def go_on(self, following: int) -> int:
         """Go on after a dear step: one of locations or text, which takes as long as ten others."""
-        self.charged += DEAR
+        self.extra_steps += EXTRA_STEP_COST
         self.pending = following
         return SPECIAL
 

@@ -21,7 +21,7 @@ from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.ports import ArmPort
 from interfaces.val2.signals import Rule, Signals
 from interfaces.val2.source import SignalRule
-from interfaces.val2.structure import meanwhile, stray
+from interfaces.val2.structure import runs_beside_program, standalone_error
 from interfaces.val2.syntax import (
     Expression,
     Program,
@@ -193,9 +193,9 @@ class Controller:
         Raises:
             ValError: If it can't stand alone, or must not now; what goes wrong while it's done is an event.
         """
-        if (misplaced := stray(step, step.at)) is not None:
+        if (misplaced := standalone_error(step, step.at)) is not None:
             raise misplaced
-        if self._do is not None or (self.running and not meanwhile(step)):
+        if self._do is not None or (self.running and not runs_beside_program(step)):
             raise ValError("Program already running")
         self.context.now = max(now, self.context.now)
         code = compiled(Program("", (), (step,)), self.context)
@@ -209,7 +209,7 @@ class Controller:
             self.context.events.append(ProgramFailed(error))
         self._due = True
 
-    def let_go(self, *, now: float) -> None:
+    def release_scheduled(self, *, now: float) -> None:
         """End a DO whose motion is accepted but begins later, without waiting for it; else nothing."""
         context = self.context
         context.now = max(now, context.now)

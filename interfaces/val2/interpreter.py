@@ -134,8 +134,8 @@ class Task:
                 self._react()
                 frame = self.frames[-1]
                 if frame.waiting is None:
-                    done += self._compute(frame, 1 if self.single else most - done) + self.context.charged
-                    self.context.charged = 0
+                    done += self._compute(frame, 1 if self.single else most - done) + self.context.extra_steps
+                    self.context.extra_steps = 0
                 elif not self._wait(frame):
                     break
                 if self.single and self.state is ProgramState.RUNNING and not self.waiting:

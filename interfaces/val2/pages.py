@@ -21,7 +21,7 @@ from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
 from interfaces.timer import Turning
 from interfaces.val2.monitor.completion import suggestions
-from interfaces.val2.monitor.control import SharedOperator, Switchboard
+from interfaces.val2.monitor.control import SharedController, SharedOperator
 from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
 from interfaces.val2.monitor.state import OutputText, Style
 from vrs.clock import Clock
@@ -98,7 +98,7 @@ _read: Final = msgspec.json.Decoder(PageHello | Who | TypedLines | Interrupt | C
 class TerminalRoom:
     """What terminals are at."""
 
-    board: Switchboard
+    shared: SharedController
     clock: Clock
     """Session time."""
     terminal: Callable[[str | None, SharedOperator | None], TerminalMonitor | None]
@@ -118,12 +118,13 @@ class PageTerminal:
     """Code and reason with which the connection is to be closed."""
     monitor: TerminalMonitor | None = None
     greeted: bool = False
-    _said: deque[OutputText] = field(default_factory=deque)
-    _waiting: int = 0
+    _output: deque[OutputText] = field(default_factory=deque)
+    waiting: int = 0
     """Characters that wait to be sent."""
     _sent: int = 0
     _shown: int = 0
-    _lost: bool = False
+    lost: bool = False
+    """Whether output was lost since any was queued."""
     _answers: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=32))
     _prompt: str | None = None
     """The prompt that the page was told last; None where it's to be told again."""
@@ -136,7 +137,7 @@ class PageTerminal:
         """Let a monitor speak and listen."""
         self.monitor = monitor
         files = monitor.state.files.offered()
-        self._answers.append({"type": "ready", "files": files, "barred": bool(monitor.barred)})
+        self._answers.append({"type": "ready", "files": files, "barred": bool(monitor.read_only)})
         monitor.start(now=now)
 
     def receive(self, data: str | bytes, *, now: float) -> None:
@@ -179,35 +180,35 @@ class PageTerminal:
         for text in message.lines:
             if not monitor.done:
                 monitor.line(text, now=now)
-                self._listen(monitor)
+                self._collect_output(monitor)
 
     def advance(self, *, now: float) -> None:
         """Do what is due."""
         if self.monitor is None:
             return
         self.monitor.advance(now=now)
-        self._listen(self.monitor)
-        if self.monitor.done and not self._said:
+        self._collect_output(self.monitor)
+        if self.monitor.done and not self._output:
             self.close(1000, "the monitor was left")
 
-    def _listen(self, monitor: TerminalMonitor) -> None:
+    def _collect_output(self, monitor: TerminalMonitor) -> None:
         """Take what was said, as far as there's room."""
         for piece in monitor.output():
-            if self._waiting + len(piece.text) > UNREAD:
-                self._lost = True
+            if self.waiting + len(piece.text) > UNREAD:
+                self.lost = True
                 continue
-            if self._lost:
-                self._lost = False
+            if self.lost:
+                self.lost = False
                 self._put(OutputText("\n*Output lost* it came faster than it could be shown\n", Style.ERROR))
             self._put(piece)
 
     def _put(self, piece: OutputText) -> None:
-        self._waiting += len(piece.text)
-        last = self._said[-1] if self._said else None
+        self.waiting += len(piece.text)
+        last = self._output[-1] if self._output else None
         if last is not None and last.style is piece.style and len(last.text) + len(piece.text) <= FRAME:
-            self._said[-1] = OutputText(last.text + piece.text, piece.style)
+            self._output[-1] = OutputText(last.text + piece.text, piece.style)
         else:
-            self._said.append(piece)
+            self._output.append(piece)
 
     def next_deadline(self) -> float:
         """When `advance` has something to do [s]; infinity for not before a message comes."""
@@ -220,19 +221,19 @@ class PageTerminal:
         if self.monitor is None or self._sent - self._shown > WINDOW:
             return None
         prompt = self.monitor.prompt
-        if not self._said and prompt == self._prompt:
+        if not self._output and prompt == self._prompt:
             return None
         pieces, size = [], 0
-        while self._said and size < FRAME:
-            text, style = self._said[0].text, self._said[0].style
+        while self._output and size < FRAME:
+            text, style = self._output[0].text, self._output[0].style
             part = text[:FRAME]
             if len(part) < len(text):
-                self._said[0] = OutputText(text[FRAME:], style)
+                self._output[0] = OutputText(text[FRAME:], style)
             else:
-                self._said.popleft()
+                self._output.popleft()
             size += len(part)
             pieces.append((part, style.value))
-        self._waiting -= size
+        self.waiting -= size
         self._sent += size
         self._prompt = prompt
         message = {
@@ -260,7 +261,7 @@ class _TerminalClient:
         self.wake, self.heard = asyncio.Event(), asyncio.Event()
 
 
-class PageDoor:
+class PageTerminalServer:
     """Terminals of pages; its route goes into an application. What they are at is made for the first of them."""
 
     def __init__(self, enter: Callable[[], Awaitable[TerminalRoom]]) -> None:
@@ -350,12 +351,12 @@ class PageDoor:
 
     def _turn(self, now: float) -> float:
         assert self._room is not None
-        self._room.board.advance(now=now)
+        self._room.shared.advance(now=now)
         for client in tuple(self._clients):
             client.terminal.advance(now=now)
             client.wake.set()
         deadlines = [client.terminal.next_deadline() for client in self._clients]
-        return min([self._room.board.next_deadline(), *deadlines])
+        return min([self._room.shared.next_deadline(), *deadlines])
 
     async def _write(self, client: _TerminalClient, socket: Any, send: Send) -> None:
         """Send what there is; a page that takes nothing is cut off."""

@@ -66,15 +66,15 @@ def read_line(text: str, line: int) -> Step:
     Raises:
         ValError: If it can't be one.
     """
-    _see_one_line(text, line)
-    step = _step(text, line)
+    _check_one_line(text, line)
+    step = cached_step(text, line)
     if len(text) > _SURELY_SHORT and len(print_step(step)) > LONGEST_LINE - _INDENTED:
         detail = f"spelled out it has more than {LONGEST_LINE - _INDENTED} characters"
         raise ValError("Line too long", detail, place=step.at)
     return step
 
 
-def _see_one_line(text: str, line: int) -> None:
+def _check_one_line(text: str, line: int) -> None:
     if len(text) > LONGEST_LINE:
         detail = f"{LONGEST_LINE} characters at most"
         raise ValError("Line too long", detail, place=TextPosition(line, LONGEST_LINE + 1))
@@ -85,7 +85,8 @@ def _see_one_line(text: str, line: int) -> None:
 
 
 @lru_cache(maxsize=8192)
-def _step(text: str, line: int) -> Step:
+def cached_step(text: str, line: int) -> Step:
+    """The step of a line that is short enough; files repeat their lines."""
     if remark := _REMARK.match(text):
         label, _ = _label(text, line)
         return Step(Blank(), label, text[remark.end() :].rstrip(), TextPosition(line, remark.start(1) + 1))
@@ -142,7 +143,7 @@ def parse_expression(text: str) -> Expression:
     Raises:
         ValError: If it isn't one.
     """
-    _see_one_line(text, 1)
+    _check_one_line(text, 1)
     return grammar.expression(grammar.read(text, "expression", 1), 1)
 
 

@@ -37,7 +37,7 @@ class Listeners:
 
     typed: Callable[[str], None] = unheard
     """What it TYPEs, with line ends."""
-    told: Callable[[str], None] = unheard
+    warned: Callable[[str], None] = unheard
     """Warnings, a line each."""
     asked: Callable[[str], str | None] = unanswered
     """Answers PROMPT; None where nobody does."""
@@ -100,7 +100,7 @@ class Player:
             case Typed(text):
                 self.listeners.typed(text)
             case Warned(text):
-                self.listeners.told(text)
+                self.listeners.warned(text)
             case Asked(question):
                 line = self.listeners.asked(question)
                 if line is None:
@@ -109,10 +109,10 @@ class Player:
                     self._controller.answer(line, now=now)
             case ProgramFailed(error):
                 self.errors.append(error)
-                self._go_on(now, unreached(error))
+                self._go_on(now, out_of_reach(error))
             case ProgramPaused(program, step, word):
                 if not self.done and not self._go_on(now, True):
-                    self.listeners.told(f"{word} in program {program} before step {step}: nobody proceeds")
+                    self.listeners.warned(f"{word} in program {program} before step {step}: nobody proceeds")
             case ProgramEnded():
                 self.done = True
             case _:
@@ -134,17 +134,17 @@ class Player:
         return error.place if error.step is None else None
 
 
-def unreached(error: ValError) -> bool:
+def out_of_reach(error: ValError) -> bool:
     """Whether an error is about where the arm can't go."""
     return error.what in ("Location out of range", "Straight line not possible")
 
 
-def stuck() -> ValError:
+def stuck_error() -> ValError:
     """The error of a program that nothing wakes."""
     return ValError("Waits for ever", "no signal that it waits for will come")
 
 
-def endless(limit: float) -> ValError:
+def endless_error(limit: float) -> ValError:
     """The error of a program that is given up."""
     return ValError("Program given up", f"it hadn't ended after {limit:g} s")
 
@@ -213,7 +213,7 @@ def rehearse(
         if len(player.errors) >= MOST:
             break
         if deadline == math.inf or now >= limit or computed >= COMPUTING:
-            given_up = player.give_up(stuck() if deadline == math.inf else endless(now), now)
+            given_up = player.give_up(stuck_error() if deadline == math.inf else endless_error(now), now)
             break
         # The steps of one call take little more than this; longer pauses are waits.
         computed += deadline - now if deadline - now <= 4 * TURN * STATEMENT else 0.0

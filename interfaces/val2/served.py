@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 from interfaces.stream.control import Role
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import LeaseControl, SharedOperator, Switchboard
+from interfaces.val2.monitor.control import LeaseControl, SharedController, SharedOperator
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.pages import TerminalRoom
 from interfaces.val2.parser import parse_expression
-from interfaces.val2.tcp import ValDoor
+from interfaces.val2.tcp import TcpTerminalServer
 from vrs.errors import VrsError
 
 if TYPE_CHECKING:
@@ -77,8 +77,8 @@ class ServedVal:
         connection, arm = await asyncio.to_thread(self._connect)
         self._connection = connection
         controller = Controller(arm, parameters=arm.parameters, now=connection.now())
-        board = Switchboard(controller, LeaseControl(connection))
-        return TerminalRoom(board, connection, partial(self._terminal, board, self._access))
+        shared = SharedController(controller, LeaseControl(connection))
+        return TerminalRoom(shared, connection, partial(self._terminal, shared, self._access))
 
     def _connect(self) -> tuple[Connection, Arm]:
         from interfaces import connect
@@ -106,19 +106,19 @@ class ServedVal:
         room = await self.enter()
 
         def terminal(shown: str) -> TerminalMonitor | None:
-            return self._terminal(room.board, access, shown, None)
+            return self._terminal(room.shared, access, shown, None)
 
-        async with ValDoor(room.board, room.clock, terminal).listening(listening):
+        async with TcpTerminalServer(room.shared, room.clock, terminal).listening(listening):
             yield self
 
     def _terminal(
-        self, board: Switchboard, access: Access, token: str | None, person: SharedOperator | None
+        self, shared: SharedController, access: Access, token: str | None, person: SharedOperator | None
     ) -> TerminalMonitor | None:
         """The monitor for whoever shows a token; None for a wrong one."""
-        barred = "this token only looks" if access.refusal(Role.OPERATOR, token) else ""
-        if barred and access.refusal(Role.VIEWER, token):
+        read_only = "this token only looks" if access.refusal(Role.OPERATOR, token) else ""
+        if read_only and access.refusal(Role.VIEWER, token):
             return None
-        return TerminalMonitor(board, self._files, f"{self._version}, VAL-II", barred=barred, person=person)
+        return TerminalMonitor(shared, self._files, f"{self._version}, VAL-II", read_only=read_only, person=person)
 
 
 def examples() -> Path | None:

@@ -111,7 +111,7 @@ class _SourceReader:
                     program, i = yield from read_program(self._lines, i)
                     self._add(program)
                 case ".LOCATIONS" | ".REALS" | ".STRINGS" | ".SIGNALS" as section:
-                    _see_alone(line, section, i + 1)
+                    _check_alone(line, section, i + 1)
                     i = yield from self._section(section, i + 1)
                 case ".END":
                     i += 1
@@ -158,7 +158,7 @@ class _SourceReader:
         return len(self._lines)
 
 
-def _see_alone(line: str, section: str, number: int) -> None:
+def _check_alone(line: str, section: str, number: int) -> None:
     """See that nothing stands behind the word that begins a section."""
     code, _ = split_comment(line, number)
     behind = code.lstrip()[len(section) :]

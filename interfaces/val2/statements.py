@@ -219,7 +219,7 @@ def label_of(operand: Expression | None, rest: OperandText) -> int:
     raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=operand.at if operand else rest.start)
 
 
-def see_no_slip(kind: str, names: list[str], known: Collection[str], at: TextPosition) -> None:
+def reject_misspelling(kind: str, names: list[str], known: Collection[str], at: TextPosition) -> None:
     """See that names which aren't known don't look like those that are, and don't stand beside them.
 
     Raises:
@@ -379,7 +379,7 @@ def _parameter(keyword: str, rest: OperandText) -> Statement:
         raise ValError("Syntax error", f"allowed: {row.usage}", place=rest.start)
     name = found[1].upper()
     if name not in forms.PARAMETERS:
-        see_no_slip("parameter", [name], forms.PARAMETERS, TextPosition(rest.line, found.start(1) + 1))
+        reject_misspelling("parameter", [name], forms.PARAMETERS, TextPosition(rest.line, found.start(1) + 1))
         return Ignored(keyword, rest.text.strip(), rest.at)
     if found[2] is None:
         raise ValError(MISSING, f"allowed: {row.usage}", place=TextPosition(rest.line, found.end() + 1))
@@ -398,7 +398,7 @@ def _switches(keyword: str, rest: OperandText) -> Statement:
             raise ValError("Syntax error", f"allowed: {row.usage}", place=at)
         names.append(name)
     if any(name not in forms.SWITCHES for name in names):
-        see_no_slip("switch", names, forms.SWITCHES, rest.start)
+        reject_misspelling("switch", names, forms.SWITCHES, rest.start)
         return Ignored(keyword, rest.text.strip(), rest.at)
     return Instruction(keyword, (), tuple(names), rest.at)
 

@@ -263,7 +263,7 @@ _MEANWHILE: Final = {
 """What DO may do while a program runs, beside assignments and TYPE."""
 
 
-def stray(step: Step, at: TextPosition) -> ValError | None:
+def standalone_error(step: Step, at: TextPosition) -> ValError | None:
     """Why a step can't stand alone, as DO wants it; None if it can."""
     match step.statement:
         case (
@@ -287,7 +287,7 @@ def stray(step: Step, at: TextPosition) -> ValError | None:
             return None
 
 
-def meanwhile(step: Step) -> bool:
+def runs_beside_program(step: Step) -> bool:
     """Whether a step takes no time and moves nothing."""
     match step.statement:
         case Assign() | Set() | Type() | Decompose():

@@ -17,28 +17,28 @@ from typing import Final
 
 from interfaces.stream.limits import Strangers
 from interfaces.timer import Turning
-from interfaces.val2.monitor.control import Switchboard
+from interfaces.val2.monitor.control import SharedController
 from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from vrs.clock import Clock
 
 MOST: Final = 16
 """Terminals at a time, those that have shown a token."""
-STRANGERS: Final = 256
+MOST_UNAUTHENTICATED: Final = 256
 """Connections at a time that haven't shown one; the oldest gives way to a new one."""
-PATIENCE: Final = 60.0
+TOKEN_TIMEOUT: Final = 60.0
 """Time for the token [s]."""
 UNREAD: Final = 262_144
 """Bytes that may wait for a reader; what is said beyond them is lost to it."""
-TRIES: Final = 3
+TOKEN_TRIES: Final = 3
 """Tokens that may be tried."""
-BEFORE: Final = 4096
+TOKEN_CHARACTERS: Final = 4096
 """Characters that may come before the right token."""
 SLICE: Final = 8
 """Lines of a terminal that are taken in one turn: others have theirs in between."""
-UNTAKEN: Final = 64
+MOST_QUEUED: Final = 64
 """Lines that may wait to be taken; more isn't read meanwhile."""
-ALIVE: Final = 1.0
+PROBE_PERIOD: Final = 1.0
 """How often a client that sends no more is looked after while its program runs [s]."""
 _READ: Final = 4096
 _NEWLINE: Final = "\r\n"
@@ -75,15 +75,22 @@ class TcpTerminal:
         self._lines: deque[str] = deque()
         self.monitor: TerminalMonitor | None = None
         """None before a token was accepted: nothing is carried out."""
-        self._tries, self._before = TRIES, 0
-        self._ended = self._told = self._lost = False
-        self._looked = 0.0
+        self._tries, self._characters = TOKEN_TRIES, 0
+        self._ended = self._end_announced = False
+        self.lost = False
+        """Whether output was lost since anything was sent."""
+        self._probed_at = 0.0
         self.over = asyncio.Event()
         """Set when it's to be closed."""
-        self.room = asyncio.Event()
+        self.may_read = asyncio.Event()
         """Set while more may be read."""
-        self.room.set()
+        self.may_read.set()
         self._send(_TOKEN)
+
+    @property
+    def unread(self) -> int:
+        """Bytes that wait for the reader."""
+        return self._writer.transport.get_write_buffer_size()
 
     def unlock(self, data: bytes, *, now: float) -> bool:
         """Take bytes, none at the end of the input, until a token was accepted; whether it was."""
@@ -94,8 +101,8 @@ class TcpTerminal:
         """Take bytes; none at the end of the input."""
         self._lines.extend(self._input.feed(data) if data else self._input.end())
         self._ended = self._ended or not data
-        if len(self._lines) > UNTAKEN:
-            self.room.clear()
+        if len(self._lines) > MOST_QUEUED:
+            self.may_read.clear()
 
     def advance(self, *, now: float) -> None:
         """Do what is due, and what was typed."""
@@ -110,13 +117,13 @@ class TcpTerminal:
         for _ in range(min(SLICE, len(self._lines))):
             if not monitor.done:
                 self._type(monitor, self._lines.popleft(), now)
-        if len(self._lines) <= UNTAKEN:
-            self.room.set()
+        if len(self._lines) <= MOST_QUEUED:
+            self.may_read.set()
         if self._ended and not self._lines:
-            if not self._told:
-                self._told, self._looked = True, now
+            if not self._end_announced:
+                self._end_announced, self._probed_at = True, now
                 monitor.end_of_input(now=now)
-            self._look_after(now)
+            self._probe(now)
         self._give()
         if monitor.done:
             self.over.set()
@@ -125,7 +132,7 @@ class TcpTerminal:
         """Make the monitor, once a token is right; whether there's one."""
         while self._lines and not self.over.is_set():
             text = self._lines.popleft().strip()
-            self._before += len(text) + 1
+            self._characters += len(text) + 1
             monitor = self._terminal(text) if text else None
             if monitor is not None and self._full():
                 self._send(f"*Too many terminals* {MOST} at most{_NEWLINE}")
@@ -134,7 +141,12 @@ class TcpTerminal:
                 self.monitor = monitor
                 monitor.start(now=now)
                 return True
-            elif text == OVERLONG or self._before > BEFORE or _OTHER_PROTOCOL.match(text) or _HEADER.match(text):
+            elif (
+                text == OVERLONG
+                or self._characters > TOKEN_CHARACTERS
+                or _OTHER_PROTOCOL.match(text)
+                or _HEADER.match(text)
+            ):
                 self.over.set()
             elif text:
                 self._tries -= 1
@@ -142,7 +154,7 @@ class TcpTerminal:
                 if not self._tries:
                     self.over.set()
         begun = self._input.begun.lstrip()
-        if self._ended or len(begun) > BEFORE or _OTHER_PROTOCOL.match(begun):
+        if self._ended or len(begun) > TOKEN_CHARACTERS or _OTHER_PROTOCOL.match(begun):
             self.over.set()
         return False
 
@@ -155,9 +167,9 @@ class TcpTerminal:
             monitor.line(text, now=now)
         self._give()
 
-    def _look_after(self, now: float) -> None:
-        if self.monitor is not None and self.monitor.busy and now >= self._looked + ALIVE:
-            self._looked = now
+    def _probe(self, now: float) -> None:
+        if self.monitor is not None and self.monitor.busy and now >= self._probed_at + PROBE_PERIOD:
+            self._probed_at = now
             self._writer.write(_NUL)
 
     def _give(self) -> None:
@@ -166,14 +178,13 @@ class TcpTerminal:
 
     def _send(self, text: str) -> None:
         data = text.encode()
-        waiting = self._writer.transport.get_write_buffer_size()
-        if waiting + len(data) > UNREAD:
-            self._lost = True
+        if self.unread + len(data) > UNREAD:
+            self.lost = True
             return
         if not data:
             return
-        if self._lost:
-            self._lost = False
+        if self.lost:
+            self.lost = False
             data = f"{_NEWLINE}*Output lost* it wasn't read{_NEWLINE}".encode() + data
         self._writer.write(data)
 
@@ -189,30 +200,42 @@ class TcpTerminal:
             return math.inf
         if self._lines:
             return -math.inf
-        looked = self._looked + ALIVE if self._told else math.inf
+        looked = self._probed_at + PROBE_PERIOD if self._end_announced else math.inf
         return min(self.monitor.next_deadline(), looked)
 
 
-class ValDoor:
+class TcpTerminalServer:
     """Terminals at one controller, over TCP."""
 
-    def __init__(self, board: Switchboard, clock: Clock, terminal: Callable[[str], TerminalMonitor | None]) -> None:
+    def __init__(
+        self, shared: SharedController, clock: Clock, terminal: Callable[[str], TerminalMonitor | None]
+    ) -> None:
         """Begin with `listening`.
 
         Args:
-            board: What all terminals are at.
+            shared: What all terminals are at.
             clock: Session time.
             terminal: Makes a connection's monitor for a token; None for a wrong one.
         """
-        self._board, self._clock, self._terminal = board, clock, terminal
+        self._shared, self._clock, self._terminal = shared, clock, terminal
         self._connections: set[TcpTerminal] = set()
-        self._strangers: Strangers[asyncio.StreamWriter] = Strangers(STRANGERS)
+        self._unauthenticated: Strangers[asyncio.StreamWriter] = Strangers(MOST_UNAUTHENTICATED)
         self._turning = Turning(clock, self._turn)
         self.port = 0
         """Where it listens."""
 
+    @property
+    def terminals(self) -> tuple[TcpTerminal, ...]:
+        """Those that have shown a token."""
+        return tuple(self._connections)
+
+    @property
+    def unauthenticated(self) -> int:
+        """Connections that haven't."""
+        return len(self._unauthenticated)
+
     @contextlib.asynccontextmanager
-    async def listening(self, listening: socket.socket) -> AsyncIterator[ValDoor]:
+    async def listening(self, listening: socket.socket) -> AsyncIterator[TcpTerminalServer]:
         """Serve terminals meanwhile.
 
         Args:
@@ -225,22 +248,22 @@ class ValDoor:
             yield self
         finally:
             server.close()
-            for writer in self._strangers:
+            for writer in self._unauthenticated:
                 writer.transport.abort()
             for connection in self._connections:
                 connection.leave(now=self._clock.now())
             self._turning.stop()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(2.0):
-                    while self._connections or len(self._strangers):
+                    while self._connections or len(self._unauthenticated):
                         await asyncio.sleep(0.01)
 
     def _turn(self, now: float) -> float:
-        self._board.advance(now=now)
+        self._shared.advance(now=now)
         for connection in tuple(self._connections):
             connection.advance(now=now)
         deadlines = [connection.next_deadline() for connection in self._connections]
-        return min([self._board.next_deadline(), *deadlines])
+        return min([self._shared.next_deadline(), *deadlines])
 
     def _full(self) -> bool:
         return len(self._connections) >= MOST
@@ -266,11 +289,11 @@ class ValDoor:
     ) -> bool:
         """Wait for a token; whether one was accepted. Another stranger may be cut off for this one."""
         address = str(writer.get_extra_info("peername", ("",))[0])
-        oldest = self._strangers.add(writer, address, until=math.inf)
+        oldest = self._unauthenticated.add(writer, address, until=math.inf)
         if oldest is not None:
             oldest.transport.abort()
         try:
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(TOKEN_TIMEOUT):
                 while not connection.over.is_set():
                     data = await reader.read(_READ)
                     if connection.unlock(data, now=self._clock.now()):
@@ -279,7 +302,7 @@ class ValDoor:
         except (OSError, TimeoutError):
             pass
         finally:
-            self._strangers.discard(writer)
+            self._unauthenticated.discard(writer)
         return False
 
     async def _read(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> None:
@@ -292,7 +315,7 @@ class ValDoor:
                 return
             connection.feed(data)
             self._turning.soon()
-            await connection.room.wait()
+            await connection.may_read.wait()
             # Others have their turn, too, where there's always something to read.
             await asyncio.sleep(0)
 

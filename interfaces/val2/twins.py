@@ -13,14 +13,14 @@ from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
-from interfaces.val2.playing import Listeners, Player, endless, stuck
+from interfaces.val2.playing import Listeners, Player, endless_error, stuck_error
 from interfaces.val2.source import SourceFile
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt
 from vrs.model import RobotModel
 
 LONGEST: Final = 600.0
-"""How long a program may take [s], unless it's told otherwise."""
+"""How long a program may take [s], by default."""
 _LOOK: Final = 0.1
 """How often a program is looked after at least [s]: reports may have changed what it waits for."""
 
@@ -50,8 +50,8 @@ class _Operator:
     player: Player = field(init=False)
     _holds: bool = False
 
-    def told(self, now: float, command: Command, receipt: Receipt) -> None:
-        """Write down what the virtual robot took."""
+    def executed(self, now: float, command: Command, receipt: Receipt) -> None:
+        """Record a command that the virtual robot accepted."""
         assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit))
         self.session.sent(now, command, receipt)
         self.motions.append(PlannedMotion(self.name, now, command))
@@ -71,9 +71,9 @@ class _Operator:
         player = self.player
         player.advance(now)
         if not player.done and player.next_deadline() == math.inf:
-            player.give_up(stuck(), now)
+            player.give_up(stuck_error(), now)
         if not player.done and now >= self.limit:
-            player.give_up(endless(self.limit), now)
+            player.give_up(endless_error(self.limit), now)
         if player.done:
             self.session.last_action = now
         else:
@@ -119,7 +119,7 @@ def play(
             start, model, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper
         )
         operator = _Operator(session, limit, source.name)
-        robot = SiteRobot(session.operator, operator.told)
+        robot = SiteRobot(session.operator, operator.executed)
         val = Arm(robot, parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
         operator.player = player = Player(source, val, listeners or Listeners(), rng)

@@ -39,7 +39,7 @@ class SharedOperator(Protocol):
 class Control(Protocol):
     """The right to command the robot, as its site gives it."""
 
-    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
+    def request(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         """Ask for it, if it isn't there: empty if it is, why not, or None while nothing is known yet.
 
         Args:
@@ -48,10 +48,10 @@ class Control(Protocol):
         """
 
     @property
-    def kept(self) -> bool:
+    def held(self) -> bool:
         """Whether it's there."""
 
-    def lapsed(self) -> str:
+    def pop_lapse(self) -> str:
         """Why it has ended since this was asked last; empty where it hasn't."""
 
     def release(self, *, now: float) -> None:
@@ -60,26 +60,26 @@ class Control(Protocol):
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself."""
 
-    def trouble(self, *, now: float) -> ValError | None:
+    def fault(self, *, now: float) -> ValError | None:
         """What is wrong with the robot or the way to it; None where nothing is."""
 
     @property
-    def looks(self) -> float:
+    def fault_poll_interval(self) -> float:
         """How often it's to be asked for trouble [s]; infinity for never."""
 
 
 class Free(Control):
     """Control over what nobody else can reach."""
 
-    kept = True
+    held = True
     """It's there."""
 
     @override
-    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
+    def request(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         return ""
 
     @override
-    def lapsed(self) -> str:
+    def pop_lapse(self) -> str:
         return ""
 
     @override
@@ -91,12 +91,12 @@ class Free(Control):
         """It doesn't stop by itself."""
 
     @override
-    def trouble(self, *, now: float) -> ValError | None:
+    def fault(self, *, now: float) -> ValError | None:
         return None
 
     @property
     @override
-    def looks(self) -> float:
+    def fault_poll_interval(self) -> float:
         return math.inf
 
 
@@ -107,7 +107,7 @@ class TerminalListener(Protocol):
         """Take an event of the controller."""
 
 
-class Switchboard:
+class SharedController:
     """Who is in control, and who is told of events."""
 
     def __init__(self, controller: Controller, control: Control) -> None:
@@ -125,7 +125,9 @@ class Switchboard:
         self._withdraws: float | None = None
         """When to see next whether what a program asked for ahead can be taken back [s]; None where nothing is."""
 
-    def wanted(self, terminal: TerminalListener, person: SharedOperator | None = None, *, now: float) -> str | None:
+    def request(
+        self, terminal: TerminalListener, person: SharedOperator | None = None, *, now: float
+    ) -> str | None:
         """Ask for control for a terminal: empty if it's in control, why not, or None if that isn't known yet.
 
         Args:
@@ -135,10 +137,10 @@ class Switchboard:
         """
         self._notice(now)
         if self.holder is not None and self.holder is not terminal:
-            if self._control.kept:
+            if self._control.held:
                 return "another terminal is in control"
             self._dismiss(now)
-        answer = self._control.wanted(person, now=now)
+        answer = self._control.request(person, now=now)
         if answer == "":
             self.holder, self._person = terminal, person
         return answer
@@ -152,7 +154,7 @@ class Switchboard:
 
     def _notice(self, now: float) -> None:
         """End what runs if control has ended since this was called last, though it may be there again."""
-        why = self._control.lapsed()
+        why = self._control.pop_lapse()
         if why and (self.controller.running or self.controller.doing):
             self.controller.interrupt(ValError("Motion interrupted", why), now=now)
             self._withdraws = now
@@ -162,8 +164,8 @@ class Switchboard:
     def _withdraw(self, now: float) -> bool:
         """Take out of the plan what was asked for ahead; whether it's to be tried again."""
         person = self._person
-        answer = "" if person is None or not person.holds else self._control.wanted(person, now=now)
-        if answer == "" and self._control.kept:
+        answer = "" if person is None or not person.holds else self._control.request(person, now=now)
+        if answer == "" and self._control.held:
             self.controller.arm.withdraw(now=now)
         return answer is None
 
@@ -171,14 +173,14 @@ class Switchboard:
         """Let a robot go on that stopped by itself."""
         self._control.resume(now=now)
 
-    def trouble(self, *, now: float) -> ValError | None:
+    def fault(self, *, now: float) -> ValError | None:
         """What is wrong with the robot or the way to it; None where nothing is."""
-        return self._control.trouble(now=now)
+        return self._control.fault(now=now)
 
     @property
-    def looks(self) -> float:
+    def fault_poll_interval(self) -> float:
         """How often it's to be asked for trouble [s]."""
-        return self._control.looks
+        return self._control.fault_poll_interval
 
     def leave(self, terminal: TerminalListener, *, now: float) -> None:
         """A terminal is gone: what it ran is stopped."""
@@ -205,15 +207,15 @@ class Switchboard:
         return min(self.controller.next_deadline(), math.inf if self._withdraws is None else self._withdraws)
 
 
-PATIENCE: Final = 3.0
+LEASE_TIMEOUT: Final = 3.0
 """How long the lease is waited for [s]; the robot comes to rest between two."""
-MEETING: Final = 10.0
+FOLLOW_TIMEOUT: Final = 10.0
 """How long a robot is waited for that doesn't follow a new lease yet [s]."""
-_TOLD: Final = 1.0
+_TAKE_GRACE: Final = 1.0
 """So long after a person's session was to take control it may be that it has it, and hasn't said so [s]."""
 _ASK_AGAIN: Final = 0.25
 """Time between two requests [s]."""
-_LOOKS: Final = 0.1
+_FAULT_POLL: Final = 0.1
 """Time between two looks at how the robot is [s]."""
 
 
@@ -227,8 +229,8 @@ class LeaseControl(Control):
             connection: Of an operator.
         """
         self._connection = connection
-        self._since: float | None = None
-        self._asked = 0.0
+        self._requested_at: float | None = None
+        self._polled_at = 0.0
         self._granted: float | None = None
         """When a lease was first seen to be held [s]."""
         self._share: tuple[str, int] = "", 0
@@ -239,19 +241,19 @@ class LeaseControl(Control):
         self._resumed = self._resume_until = -math.inf
 
     @override
-    def wanted(self, person: SharedOperator | None = None, *, now: float) -> str | None:
+    def request(self, person: SharedOperator | None = None, *, now: float) -> str | None:
         """Ask for the lease: empty if it's there, why not, or None while nothing is known yet.
 
         Args:
             person: Whose lease is to be shared; None for one of the connection's own.
             now: Session time [s].
         """
-        lease = self._noted(now)
+        lease = self._observe_lease(now)
         if not self._connection.is_connected:
-            return self._settled("there's no connection to the robot's server")
-        return self._own(lease, now) if person is None else self._theirs(person, lease, now)
+            return self._answer("there's no connection to the robot's server")
+        return self._request_own(lease, now) if person is None else self._request_share(person, lease, now)
 
-    def _noted(self, now: float) -> Lease | None:
+    def _observe_lease(self, now: float) -> Lease | None:
         """The lease as it was last heard of."""
         lease = self._connection.lease
         if lease is None or lease.state is not LeaseState.HELD:
@@ -260,26 +262,26 @@ class LeaseControl(Control):
             self._granted = now
         return lease
 
-    def _own(self, lease: Lease | None, now: float) -> str | None:
-        if lease is not None and lease.state is LeaseState.HELD and not self._ends:
+    def _request_own(self, lease: Lease | None, now: float) -> str | None:
+        if lease is not None and lease.state is LeaseState.HELD and not self._release_pending:
             if not lease.yours:
-                return self._settled(f"{lease.holder} has control")
-            return self._settled("") if self._follows(now) else None
-        return self._patient(now, self._acquire, "the robot isn't at rest yet: try again")
+                return self._answer(f"{lease.holder} has control")
+            return self._answer("") if self._follows(now) else None
+        return self._poll(now, self._acquire, "the robot isn't at rest yet: try again")
 
     def _acquire(self) -> None:
         self._connection.acquire(wait=0.0)
 
-    def _theirs(self, person: SharedOperator, lease: Lease | None, now: float) -> str | None:
+    def _request_share(self, person: SharedOperator, lease: Lease | None, now: float) -> str | None:
         """A share of the lease of a person's session, which is to take one if it has none."""
-        mine = lease is not None and lease.shared and lease.commands and not self._ends
+        mine = lease is not None and lease.shared and lease.commands and not self._release_pending
         if mine and self._share[0] == person.session:
-            return self._settled("") if self._follows(now) else None
+            return self._answer("") if self._follows(now) else None
         if not person.holds:
-            asked = self._since is not None and self._since <= now < self._since + _TOLD
+            asked = self._requested_at is not None and self._requested_at <= now < self._requested_at + _TAKE_GRACE
             if lease is not None and lease.state is LeaseState.HELD and not (lease.yours or asked):
-                return self._settled(f"{lease.holder} has control")
-            return self._patient(now, person.take, "control wasn't given: try again")
+                return self._answer(f"{lease.holder} has control")
+            return self._poll(now, person.take, "control wasn't given: try again")
         session, number = self._share
         if session != person.session or not number:
             self._share = person.session, self._connection.ask_to_share(person.session)
@@ -287,16 +289,16 @@ class LeaseControl(Control):
         answer = self._connection.answer(number)
         if answer is not None:
             self._share = session, 0
-        return self._settled(answer.text) if isinstance(answer, Problem) else None
+        return self._answer(answer.text) if isinstance(answer, Problem) else None
 
-    def _patient(self, now: float, ask: Callable[[], None], in_vain: str) -> str | None:
+    def _poll(self, now: float, ask: Callable[[], None], timeout_reason: str) -> str | None:
         """Ask now and then, but not for ever."""
-        if self._since is None or now < self._since:
-            self._since, self._asked = now, now - _ASK_AGAIN
-        if now >= self._since + PATIENCE:
-            return self._settled(in_vain)
-        if now >= self._asked + _ASK_AGAIN:
-            self._asked = now
+        if self._requested_at is None or now < self._requested_at:
+            self._requested_at, self._polled_at = now, now - _ASK_AGAIN
+        if now >= self._requested_at + LEASE_TIMEOUT:
+            return self._answer(timeout_reason)
+        if now >= self._polled_at + _ASK_AGAIN:
+            self._polled_at = now
             ask()
         return None
 
@@ -304,25 +306,27 @@ class LeaseControl(Control):
         """Whether the robot follows this lease; one that doesn't in time says why to those who command it."""
         assert self._granted is not None
         state = self._connection.state
-        return now >= self._granted + MEETING or (state is not None and state.connected and not state.halted)
+        return now >= self._granted + FOLLOW_TIMEOUT or (state is not None and state.connected and not state.halted)
 
-    def _settled(self, answer: str) -> str:
-        self._since = None
+    def _answer(self, answer: str) -> str:
+        self._requested_at = None
         return answer
 
     @property
-    def _ends(self) -> bool:
+    def _release_pending(self) -> bool:
         """Whether it was given back, and the server hasn't said so yet."""
         return self._connection.lapses == self._given_back
 
     @property
     @override
-    def kept(self) -> bool:
+    def held(self) -> bool:
         lease = self._connection.lease
-        return not self._connection.is_connected or (lease is not None and lease.commands and not self._ends)
+        return not self._connection.is_connected or (
+            lease is not None and lease.commands and not self._release_pending
+        )
 
     @override
-    def lapsed(self) -> str:
+    def pop_lapse(self) -> str:
         lease, lapses = self._connection.lease, self._connection.lapses
         if lapses == self._lapses:
             return ""
@@ -339,12 +343,12 @@ class LeaseControl(Control):
     @override
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself, as soon as it can within a while."""
-        self._resumed, self._resume_until = -math.inf, now + PATIENCE
-        self.trouble(now=now)
+        self._resumed, self._resume_until = -math.inf, now + LEASE_TIMEOUT
+        self.fault(now=now)
 
     @override
-    def trouble(self, *, now: float) -> ValError | None:
-        connection, state, lease = self._connection, self._connection.state, self._noted(now)
+    def fault(self, *, now: float) -> ValError | None:
+        connection, state, lease = self._connection, self._connection.state, self._observe_lease(now)
         if not connection.is_connected:
             return ValError("No connection", "to the robot's server; it's taken up again by itself")
         if state is None or not state.halted:
@@ -358,5 +362,5 @@ class LeaseControl(Control):
 
     @property
     @override
-    def looks(self) -> float:
-        return _LOOKS
+    def fault_poll_interval(self) -> float:
+        return _FAULT_POLL

@@ -10,7 +10,7 @@ from typing import Final
 from interfaces.val2 import context
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, settings
-from interfaces.val2.monitor.control import SharedOperator, Switchboard
+from interfaces.val2.monitor.control import SharedController, SharedOperator
 from interfaces.val2.monitor.editor import Editing
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.locations import Teach, WatchDialogue
@@ -23,7 +23,7 @@ OVERLONG: Final = "\x00"
 """What stands for a line that was too long to be read."""
 WAITING: Final = 64
 """Lines that may wait until an instruction is done."""
-ASKING: Final = 0.02
+CONTROL_POLL: Final = 0.02
 """Time between two looks whether control was given [s]."""
 _URGENT: Final = frozenset({"ABORT", "PANIC"})
 """What doesn't wait."""
@@ -34,38 +34,38 @@ class TerminalMonitor:
 
     def __init__(
         self,
-        board: Switchboard,
+        shared: SharedController,
         files: Files,
         version: str,
         *,
-        patient: bool = False,
-        barred: str = "",
+        queues_commands: bool = False,
+        read_only: str = "",
         person: SharedOperator | None = None,
     ) -> None:
         """Begin; `start` greets.
 
         Args:
-            board: Where the controller is, and others perhaps.
+            shared: Where the controller is, and others perhaps.
             files: What LOAD and STORE reach.
             version: What ID says.
-            patient: Whether lines that can't be done while a program runs wait for its end, as they do where all
-                come at once; else they are errors.
-            barred: Why this terminal only looks, whoever is in control.
+            queues_commands: Whether lines that can't be done while a program runs wait for its end; else they are
+                errors.
+            read_only: Why this terminal only looks, whoever is in control.
             person: Who sits here, where they command by a session of their own, too: control is theirs, and isn't
                 asked for before a command needs it.
         """
         self._person = person
-        self._board, self._patient, self.barred = board, patient, barred
-        self.state = TerminalState(board.controller, files, version)
+        self._shared, self._queues_commands, self.read_only = shared, queues_commands, read_only
+        self.state = TerminalState(shared.controller, files, version)
         self._dialogue: Dialogue | None = None
-        self._asked: str | None = None
+        self._question: str | None = None
         self._waiting: deque[str] = deque()
         self._greeting = False
         self._ended = False
-        self._due = math.inf
-        self._claimed = ("", "")
+        self._control_due = math.inf
+        self._pending_command = ("", "")
         """A command's name, and its line that waits for control."""
-        self._trouble, self._looked = "", -math.inf
+        self._fault, self._checked_at = "", -math.inf
         self.done = False
         """Whether it's over: QUIT, or the end of the input."""
 
@@ -76,32 +76,32 @@ class TerminalMonitor:
             return ""
         if self._dialogue is not None and not self._busy:
             return self._dialogue.prompt
-        if self._asked is not None:
-            return self._asked
+        if self._question is not None:
+            return self._question
         if self._busy:
             return ""
         return "*" if self.state.controller.running else "."
 
     @property
-    def _mine(self) -> bool:
-        return self._board.holder is self
+    def _in_control(self) -> bool:
+        return self._shared.holder is self
 
     @property
     def _busy(self) -> bool:
         """Whether lines wait: for an instruction, or for control."""
-        works = self.state.work is not None or (self._mine and self.state.controller.doing)
-        return self._greeting or self._due < math.inf or works
+        works = self.state.work is not None or (self._in_control and self.state.controller.doing)
+        return self._greeting or self._control_due < math.inf or works
 
     @property
     def busy(self) -> bool:
         """Whether a program or an instruction of this terminal is under way, or lines wait."""
-        running = self._mine and (self.state.controller.running or self.state.controller.doing)
+        running = self._in_control and (self.state.controller.running or self.state.controller.doing)
         return running or self._busy or bool(self._waiting)
 
     @property
     def takes_commands(self) -> bool:
         """Whether the next line is a command."""
-        return self._asked is None and (self._dialogue is None or isinstance(self._dialogue, Teach))
+        return self._question is None and (self._dialogue is None or isinstance(self._dialogue, Teach))
 
     @property
     def edits(self) -> bool:
@@ -117,7 +117,7 @@ class TerminalMonitor:
         """Say what this is, and ask for control."""
         self.state.now = now
         self.state.say(f"{self.state.version}. HELP lists the commands.", style=Style.NOTE)
-        self._greeting = self._person is None or bool(self.barred)
+        self._greeting = self._person is None or bool(self.read_only)
         self.advance(now=now)
 
     def line(self, text: str, *, now: float) -> None:
@@ -130,7 +130,7 @@ class TerminalMonitor:
             return
         text = "".join(letter for letter in text.expandtabs() if letter.isprintable())
         word = text.strip().upper()
-        if not self._patient and (word == "PANIC" or (word == "ABORT" and not self._at_prompt)):
+        if not self._queues_commands and (word == "PANIC" or (word == "ABORT" and not self._at_prompt)):
             self._urgent(word)
         elif self.takes(text):
             self._take(text)
@@ -141,18 +141,18 @@ class TerminalMonitor:
     @property
     def _at_prompt(self) -> bool:
         """Whether the next line can be taken, and isn't an answer to a program."""
-        return not (self._busy or self._waiting) and self._asked is None
+        return not (self._busy or self._waiting) and self._question is None
 
     def _urgent(self, word: str) -> None:
         """What is done whatever is under way; what a program asks and what waits is dropped."""
-        if word == "PANIC" or self._mine:
+        if word == "PANIC" or self._in_control:
             self._waiting.clear()
-            dialogue, self._asked = self._dialogue, None
+            dialogue, self._question = self._dialogue, None
             self._command(word)
             self._dialogue = dialogue
 
     def _wait(self, text: str) -> None:
-        if len(self._waiting) >= WAITING and not self._patient:
+        if len(self._waiting) >= WAITING and not self._queues_commands:
             self.state.fail(ValError("Too many lines waiting", f"{WAITING} at most"))
         else:
             self._waiting.append(text)
@@ -162,22 +162,22 @@ class TerminalMonitor:
         return not self._waiting and self._can_take(text)
 
     def _can_take(self, text: str) -> bool:
-        if self._busy or self._dialogue is not None or self._asked is not None:
-            return not self._busy or self._asked is not None
-        runs = self._patient and self._mine and self.state.controller.running
+        if self._busy or self._dialogue is not None or self._question is not None:
+            return not self._busy or self._question is not None
+        runs = self._queues_commands and self._in_control and self.state.controller.running
         return not runs or self._is_allowed(text)
 
     def _take(self, text: str) -> None:
         """Do what a line says."""
         if self._dialogue is not None and not self._busy:
-            self._converse(self._dialogue, text)
-        elif self._asked is not None:
-            self._asked = None
+            self._answer_dialogue(self._dialogue, text)
+        elif self._question is not None:
+            self._question = None
             self._guarded(lambda: self.state.controller.answer(text, now=self.state.now))
         else:
             self._command(text)
 
-    def _converse(self, dialogue: Dialogue, text: str) -> None:
+    def _answer_dialogue(self, dialogue: Dialogue, text: str) -> None:
         if isinstance(dialogue, Teach) and not dialogue.takes(text):
             self._command(text)
             self._dialogue = self._dialogue or dialogue
@@ -223,10 +223,10 @@ class TerminalMonitor:
             self._end()
             return
         if not command.only_shows(rest):
-            answer = self.barred or self._board.wanted(self, self._person, now=self.state.now)
+            answer = self.read_only or self._shared.request(self, self._person, now=self.state.now)
             if answer is None and command.name not in _URGENT:
                 self._waiting.appendleft(text)
-                self._due, self._claimed = self.state.now + ASKING, (command.name, text)
+                self._control_due, self._pending_command = self.state.now + CONTROL_POLL, (command.name, text)
                 return
             if answer:
                 raise ValError("No control", f"{command.name}: {answer}")
@@ -235,7 +235,7 @@ class TerminalMonitor:
             raise ValError("Program running", f"{command.name} must wait, or ABORT it")
         self._dialogue = command.act(self.state, rest)
         if command.name == "ENABLE":
-            self._board.resume(now=self.state.now)
+            self._shared.resume(now=self.state.now)
 
     def interrupt(self, *, now: float) -> None:
         """Ctrl-C: what is asked is dropped, else what this terminal runs is aborted."""
@@ -243,14 +243,14 @@ class TerminalMonitor:
         self._waiting.clear()
         self.state.drop_work()
         if self._dialogue is not None:
-            self._drop(kept=False)
-        elif self._mine and (self.state.controller.running or self.state.controller.doing):
-            self._asked = None
+            self._end_dialogue(kept=False)
+        elif self._in_control and (self.state.controller.running or self.state.controller.doing):
+            self._question = None
             self._command("ABORT")
         self.advance(now=now)
 
-    def _drop(self, *, kept: bool) -> None:
-        dialogue, self._dialogue, self._asked = self._dialogue, None, None
+    def _end_dialogue(self, *, kept: bool) -> None:
+        dialogue, self._dialogue, self._question = self._dialogue, None, None
         if dialogue is not None:
             self._guarded(lambda: dialogue.leave(kept=kept))
 
@@ -267,11 +267,11 @@ class TerminalMonitor:
             self._end()
 
     def _end(self) -> None:
-        self._drop(kept=True)
+        self._end_dialogue(kept=True)
         self.state.drop_work()
         self.done = True
         self._waiting.clear()
-        self._board.leave(self, now=self.state.now)
+        self._shared.leave(self, now=self.state.now)
 
     def take(self, event: context.Event) -> None:
         """Take an event of the controller, when in control."""
@@ -280,17 +280,17 @@ class TerminalMonitor:
             case context.Typed(text):
                 state.output.append(OutputText(text, Style.TYPED))
             case context.Asked(text):
-                self._asked = text
+                self._question = text
             case context.ProgramPaused(program, step, word):
-                self._asked = None
+                self._question = None
                 if word != "XSTEP" or not state.steps:
                     state.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
             case context.ProgramEnded(program, word):
-                self._asked, state.steps = None, 0
+                self._question, state.steps = None, 0
                 if program or word == "ABORT":
                     state.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
             case context.ProgramFailed(error):
-                self._asked, state.steps = None, 0
+                self._question, state.steps = None, 0
                 state.fail(error)
             case context.Warned(text):
                 state.say(text if text.startswith("*") else f"*Warning* {text}", style=Style.NOTE)
@@ -300,81 +300,81 @@ class TerminalMonitor:
     def advance(self, *, now: float) -> None:
         """Do what is due: of the controller, of what is shown again and again, and lines that have waited."""
         self.state.now = now
-        self._board.advance(now=now)
-        if self._greeting or now >= self._due:
+        self._shared.advance(now=now)
+        if self._greeting or now >= self._control_due:
             self._settle_control()
-        self._look()
+        self._report_fault()
         if isinstance(self._dialogue, WatchDialogue):
             self._dialogue.advance()
-        self.state.work_on(allowed=self._mine)
-        self._step_on()
-        self._schedule()
+        self.state.work_on(allowed=self._in_control)
+        self._continue_steps()
+        self._release_scheduled()
         while self._waiting and not self.done:
             text = self._waiting.popleft()
             if not self._can_take(text):
                 self._waiting.appendleft(text)
                 break
             self._take(text)
-            if self._due < math.inf:
+            if self._control_due < math.inf:
                 break
-            self._board.advance(now=now)
-            self._step_on()
+            self._shared.advance(now=now)
+            self._continue_steps()
         if self._ended and not self.done:
             self._finish()
 
     def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.barred or self._board.wanted(self, self._person, now=self.state.now)
+        answer = self.read_only or self._shared.request(self, self._person, now=self.state.now)
         if answer is None:
-            self._due = self.state.now + ASKING
+            self._control_due = self.state.now + CONTROL_POLL
             return
-        self._due = math.inf
+        self._control_due = math.inf
         if self._greeting:
             self._greeting = False
             if answer:
                 self.state.say(f"*No control* {answer}: looking only", style=Style.NOTE)
-        elif answer and self._waiting and self._waiting[0] is self._claimed[1]:
+        elif answer and self._waiting and self._waiting[0] is self._pending_command[1]:
             self._waiting.popleft()
-            self.state.fail(ValError("No control", f"{self._claimed[0]}: {answer}"))
+            self.state.fail(ValError("No control", f"{self._pending_command[0]}: {answer}"))
 
-    def _look(self) -> None:
+    def _report_fault(self) -> None:
         """Say when the robot has stopped by itself, or can't be reached; and when that's over."""
-        self._looked = self.state.now
+        self._checked_at = self.state.now
         if self._greeting:
             return
-        trouble = self._board.trouble(now=self.state.now)
-        text = "" if trouble is None else str(trouble)
-        if text == self._trouble:
+        fault = self._shared.fault(now=self.state.now)
+        text = "" if fault is None else str(fault)
+        if text == self._fault:
             return
-        self._trouble = text
+        self._fault = text
         if text:
             self.state.say(text, style=Style.ERROR)
         else:
             self.state.say("The robot follows again", style=Style.NOTE)
 
-    def _step_on(self) -> None:
+    def _continue_steps(self) -> None:
         """The next of the steps that NEXT is to do."""
         controller = self.state.controller
         while self.state.steps and not (controller.running or controller.doing):
             self.state.steps -= 1
             self._guarded(lambda: controller.xstep(now=self.state.now))
-            self._board.advance(now=self.state.now)
+            self._shared.advance(now=self.state.now)
 
-    def _schedule(self) -> None:
+    def _release_scheduled(self) -> None:
         """A motion for later isn't waited for, once it's accepted."""
         controller = self.state.controller
-        if self.state.scheduling and self._mine and controller.doing:
-            controller.let_go(now=self.state.now)
-            self._board.advance(now=self.state.now)
+        if self.state.scheduling and self._in_control and controller.doing:
+            controller.release_scheduled(now=self.state.now)
+            self._shared.advance(now=self.state.now)
             self.state.scheduling = controller.doing
 
     def _finish(self) -> None:
         """Leave, once nothing is under way."""
         if self._dialogue is not None and not self._busy and not self._waiting:
-            self._drop(kept=True)
-        if self._asked is not None:
+            self._end_dialogue(kept=True)
+        if self._question is not None:
             self.state.fail(ValError("End of input", "the program asks for a line"))
-            self._asked = None
+            self._question = None
             self._command("ABORT")
         if not self.busy:
             self._end()
@@ -382,6 +382,11 @@ class TerminalMonitor:
     def next_deadline(self) -> float:
         """When to call `advance` next [s]; infinity for not before a line comes."""
         if self.state.work is not None:
-            return self._looked
+            return self._checked_at
         watched = self._dialogue.due if isinstance(self._dialogue, WatchDialogue) else math.inf
-        return min(self._board.next_deadline(), self._due, watched, self._looked + self._board.looks)
+        return min(
+            self._shared.next_deadline(),
+            self._control_due,
+            watched,
+            self._checked_at + self._shared.fault_poll_interval,
+        )

@@ -158,7 +158,7 @@ class Pipe:
         """Begin; `run` reads.
 
         Args:
-            monitor: To be patient.
+            monitor: Queues commands.
             clock: Session time.
             source: File descriptor.
         """

@@ -32,7 +32,7 @@ from interfaces.val2.motion.places import (
     with_word,
 )
 from interfaces.val2.motion.robot import CommandOutcome, RobotPort
-from interfaces.val2.motion.speeds import Manners, MonitorSpeed, MotionSettings, Speed, bounded
+from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded
 from interfaces.val2.ports import ArmPort, Where
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
@@ -77,9 +77,9 @@ class Arm(ArmPort):
         self.robot = robot
         self.parameters: MutableMapping[str, float] = {} if parameters is None else parameters
         self._frames = Frames(robot.model)
-        self._framed = deque([(-math.inf, self._frames)], maxlen=REMEMBERED)
+        self._frames_since = deque([(-math.inf, self._frames)], maxlen=REMEMBERED)
         """Since when TOOL and BASE have been which [s]."""
-        self._manners = Manners()
+        self._settings = SettingsInForce()
         self._hand = Hand(self.parameters, gripped)
         self._alterations = Alterations()
         self._pace = MonitorSpeed(robot)
@@ -90,21 +90,21 @@ class Arm(ArmPort):
         self._at: float | None = None
         self._delay: tuple[float, float] | None = None
         """When a DELAY may begin at the earliest, and how long it lasts [s]."""
-        self._open: list[tuple[int, bool]] = []
+        self._unanswered: list[tuple[int, bool]] = []
         """What has no answer yet, and whether it's a straight line."""
         self._recent: deque[tuple[int, MotionCommand]] = deque(maxlen=_RECENT)
         self._interrupted: tuple[MotionCommand, ...] = ()
-        self._ahead: tuple[int, ...] = ()
+        self._asked_ahead: tuple[int, ...] = ()
         """What was asked for ahead when somebody else took the arm over."""
-        self._taken_out: list[int] = []
+        self._cancels: list[int] = []
         """What was asked for to take those out of the plan, and has no answer."""
-        self._bound: int | None = None
+        self._awaited: int | None = None
         """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
         self._correction: int | None = None
         """The newest correction by ALTOUT."""
-        self._made = MotionSettings()
+        self._last_settings = MotionSettings()
         """How the newest motion was asked for."""
-        self._made_words: tuple[str, ...] = ()
+        self._last_words: tuple[str, ...] = ()
         self._now = -math.inf
 
     # Where it is.
@@ -115,7 +115,7 @@ class Arm(ArmPort):
 
     @override
     def destination(self, *, now: float) -> Where:
-        self._look(now)
+        self._update(now)
         return self._frames.where(self._goal(), self._hand.goal)
 
     @override
@@ -125,14 +125,14 @@ class Arm(ArmPort):
 
     @override
     def past(self, t: float, *, now: float) -> Where:
-        self._look(now)
-        frames = self._framed[max(bisect_right(self._framed, t, key=lambda since: since[0]) - 1, 0)][1]
+        self._update(now)
+        frames = self._frames_since[max(bisect_right(self._frames_since, t, key=lambda since: since[0]) - 1, 0)][1]
         return frames.where(self.robot.timeline.sample(t), self._hand.opening(t, self._begins))
 
-    def _frame(self, frames: Frames) -> None:
+    def _set_frames(self, frames: Frames) -> None:
         """Let tool and base be others from now on."""
         self._frames = frames
-        self._framed.append((self._now, frames))
+        self._frames_since.append((self._now, frames))
 
     def _goal(self) -> Array:
         """Joints at the destination [rad], (6,)."""
@@ -140,7 +140,7 @@ class Arm(ArmPort):
 
     @override
     def reaches(self, location: Location, *, now: float) -> bool:
-        self._look(now)
+        self._update(now)
         try:
             self._frames.solve(location, self._goal(), ())
         except ValError:
@@ -149,18 +149,18 @@ class Arm(ArmPort):
 
     # What it waits for.
 
-    def _look(self, now: float) -> None:
+    def _update(self, now: float) -> None:
         self._now = now
         self._pace.advance(now=now)
-        self._taken_out = [n for n in self._taken_out if self.robot.fate(n, now=now) is None]
+        self._cancels = [n for n in self._cancels if self.robot.outcome(n, now=now) is None]
         self._hand.begin(self._begins, now)
 
     def _begins(self, number: int) -> float | None:
         """When a motion begins [s]; None while that's unknown. One that was taken back has begun."""
-        fate = self.robot.fate(number, now=self._now)
-        if fate is None:
+        outcome = self.robot.outcome(number, now=self._now)
+        if outcome is None:
             return None
-        receipt = fate.receipt
+        receipt = outcome.receipt
         known = receipt is not None and receipt.execute_at is not None and not receipt.undone
         return receipt.execute_at if receipt is not None and known else self._now
 
@@ -174,29 +174,29 @@ class Arm(ArmPort):
 
     @override
     def answered(self, *, now: float) -> bool:
-        self._look(now)
-        while self._open:
-            number, straight = self._open[0]
-            fate = self.robot.fate(number, now=now)
-            if fate is None:
+        self._update(now)
+        while self._unanswered:
+            number, straight = self._unanswered[0]
+            outcome = self.robot.outcome(number, now=now)
+            if outcome is None:
                 return False
-            self._open.pop(0)
-            if fate.reason:
-                raise _refusal(fate, straight)
-        self._follow_up(now)
+            self._unanswered.pop(0)
+            if outcome.reason:
+                raise _refusal(outcome, straight)
+        self._check_interrupted(now)
         return not self._pace.waits
 
-    def _follow_up(self, now: float) -> None:
+    def _check_interrupted(self, now: float) -> None:
         """See that nothing else has stopped the arm.
 
         Raises:
             ValError: If the real arm stopped on the way, or the way ends somewhere else. RETRY is for the motion.
         """
-        if self._bound is None or (fate := self.robot.fate(self._bound, now=now)) is None:
+        if self._awaited is None or (outcome := self.robot.outcome(self._awaited, now=now)) is None:
             return
-        receipt, why = fate.receipt, self.robot.trouble()
+        receipt, why = outcome.receipt, self.robot.halt_reason()
         if receipt is None or receipt.q is None or receipt.undone:
-            self._bound = None
+            self._awaited = None
             return
         ends = math.inf if receipt.end is None else receipt.end
         if why and now < ends:
@@ -209,7 +209,7 @@ class Arm(ArmPort):
             if np.abs(self.robot.timeline.final() - receipt.q).max() > _ELSEWHERE:
                 self._give_up(now, math.inf)
                 raise ValError("Motion interrupted", "the arm was stopped before its destination")
-            self._bound = None
+            self._awaited = None
 
     def _give_up(self, now: float, end: float) -> None:
         """Ask for nothing more; what isn't over is for RETRY, what was for a motion to come is for the next one.
@@ -226,10 +226,10 @@ class Arm(ArmPort):
             if begins is not None and begins <= now < over
         )
         if self._moves(-math.inf) and (motions[-1][1] is None or motions[-1][1] > now):
-            self._manners.next, self._words = self._made, self._made_words
+            self._settings.next, self._words = self._last_settings, self._last_words
             self._hand.give_back()
         self._recent.clear()
-        self._delay = self._at = self._bound = None
+        self._delay = self._at = self._awaited = None
 
     @override
     def ready(self, *, now: float) -> bool:
@@ -250,24 +250,24 @@ class Arm(ArmPort):
 
     def _nulled(self, now: float) -> bool:
         """Whether the other twin is there, where a motion was to end so."""
-        q = self.robot.real(now=now) if self._made.nulling and self._dry is None else None
+        q = self.robot.real(now=now) if self._last_settings.nulling and self._dry is None else None
         if q is None or now >= self._end() + _NULL_PATIENCE:
             return True
-        allowed = (_FINE if self._made.fine else _COARSE) * self._made.tolerance / 100.0
+        allowed = (_FINE if self._last_settings.fine else _COARSE) * self._last_settings.tolerance / 100.0
         return bool(np.abs(q - self.robot.timeline.final()).max() <= allowed)
 
     @override
     def next_deadline(self) -> float:
         now, (delayed, ends) = self._now, self._delay_span()
         times = [self.robot.timeline.end, self._hand.end, self._pace.next_deadline(), delayed, ends]
-        if self._bound is not None:
-            times.append(now + self.robot.looks)
+        if self._awaited is not None:
+            times.append(now + self.robot.fault_poll_interval)
         if self._recent:
             begins = self._begins(self._recent[-1][0])
             times.append(now + _POLL if begins is None else begins)
-        if self._open or self._pace.waits:
+        if self._unanswered or self._pace.waits:
             times.append(now + _POLL)
-        if self._made.nulling and now >= self._end() and not self._nulled(now):
+        if self._last_settings.nulling and now >= self._end() and not self._nulled(now):
             times.append(now + _NULL_POLL)
         return min((t for t in times if t > now), default=math.inf)
 
@@ -277,11 +277,11 @@ class Arm(ArmPort):
 
     def _send(self, command: Command | None, straight: bool, now: float) -> int:
         number = self.robot.ask(command, now=now)
-        fate = self.robot.fate(number, now=now)
-        if fate is None:
-            self._open.append((number, straight))
-        elif fate.reason:
-            raise _refusal(fate, straight)
+        outcome = self.robot.outcome(number, now=now)
+        if outcome is None:
+            self._unanswered.append((number, straight))
+        elif outcome.reason:
+            raise _refusal(outcome, straight)
         return number
 
     # Motions.
@@ -328,13 +328,13 @@ class Arm(ArmPort):
     def delay(self, seconds: float, *, now: float) -> None:
         if not 0 <= seconds < math.inf:
             raise ValError("Illegal value", f"{seconds:g}: a delay is 0 or above")
-        self._look(now)
+        self._update(now)
         if self._dry is None:
             self._delay = max(now, self._delay_span()[1]), seconds
 
     @override
     def actuate(self, hand: bool | None, *, now: float) -> None:
-        self._look(now)
+        self._update(now)
         if self._dry is None:
             self._hand.actuate(hand, now)
 
@@ -344,7 +344,7 @@ class Arm(ArmPort):
 
         What was asked for the next motion, its speed and the hand, waits for that.
         """
-        self._look(now)
+        self._update(now)
         if self._moves(now):
             raise ValError("Robot is moving", "the path is altered between motions: BREAK comes first")
         if not self.answered(now=now):
@@ -364,7 +364,7 @@ class Arm(ArmPort):
                 pace=bounded(self._pace.pace),
                 tool=self._frames.tip(),
             )
-            self._correction = self._bound = number = self._send(command, True, now)
+            self._correction = self._awaited = number = self._send(command, True, now)
             self._recent.append((number, command))
             self._delay = None
         self._alterations.taken(place)
@@ -379,8 +379,8 @@ class Arm(ArmPort):
         speed: Speed | None = None,
     ) -> None:
         """Ask for a motion; nothing is changed where it can't be."""
-        self._look(now)
-        near, manner = self._goal(), self._manners.next
+        self._update(now)
+        near, manner = self._goal(), self._settings.next
         turns = not straight and isinstance(target, Transformation)
         words = self._words if turns else ()
         if self._dry is not None:
@@ -391,7 +391,7 @@ class Arm(ArmPort):
             command = MotionCommand(
                 target=self._target(target, straight, near, words),
                 execute_at=self._start(now),
-                speed=self._share(target, straight, near, manner.speed if speed is None else speed),
+                speed=self._speed_share(target, straight, near, manner.speed if speed is None else speed),
                 motion=Motion.LINE if straight else Motion.JOINT,
                 insertion=Insertion.APPEND,
                 deviation=math.inf if rolls else 0.0,
@@ -403,11 +403,11 @@ class Arm(ArmPort):
                 command = self._stretched(command, near, manner.duration)
             number = self._send(command, straight, now)
             self._recent.append((number, command))
-            self._bound = number
+            self._awaited = number
             self._hand.ask(number, hand)
             self._hand.begin(self._begins, now)
-        self._made, self._made_words, self._delay, self._at = manner, words, None, None
-        self._manners.taken()
+        self._last_settings, self._last_words, self._delay, self._at = manner, words, None, None
+        self._settings.taken()
         if turns:
             self._words = ()
 
@@ -425,7 +425,7 @@ class Arm(ArmPort):
             return max(self._at, ends)
         return ends if ends > now else None
 
-    def _share(self, target: Location, straight: bool, near: Array, speed: Speed) -> float:
+    def _speed_share(self, target: Location, straight: bool, near: Array, speed: Speed) -> float:
         model = self.robot.model
         if not straight:
             return speed.share(model)
@@ -443,62 +443,62 @@ class Arm(ArmPort):
     @override
     def brake(self, *, now: float) -> None:
         """BRAKE, REACTI, ABORT; what was asked for a motion that hasn't begun is for the next one again."""
-        self._look(now)
+        self._update(now)
         self._give_up(now, self.robot.timeline.end)
-        if now < self.robot.timeline.end or self._open:
+        if now < self.robot.timeline.end or self._unanswered:
             self._send(Stop(), False, now)
 
     @override
     def give_up(self, *, now: float) -> None:
         """Somebody else commands the arm: what isn't over is for RETRY, and no answer is waited for any more."""
-        self._look(now)
-        fate = None if self._bound is None else self.robot.fate(self._bound, now=now)
-        end = None if fate is None or fate.receipt is None else fate.receipt.end
-        self._ahead = tuple(n for n, _ in self._recent if (begins := self._begins(n)) is None or begins > now)
+        self._update(now)
+        outcome = None if self._awaited is None else self.robot.outcome(self._awaited, now=now)
+        end = None if outcome is None or outcome.receipt is None else outcome.receipt.end
+        self._asked_ahead = tuple(n for n, _ in self._recent if (begins := self._begins(n)) is None or begins > now)
         self._give_up(now, math.inf if end is None else end)
-        self._open.clear()
+        self._unanswered.clear()
 
     @override
     def withdraw(self, *, now: float) -> None:
         """Take out of the plan what `give_up` found asked for ahead, as far as it has been accepted."""
-        ahead, self._ahead = self._ahead, ()
+        ahead, self._asked_ahead = self._asked_ahead, ()
         for number in ahead:
-            fate = self.robot.fate(number, now=now)
-            receipt = None if fate is None else fate.receipt
+            outcome = self.robot.outcome(number, now=now)
+            receipt = None if outcome is None else outcome.receipt
             if receipt is not None and receipt.stands:
-                self._taken_out.append(self.robot.ask(Cancel(receipt.command_id), now=now))
+                self._cancels.append(self.robot.ask(Cancel(receipt.command_id), now=now))
 
     @override
     def retry(self, *, now: float) -> bool:
-        self._look(now)
+        self._update(now)
         interrupted, self._interrupted = self._interrupted, ()
         for command in interrupted:
             again = replace(command, execute_at=None, pace=bounded(self._pace.pace))
             number = self._send(again, command.motion is Motion.LINE, now)
             self._recent.append((number, again))
-            self._bound = number
+            self._awaited = number
         return bool(interrupted)
 
     # The timeline.
 
     @override
     def undo(self, *, now: float) -> str:
-        self._look(now)
-        self._interrupted, self._delay, self._bound = (), None, None
+        self._update(now)
+        self._interrupted, self._delay, self._awaited = (), None, None
         self._hand.forget()
         number = self.robot.ask(None, now=now)
-        fate = self.robot.fate(number, now=now)
-        if fate is None:
-            self._open.append((number, False))
+        outcome = self.robot.outcome(number, now=now)
+        if outcome is None:
+            self._unanswered.append((number, False))
             return "The newest command is taken back"
-        if fate.reason or fate.receipt is None:
-            return "Nothing was taken back" + (f": {fate.reason}" if fate.reason else "")
-        return f"Command {fate.receipt.command_id} was taken back"
+        if outcome.reason or outcome.receipt is None:
+            return "Nothing was taken back" + (f": {outcome.reason}" if outcome.reason else "")
+        return f"Command {outcome.receipt.command_id} was taken back"
 
     @override
     def timeline(self, *, now: float) -> list[str]:
         """TIMELINE: number, begin, end and destination of what is scheduled."""
-        self._look(now)
+        self._update(now)
         lines = []
         for receipt in self.robot.scheduled(now=now):
             q = receipt.q
@@ -519,7 +519,7 @@ class Arm(ArmPort):
 
     @override
     def set_speed(self, speed: float, *, turn: float | None, unit: str, always: bool) -> None:
-        self._manners.set_speed(speed, turn, unit, always)
+        self._settings.set_speed(speed, turn, unit, always)
 
     @override
     def fastest(self, unit: str) -> float:
@@ -527,23 +527,23 @@ class Arm(ArmPort):
 
     @override
     def set_acceleration(self, up: float, down: float) -> None:
-        self._manners.set_acceleration(up, down)
+        self._settings.set_acceleration(up, down)
 
     @override
     def set_duration(self, seconds: float, *, always: bool) -> None:
-        self._manners.set_duration(seconds, always)
+        self._settings.set_duration(seconds, always)
 
     @override
     def set_tolerance(self, percent: float | None, *, fine: bool, always: bool) -> None:
-        self._manners.set_tolerance(percent, fine, always)
+        self._settings.set_tolerance(percent, fine, always)
 
     @override
     def tolerance(self) -> tuple[bool, float]:
-        return self._manners.next.fine, self._manners.next.tolerance
+        return self._settings.next.fine, self._settings.next.tolerance
 
     @override
     def set_nulling(self, on: bool, *, always: bool) -> None:
-        self._manners.set_nulling(on, always)
+        self._settings.set_nulling(on, always)
 
     @override
     def set_configuration(self, word: str) -> None:
@@ -553,7 +553,7 @@ class Arm(ArmPort):
 
     @override
     def set_tool(self, tool: Transformation) -> None:
-        self._frame(self._frames.with_tool(tool))
+        self._set_frames(self._frames.with_tool(tool))
 
     @override
     def tool(self) -> Transformation:
@@ -561,7 +561,7 @@ class Arm(ArmPort):
 
     @override
     def set_base(self, base: Transformation) -> None:
-        self._frame(self._frames.with_base(base))
+        self._set_frames(self._frames.with_base(base))
 
     @override
     def base(self) -> Transformation:
@@ -572,7 +572,7 @@ class Arm(ArmPort):
         """Monitor speed, at most 100: time alone is stretched."""
         if not 0 < percent < math.inf:
             raise ValError("Illegal value", f"{percent:g}: a speed is above 0 %")
-        self._look(now)
+        self._update(now)
         self._pace.set(percent, now=now)
 
     @override
@@ -598,28 +598,28 @@ class Arm(ArmPort):
 
     @override
     def set_alter(self, mode: int | None, *, now: float) -> None:
-        self._look(now)
+        self._update(now)
         self._alterations.set(mode)
 
     @override
     def begin_program(self) -> None:
-        self._manners.reset()
+        self._settings.reset()
         self._hand.wanted, self._hand.relax = None, False
         self._words, self._at, self._interrupted = (), None, ()
         self._alterations.set(None)
 
 
-def _refusal(fate: CommandOutcome, straight: bool) -> ValError:
+def _refusal(outcome: CommandOutcome, straight: bool) -> ValError:
     """What a refusal is in VAL's words."""
-    if fate.refusal == OVERRULED:
+    if outcome.refusal == OVERRULED:
         return ValError("Motion interrupted", TAKEN)
-    if fate.receipt is None:
-        return ValError("Command refused", fate.reason)
-    if fate.reason.startswith(NOT_FOLLOWING):
-        why = fate.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
+    if outcome.receipt is None:
+        return ValError("Command refused", outcome.reason)
+    if outcome.reason.startswith(NOT_FOLLOWING):
+        why = outcome.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
         return robot_halted(why)
     if straight:
         return ValError(
-            "Straight line not possible", in_millimetres(fate.reason.removeprefix("no straight line: "))
+            "Straight line not possible", in_millimetres(outcome.reason.removeprefix("no straight line: "))
         )
-    return location_error(fate.reason)
+    return location_error(outcome.reason)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _PATIENCE: Final = 2.0
 """How long an answer waits for the edit that it speaks of to come, too [s]: a motion's from its end on."""
-_LOOKS: Final = 0.05
+_FAULT_POLL: Final = 0.05
 """How often it's looked whether the real robot has stopped by itself [s]."""
 _FETCHED: Final = 10.0
 """How long the timeline may take to come at first [s]."""
@@ -81,7 +81,7 @@ class RemoteRobot(RobotPort):
         return number
 
     @override
-    def fate(self, number: int, *, now: float) -> CommandOutcome | None:
+    def outcome(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it, once the timeline shows it."""
         try:
             issued = self._connection.designer.issued(number)
@@ -91,17 +91,17 @@ class RemoteRobot(RobotPort):
             return None
         if number == self._open:
             self._open, self._outdated = None, self._connection.state
-        fate = CommandOutcome(issued.receipt, issued.refusal)
-        if fate.reason or number not in self._asked:
-            return fate
+        outcome = CommandOutcome(issued.receipt, issued.refusal)
+        if outcome.reason or number not in self._asked:
+            return outcome
         command, before = self._asked[number]
-        if not (self._shows(command, issued.receipt, before) or self.trouble()):
+        if not (self._shows(command, issued.receipt, before) or self.halt_reason()):
             if now < self._patience(issued) + _PATIENCE:
                 return None
             if isinstance(command, MotionCommand) and not self._leads_to(issued.receipt):
-                fate = CommandOutcome(refusal="the server took it, but doesn't show what the arm does")
+                outcome = CommandOutcome(refusal="the server took it, but doesn't show what the arm does")
         del self._asked[number]
-        return fate
+        return outcome
 
     @staticmethod
     def _patience(issued: Issued) -> float:
@@ -124,7 +124,7 @@ class RemoteRobot(RobotPort):
         return q is None or bool(np.abs(self.timeline.final() - q).max() <= _SAME)
 
     @override
-    def trouble(self) -> str:
+    def halt_reason(self) -> str:
         state = self._connection.state
         return "" if state is None or state is self._outdated else state.halted
 
@@ -135,8 +135,8 @@ class RemoteRobot(RobotPort):
 
     @property
     @override
-    def looks(self) -> float:
-        return _LOOKS
+    def fault_poll_interval(self) -> float:
+        return _FAULT_POLL
 
     @override
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:

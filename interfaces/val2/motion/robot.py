@@ -52,13 +52,13 @@ class RobotPort(Protocol):
         """Ask for something; None takes back the newest command.
 
         Returns:
-            The number by which `fate` tells what came of it.
+            The number by which `outcome` tells what came of it.
         """
 
-    def fate(self, number: int, *, now: float) -> CommandOutcome | None:
+    def outcome(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it by now; None while nothing was heard."""
 
-    def trouble(self) -> str:
+    def halt_reason(self) -> str:
         """Why the other twin doesn't follow, having stopped by itself; empty while it does."""
 
     @property
@@ -66,7 +66,7 @@ class RobotPort(Protocol):
         """Whether nothing can be heard of it now."""
 
     @property
-    def looks(self) -> float:
+    def fault_poll_interval(self) -> float:
         """How often it's to be asked for trouble while it moves [s]; infinity where its driver does so anyway."""
 
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
@@ -88,7 +88,7 @@ class EngineRobot(RobotPort):
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
         self._number = 0
-        self._fates: OrderedDict[int, CommandOutcome] = OrderedDict()
+        self._outcomes: OrderedDict[int, CommandOutcome] = OrderedDict()
 
     @property
     @override
@@ -106,16 +106,16 @@ class EngineRobot(RobotPort):
         try:
             answer = self._do(command, now)
         except VrsError as error:
-            fate = CommandOutcome(refusal=str(error))
+            outcome = CommandOutcome(refusal=str(error))
         else:
-            fate = (
+            outcome = (
                 CommandOutcome(answer)
                 if answer is not None
                 else CommandOutcome(refusal="there's nothing to take back")
             )
-        self._fates[self._number] = fate
-        if len(self._fates) > _REMEMBERED:
-            self._fates.popitem(last=False)
+        self._outcomes[self._number] = outcome
+        if len(self._outcomes) > _REMEMBERED:
+            self._outcomes.popitem(last=False)
         return self._number
 
     def _do(self, command: Command | None, now: float) -> Receipt | None:
@@ -127,18 +127,18 @@ class EngineRobot(RobotPort):
         return self.engine.execute(command)  # type: ignore[arg-type]
 
     @override
-    def fate(self, number: int, *, now: float) -> CommandOutcome | None:
+    def outcome(self, number: int, *, now: float) -> CommandOutcome | None:
         """What became of it; of one that's long over, nothing but that it's over."""
-        fate = self._fates.get(number)
-        if fate is None:
+        outcome = self._outcomes.get(number)
+        if outcome is None:
             return CommandOutcome()
-        receipt = fate.receipt
+        receipt = outcome.receipt
         if receipt is None or receipt.status is Status.REJECTED:
-            return fate
+            return outcome
         return CommandOutcome(self.engine.receipt(receipt.command_id))
 
     @override
-    def trouble(self) -> str:
+    def halt_reason(self) -> str:
         return ""
 
     @property
@@ -148,7 +148,7 @@ class EngineRobot(RobotPort):
 
     @property
     @override
-    def looks(self) -> float:
+    def fault_poll_interval(self) -> float:
         return math.inf
 
     @override
@@ -165,27 +165,29 @@ class EngineRobot(RobotPort):
 class SiteRobot(EngineRobot):
     """The operator's site of the laboratory."""
 
-    def __init__(self, site: OperatorSite, told: Callable[[float, Command, Receipt], None] | None = None) -> None:
+    def __init__(
+        self, site: OperatorSite, executed: Callable[[float, Command, Receipt], None] | None = None
+    ) -> None:
         """Reach a site.
 
         Args:
             site: The operator's.
-            told: Is told what was carried out, and when [s].
+            executed: Is called with what was carried out, and when [s].
         """
         super().__init__(site.engine)
-        self._site, self._told = site, told
+        self._site, self._executed = site, executed
 
     def _do(self, command: Command | None, now: float) -> Receipt | None:
         if command is None:
             return self._site.undo(now=now)
         answer = self._site.execute(command, now=now)
         assert isinstance(answer, Receipt)
-        if self._told is not None and answer.status is not Status.REJECTED:
-            self._told(now, command, answer)
+        if self._executed is not None and answer.status is not Status.REJECTED:
+            self._executed(now, command, answer)
         return answer
 
     @override
-    def trouble(self) -> str:
+    def halt_reason(self) -> str:
         return self._site.halted
 
     @override

@@ -73,7 +73,7 @@ class MotionSettings:
     """Whether its end waits for the other twin."""
 
 
-class Manners:
+class SettingsInForce:
     """What holds for the next motion, and what for all after it."""
 
     def __init__(self) -> None:
@@ -171,15 +171,15 @@ class MonitorSpeed:
         self._hear(now)
 
     def _hear(self, now: float) -> None:
-        fate = None if self._number is None else self._robot.fate(self._number, now=now)
-        if fate is None:
+        outcome = None if self._number is None else self._robot.outcome(self._number, now=now)
+        if outcome is None:
             return
         self._number = None
-        if fate.reason:
+        if outcome.reason:
             self._again = max(self._changed, now + _AGAIN)
         else:
             self._held = self._asked
-            self._changed = now if fate.receipt is None or fate.receipt.end is None else fate.receipt.end
+            self._changed = now if outcome.receipt is None or outcome.receipt.end is None else outcome.receipt.end
 
     def next_deadline(self) -> float:
         """When something is to be asked for again [s]; infinity for never."""

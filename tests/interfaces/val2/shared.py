@@ -10,7 +10,7 @@ from interfaces.stream import control
 from interfaces.stream.client import Phase
 from interfaces.stream.control import Role
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import LeaseControl, Switchboard
+from interfaces.val2.monitor.control import LeaseControl, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.motion import Arm
@@ -77,17 +77,21 @@ class Line:
         viewer = Viewer(peer.port, rate=rate)
         self.joined.parts[peer].append(viewer)
         self.joined.run(0.3)
-        return SimpleNamespace(timeline=None, wait=lambda ready, timeout: ready(viewer), of=viewer)
+        return _Following(viewer)
 
 
-class Robot(RemoteRobot):
-    """As its server shows it; the viewer of these tests is plain."""
+class _Following:
+    """A viewer whose server answers at once."""
 
-    def _newest(self):
-        timeline = self._viewer.of.timeline
-        if timeline is not None:
-            self._timeline = timeline
-        return self._timeline
+    def __init__(self, viewer) -> None:
+        self._of = viewer
+
+    @property
+    def timeline(self):
+        return self._of.timeline
+
+    def wait(self, ready, timeout):
+        return ready(self)
 
 
 class Pair:
@@ -97,11 +101,11 @@ class Pair:
         self.joined = Joined()
         self.page = Line(self.joined)
         self.val = Line(self.joined)
-        arm = Arm(Robot(self.val, MODEL))
+        arm = Arm(RemoteRobot(self.val, MODEL))
         self.controller = Controller(arm, parameters=arm.parameters, now=self.val.now)
-        self.board = Switchboard(self.controller, LeaseControl(self.val))
+        self.shared = SharedController(self.controller, LeaseControl(self.val))
         self.taken = 0
-        self.monitor = TerminalMonitor(self.board, Files(directory), "a test", person=self)
+        self.monitor = TerminalMonitor(self.shared, Files(directory), "a test", person=self)
         self.monitor.start(now=self.val.now)
         self.said = ""
 

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import Control, Free, Switchboard
+from interfaces.val2.monitor.control import Control, Free, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.motion import arm_for
@@ -33,20 +33,20 @@ def numbers(shown: str) -> list[float]:
 class Sitting:
     """One or more terminals at a controller."""
 
-    def __init__(self, directory: Path, *, control: Control | None = None, patient: bool = False) -> None:
+    def __init__(self, directory: Path, *, control: Control | None = None, queues_commands: bool = False) -> None:
         self.engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
         parameters: dict[str, float] = {}
         self.arm = arm_for(self.engine, parameters=parameters)
         self.controller = Controller(self.arm, parameters=parameters)
-        self.board = Switchboard(self.controller, Free() if control is None else control)
+        self.shared = SharedController(self.controller, Free() if control is None else control)
         self.files = Files(directory)
         self.now = 0.0
-        self.monitor = self.terminal(patient=patient)
+        self.monitor = self.terminal(queues_commands=queues_commands)
         self.shown = ""
 
-    def terminal(self, *, patient: bool = False) -> TerminalMonitor:
+    def terminal(self, *, queues_commands: bool = False) -> TerminalMonitor:
         """One more terminal."""
-        monitor = TerminalMonitor(self.board, self.files, "vrs-teleop 0: a test", patient=patient)
+        monitor = TerminalMonitor(self.shared, self.files, "vrs-teleop 0: a test", queues_commands=queues_commands)
         monitor.start(now=self.now)
         monitor.output()
         return monitor

@@ -13,22 +13,22 @@ from .sitting import ASK, HELLO, LOOP, Sitting
 class Held:
     """Control that somebody else has, or that takes time to come; of a robot that may be in trouble."""
 
-    looks = 0.1
-    kept = True
+    fault_poll_interval = 0.1
+    held = True
 
     def __init__(self, *answers):
         self.answers, self.released = list(answers), 0
         self.why = ""
         self.wrong = None
 
-    def trouble(self, *, now):
+    def fault(self, *, now):
         return self.wrong
 
-    def lapsed(self):
+    def pop_lapse(self):
         why, self.why = self.why, ""
         return why
 
-    def wanted(self, person=None, *, now):
+    def request(self, person=None, *, now):
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 
     def release(self, *, now):
@@ -114,7 +114,7 @@ def test_a_terminal_that_has_lost_control_gives_way_to_another(tmp_path):
     sitting = Sitting(tmp_path, control=control)
     second = sitting.terminal()
     sitting.type(*LOOP, "EXECUTE loop")
-    control.kept = False
+    control.held = False
     second.line("DO x = 1", now=sitting.now)
     assert not sitting.controller.running
     sitting.pass_time(0.1)
@@ -169,7 +169,7 @@ def test_a_second_terminal_looks_until_the_first_has_left(sitting):
 
 
 def test_from_a_pipe_lines_wait_for_the_end_of_a_program_or_its_question(tmp_path):
-    sitting = Sitting(tmp_path, patient=True)
+    sitting = Sitting(tmp_path, queues_commands=True)
     sitting.type("EDIT ask", "DELAY 1", "BREAK", 'PROMPT "n? ", n', 'TYPE "n is", n', "E", *HELLO)
     sitting.line("EXECUTE ask")
     assert not sitting.monitor.takes("7")
@@ -202,5 +202,5 @@ def test_the_end_of_input_waits_for_the_program_and_ends_a_question(sitting):
 def test_it_can_be_left(sitting, line):
     sitting.line(line)
     assert sitting.monitor.done
-    assert sitting.board.holder is None
+    assert sitting.shared.holder is None
     assert commands.COMMANDS

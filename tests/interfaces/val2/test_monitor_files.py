@@ -120,8 +120,8 @@ def big(count):
 def test_a_large_file_is_loaded_in_slices(sitting, tmp_path, monkeypatch):
     (tmp_path / "big.v2").write_text(big(1000))
     read = []
-    step = parser._step
-    monkeypatch.setattr(parser, "_step", lambda text, line: (read.append(text), step(text, line))[1])
+    step = parser.read_line
+    monkeypatch.setattr(parser, "read_line", lambda text, line: (read.append(text), step(text, line))[1])
     sitting.line("LOAD big")
     sitting.line("LISTR n")
     slices = 0

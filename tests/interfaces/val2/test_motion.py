@@ -177,7 +177,7 @@ def test_a_configuration_is_taken_at_the_next_joint_motion(word):
     bench.settle()
     assert close(bench.here(), place) < 1e-9
     joints, q = bench.here().joints.joints, bench.engine.joints(bench.now)
-    assert word in bench.arm._frames.configured(q)
+    assert word in Frames(MODEL).configured(q)
     if "FLIP" in word:
         assert (joints[4] < 0) == (word == "FLIP")
     else:

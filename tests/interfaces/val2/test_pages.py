@@ -15,14 +15,16 @@ from tests.interfaces.val2.sitting import Sitting
 class Seen:
     """A page's terminal, and what its page was sent."""
 
-    def __init__(self, directory, *, barred="", examples=None):
+    def __init__(self, directory, *, read_only="", examples=None):
         self.sitting = Sitting(directory)
         self.sitting.monitor.leave(now=0.0)
         self.terminal = PageTerminal()
         self.text, self.prompt, self.size, self.others = "", None, 0, []
         self.tell(type="hello", token=None, session="page's", holds=True)
         files = Files(directory, examples=examples)
-        self.monitor = TerminalMonitor(self.sitting.board, files, "a test", barred=barred, person=self.terminal)
+        self.monitor = TerminalMonitor(
+            self.sitting.shared, files, "a test", read_only=read_only, person=self.terminal
+        )
         self.terminal.begin(self.monitor, now=0.0)
         self.look()
 
@@ -83,13 +85,13 @@ def test_a_page_that_shows_nothing_is_sent_little_and_loses_what_finds_no_room(t
         seen.sitting.now += 0.05
         seen.look(shows=False)
         assert len(seen.text) <= WINDOW + 2 * FRAME
-        assert seen.terminal._waiting <= UNREAD + 100
-    assert seen.terminal._lost
+        assert seen.terminal.waiting <= UNREAD + 100
+    assert seen.terminal.lost
     seen.type("abort", shows=False)
     for _ in range(20):
         seen.tell(type="shown", size=seen.size)
         seen.look()
-    assert seen.terminal._waiting == 0
+    assert seen.terminal.waiting == 0
     assert "919.85" in seen.type("where")
     assert "*Output lost*" in seen.text
 
@@ -114,7 +116,7 @@ def test_what_is_no_message_ends_the_connection_and_does_nothing(tmp_path, data)
 
 
 def test_who_only_looks_is_told_so(tmp_path):
-    seen = Seen(tmp_path, barred="this token only looks")
+    seen = Seen(tmp_path, read_only="this token only looks")
     assert "looking only" in seen.text
     assert "*No control*" in seen.type("do ready")
     assert "919.85" in seen.type("where")

@@ -66,7 +66,8 @@ class Line:
                 self.joined.run(0.01)
             return ready(viewer)
 
-        return _Following(viewer, wait)
+        self.following = _Following(viewer, wait)
+        return self.following
 
     def until(self, ready, limit=20.0):
         given_up = self.now + limit
@@ -78,10 +79,11 @@ class Line:
 class _Following:
     def __init__(self, viewer, wait):
         self._viewer, self.wait = viewer, wait
+        self.frozen = None
 
     @property
     def timeline(self):
-        return self._viewer.timeline
+        return self._viewer.timeline if self.frozen is None else self.frozen
 
 
 @pytest.fixture(params=[constant(0.0), constant(0.2), bad(0.1, 0.1, 0.05, 0.02)], ids=["near", "far", "bad"])
@@ -213,7 +215,7 @@ def test_a_motion_that_is_seen_late_lasts_to_its_end():
 def test_a_motion_that_is_never_seen_ends_as_an_error_a_while_after_its_end(line):
     robot = RemoteRobot(line, MODEL)
     arm = Arm(robot)
-    robot._viewer = SimpleNamespace(timeline=robot.timeline)
+    line.following.frozen = robot.timeline
     arm.move(NEAR, straight=False, now=line.now)
     with pytest.raises(ValError, match=r"\*Command refused\* the server took it, but doesn't show"):
         line.until(arm.settled)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.motion.speeds import SLOWEST, Manners, Speed
+from interfaces.val2.motion.speeds import SLOWEST, SettingsInForce, Speed
 from robots import puma560
 from vrs.model import Array
 
@@ -45,22 +45,22 @@ def test_of_way_and_turn_the_slower_one_counts() -> None:
 
 
 def test_what_is_not_said_of_turning_follows_percents_alone() -> None:
-    manners = Manners()
+    settings = SettingsInForce()
     for asked, speed in (
         ((20.0, None, "%"), Speed(20.0, "%", 20.0)),
         ((20.0, 70.0, "%"), Speed(20.0, "%", 70.0)),
         ((20.0, None, "MMPS"), Speed(20.0, "MMPS", 100.0)),
     ):
-        manners.set_speed(*asked, always=False)
-        assert manners.next.speed == speed
-    manners.taken()
-    assert manners.next.speed == Speed()
+        settings.set_speed(*asked, always=False)
+        assert settings.next.speed == speed
+    settings.taken()
+    assert settings.next.speed == Speed()
     with pytest.raises(ValError, match="above 0"):
-        manners.set_speed(20.0, 0.0, "%", always=True)
+        settings.set_speed(20.0, 0.0, "%", always=True)
 
 
 @pytest.mark.parametrize(("up", "down", "share"), [(50, 80, 0.5), (80, 30, 0.3), (0.1, 100, 0.01), (300, 200, 1.0)])
 def test_of_both_accelerations_the_smaller_counts(up: float, down: float, share: float) -> None:
-    manners = Manners()
-    manners.set_acceleration(up, down)
-    assert manners.always.acceleration == manners.next.acceleration == pytest.approx(share)
+    settings = SettingsInForce()
+    settings.set_acceleration(up, down)
+    assert settings.always.acceleration == settings.next.acceleration == pytest.approx(share)

@@ -16,13 +16,13 @@ import pytest
 
 from interfaces.stream import sockets
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import Free, Switchboard
+from interfaces.val2.monitor.control import Free, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.state import OutputText, Style
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from interfaces.val2.motion import arm_for
-from interfaces.val2.tcp import MOST, TRIES, UNREAD, ValDoor
+from interfaces.val2.tcp import MOST, TOKEN_TRIES, UNREAD, TcpTerminalServer
 from robots import puma560
 from tests.memory import values_held
 from vrs.clock import ManualClock, WallClock
@@ -127,13 +127,15 @@ async def door_here(tmp_path):
     engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
     arm, clock = arm_for(engine), WallClock()
     controller = Controller(arm, parameters=arm.parameters)
-    board = Switchboard(controller, Free())
+    shared = SharedController(controller, Free())
 
     def terminal(token):
         rights = {"secret": "", "look": "this token only looks"}
-        return TerminalMonitor(board, Files(tmp_path), "a test", barred=rights[token]) if token in rights else None
+        return (
+            TerminalMonitor(shared, Files(tmp_path), "a test", read_only=rights[token]) if token in rights else None
+        )
 
-    door = ValDoor(board, clock, terminal)
+    door = TcpTerminalServer(shared, clock, terminal)
     async with door.listening(sockets.bind("127.0.0.1", 0)):
         door.controller, door.engine = controller, engine
         yield door
@@ -223,14 +225,13 @@ def test_who_reads_nothing_loses_output_and_holds_up_nobody(tmp_path):
             writer.write(b'edit flood\nwhile true do\ntype "0123456789012345678901234567890123456789"\nend\ne\n')
             writer.write(b"execute flood\n")
             async with asyncio.timeout(WAIT):
-                while not door._connections:
+                while not door.terminals:
                     await asyncio.sleep(0.01)
-            (connection,) = door._connections
-            waiting = connection._writer.transport.get_write_buffer_size
+            (connection,) = door.terminals
             async with asyncio.timeout(WAIT):
-                while not connection._lost:
+                while not connection.lost:
                     await asyncio.sleep(0.02)
-            assert waiting() <= UNREAD
+            assert connection.unread <= UNREAD
             begun = time.monotonic()
             second = await Client.at(door, "")
             assert "919.85" in await second.say("where\n", "919.85")
@@ -270,10 +271,10 @@ def test_tokens_open_what_they_open(tmp_path):
             client.writer.close()
             assert "*No control*" in await looker.say("do ready\n")
             wrong = await Client.at(door, "Token: $", "")
-            wrong.writer.write(b"guess\n" * TRIES)
+            wrong.writer.write(b"guess\n" * TOKEN_TRIES)
             async with asyncio.timeout(WAIT):
                 heard = (await wrong.reader.read()).decode()
-            assert heard.count("*Invalid token*") == TRIES
+            assert heard.count("*Invalid token*") == TOKEN_TRIES
 
     live(scenario())
 
@@ -342,8 +343,8 @@ def test_a_program_may_send_its_token_and_all_that_it_wants_at_once(tmp_path):
 def test_idle_connections_keep_nobody_out_and_end(tmp_path, monkeypatch):
     from interfaces.val2 import tcp
 
-    monkeypatch.setattr(tcp, "PATIENCE", 0.5)
-    monkeypatch.setattr(tcp, "STRANGERS", 20)
+    monkeypatch.setattr(tcp, "TOKEN_TIMEOUT", 0.5)
+    monkeypatch.setattr(tcp, "MOST_UNAUTHENTICATED", 20)
 
     async def scenario():
         async with door_here(tmp_path) as door:
@@ -354,8 +355,8 @@ def test_idle_connections_keep_nobody_out_and_end(tmp_path, monkeypatch):
                     with contextlib.suppress(OSError):
                         client.writer.write(b"\r\n")
                         assert await client.reader.read() == b""
-            assert len(door._connections) == 1
-            assert len(door._strangers) == 0
+            assert len(door.terminals) == 1
+            assert door.unauthenticated == 0
 
     live(scenario())
 
