@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, field
 
 from interfaces.stream.wire.segments import MOST_POWERS
 from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
@@ -89,7 +89,8 @@ class ThingEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     height: Size
     length: Size | None = None
     width: Size | None = None
-    angle: Finite = 0.0
+    angle: Finite = field(default_factory=float)
+    """Written even where it's zero: a plain default is left out only where it's the very same object."""
     radius: Size | None = None
     known: bool = True
     start: Finite | None = None
