@@ -12,9 +12,9 @@ from robots.ipr.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.global_localization import locate
 from robots.onboard.laser import LaserScan
+from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer
 from robots.onboard.map_building import MapBuilder, Surveyor
-from robots.onboard.paper_localization import PaperLocalizer
 
 if TYPE_CHECKING:
     from benchmarks.results import Part

@@ -13,8 +13,8 @@ from interfaces.lab.tipsuwan.gain import behind_a_network
 from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, network_of, run
 from interfaces.lab.tipsuwan.s_paths import START, s_path
 from interfaces.middleware import GainScheduler, default_network, optimal_way, train
+from robots.onboard.curve_trackers import QuadraticCurveTracker
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.quadratic_tracker import QuadraticCurveTracker
 
 if TYPE_CHECKING:
     from benchmarks.results import Part

@@ -14,10 +14,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
-from robots.ipr.bare import BareBody
 from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses, SonarModel
-from robots.ipr.robot import MobileRobot
+from robots.ipr.robot import BareBody, MobileRobot
 
 if TYPE_CHECKING:
     from benchmarks.results import Part

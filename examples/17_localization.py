@@ -8,10 +8,9 @@ import numpy as np
 
 from interfaces.lab.localization.wandering import Wanderer
 from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.floor_plan import plan_map
-from robots.ipr.reality import MobileReality
+from robots.ipr.robot import BareBody
 from robots.onboard import LaserModel, Localizer, Status
 
 room = apartment(7, ApartmentConfig(rooms=3, people=2))

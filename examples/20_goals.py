@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
 from robots.ipr.navigation import BodyNavigator
 from robots.ipr.position import LaserPosition
-from robots.ipr.robot import place
+from robots.ipr.robot import BareBody, place
 from robots.onboard import Goal, LaserModel
 from robots.onboard.driving import IPR_LIMITS, STAND, kept
 from robots.onboard.journey import GOING

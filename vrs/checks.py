@@ -1,4 +1,4 @@
-"""Checks of values that many parts share."""
+"""Checks of values that many parts share, and of text files from anybody: of a bounded size, and text indeed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import fields
+from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
@@ -14,7 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.errors import InvalidValueError
+from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
 _ClassT = TypeVar("_ClassT", bound=type)
@@ -216,3 +217,25 @@ def _in_range(name: str, kind: type, note: msgspec.Meta, optional: bool, value: 
         return integer_in(name, value, int(low), int(high))
     unit = (note.extra or {}).get("unit", "")
     return number_in(name, value, low, high, unit=unit and f" {unit}")
+
+
+def bounded_text(path: Path, most: int, encoding: str = "utf-8") -> str:
+    """Return the text of a file.
+
+    Args:
+        path: Where it is.
+        most: Largest size [B]; no more is read.
+        encoding: UTF-8 of a kind.
+
+    Raises:
+        FormatError: If it's longer, or isn't UTF-8.
+        OSError: If it can't be read.
+    """
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise FormatError(path.name, f"longer than {most} bytes")
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise FormatError(path.name, f"no UTF-8 at byte {error.start}") from None

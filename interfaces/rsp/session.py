@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from interfaces.rsp import header
 from interfaces.rsp.header import MODULUS, Header, PacketType, unwrapped, up_to
-from robots.onboard.stamps import SequenceWindow
+from robots.onboard.watchdog import SequenceWindow
 from vrs.errors import InvalidValueError
 
 TAG: Final = 16

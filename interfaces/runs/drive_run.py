@@ -17,7 +17,7 @@ from interfaces.teleop.architectures import (
 )
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
-from robots.ipr.reality import MobileReality
+from robots.ipr.chassis import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import IPR_LIMITS, Posture
 from vrs.checks import one_of, validated, within

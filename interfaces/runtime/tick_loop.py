@@ -36,7 +36,7 @@ from interfaces.runtime.physics_messages import (
     TickCounter,
 )
 from robots.onboard.following import SensorMonitor
-from robots.onboard.stops import from_measured
+from robots.onboard.servo import from_measured
 from vrs.errors import FormatError, VrsError
 from vrs.model import Array, Limits
 

@@ -25,9 +25,8 @@ from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.samples import SampleLog
 from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
-from robots.onboard.stamps import Stamp, Verdict
-from robots.onboard.stops import from_commanded
-from robots.onboard.watchdog import BeginStop, StopReason, Watchdog, WatchdogConfig, WatchdogState
+from robots.onboard.servo import from_commanded
+from robots.onboard.watchdog import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import validated, within
 from vrs.clock import ManualClock
 from vrs.commands import Profile, finite

@@ -29,8 +29,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from robots.text_files import bounded_text
-from vrs.checks import one_of
+from vrs.checks import bounded_text, one_of
 from vrs.errors import FormatError
 
 

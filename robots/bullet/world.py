@@ -1,13 +1,25 @@
-"""A PyBullet world of its own: one client in DIRECT mode, closed when its context ends."""
+"""A PyBullet world of its own: one client in DIRECT mode, closed when its context ends.
+
+In it a room's bodies (floor, things, people who walk), or coloured shapes of which PyBullet's own renderer makes
+pictures without a display.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import sys
+from collections.abc import Sequence
 from types import ModuleType, TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.bullet.rooms import Block, Column, Room
+from robots.solids import LinkShape
 from vrs.errors import VrsError
+from vrs.model import Array
 
 
 class WorldClosedError(VrsError):
@@ -78,3 +90,217 @@ class World:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+RAY, THING, CHASSIS, WHEEL, FLOOR = 1, 2, 4, 8, 16
+"""Collision groups: wheels meet the floor, chassis and rays meet things. PyBullet's rays are of group 1."""
+_BELOW = -100.0
+
+
+class RoomBodies:
+    """Bodies of a room's things; `at` brings them to where they are at a time."""
+
+    def __init__(self, world: World, room: Room) -> None:
+        """Put a floor and the things of a room into a world, as they stand at time 0."""
+        self._world = world
+        bullet, client = world.bullet, world.client
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
+        self.floor = floor = int(bullet.createMultiBody(0.0, shape, physicsClientId=client))
+        """PyBullet's id of the floor."""
+        bullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)
+        bullet.setCollisionFilterGroupMask(floor, -1, FLOOR, WHEEL, physicsClientId=client)
+        self.names: dict[int, str] = {}
+        """Names of things by PyBullet's body ids."""
+        self._coming: list[tuple[int, Block | Column, list[float], list[float]]] = []
+        for thing in room.things:
+            position, turn = _pose(thing)
+            shape = self._box(thing) if isinstance(thing, Block) else self._cylinder(thing.radius, thing.height)
+            body = self._stand(shape, thing.name, position, turn)
+            if thing.start > -math.inf or thing.end < math.inf:
+                self._coming.append((body, thing, position, turn))
+        self._walking = [
+            (self._stand(self._cylinder(person.radius, person.height), person.name, [0.0, 0.0, _BELOW]), person)
+            for person in room.people
+        ]
+        self._doors = [
+            (self._stand(self._box(door.at(0.0)), door.name, *_pose(door.at(0.0))), door) for door in room.doors
+        ]
+        self._open = [door.share(0.0) for door in room.doors]
+        self._there = [True] * len(self._coming)
+        self._moved = math.nan
+        self.at(0.0)
+
+    @property
+    def moving(self) -> bool:
+        """Whether anything ever moves, comes or goes."""
+        return bool(self._coming or self._walking or self._doors)
+
+    def at(self, t: float) -> None:
+        """Bring everything to where it is at a time [s]."""
+        if t == self._moved:
+            return
+        self._moved = t
+        put, client = self._world.bullet.resetBasePositionAndOrientation, self._world.client
+        for body, person in self._walking:
+            x, y = person.at(t)
+            put(body, [x, y, person.height / 2], [0.0, 0.0, 0.0, 1.0], physicsClientId=client)
+        for k, (body, door) in enumerate(self._doors):
+            if (share := door.share(t)) != self._open[k]:
+                self._open[k] = share
+                put(body, *_pose(door.at(t)), physicsClientId=client)
+        for k, (body, thing, (x, y, z), turn) in enumerate(self._coming):
+            there = thing.stands(t)
+            if there != self._there[k]:
+                self._there[k] = there
+                put(body, [x, y, z if there else _BELOW], turn, physicsClientId=client)
+
+    def cast(self, origins: Array, directions: Array, height: float, reach: float) -> Array:
+        """Return how far level rays go, as `FloorPlan.cast` does, but nothing from inside of a thing.
+
+        Args:
+            origins: Where they begin [m], (k, 2).
+            directions: Unit vectors, (k, 2).
+            height: Above the floor [m].
+            reach: Longest that counts [m].
+        """
+        level = np.full((len(origins), 1), height)
+        hits = self._world.bullet.rayTestBatch(
+            np.hstack([origins, level]).tolist(),
+            np.hstack([origins + reach * directions, level]).tolist(),
+            numThreads=1,
+            collisionFilterMask=THING,
+            physicsClientId=self._world.client,
+        )
+        return np.array([hit[2] * reach if hit[0] >= 0 else math.inf for hit in hits])
+
+    def _box(self, block: Block) -> int:
+        bullet = self._world.bullet
+        half = [block.length / 2, block.width / 2, block.height / 2]
+        return int(
+            bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._world.client)
+        )
+
+    def _cylinder(self, radius: float, height: float) -> int:
+        bullet = self._world.bullet
+        return int(
+            bullet.createCollisionShape(
+                bullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._world.client
+            )
+        )
+
+    def _stand(self, shape: int, name: str, position: list[float], turn: list[float] | None = None) -> int:
+        bullet, client = self._world.bullet, self._world.client
+        body = bullet.createMultiBody(
+            0.0, shape, -1, position, [0.0, 0.0, 0.0, 1.0] if turn is None else turn, physicsClientId=client
+        )
+        bullet.changeDynamics(body, -1, lateralFriction=0.5, physicsClientId=client)
+        bullet.setCollisionFilterGroupMask(body, -1, THING, CHASSIS | RAY, physicsClientId=client)
+        self.names[int(body)] = name
+        return int(body)
+
+
+def _pose(thing: Block | Column) -> tuple[list[float], list[float]]:
+    """Where a thing's middle is [m], and how it's turned, a quaternion."""
+    angle = thing.angle if isinstance(thing, Block) else 0.0
+    return [thing.x, thing.y, thing.height / 2], [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
+
+
+Picture = NDArray[np.uint8]
+"""Red, green, blue, (height, width, 3)."""
+SKY: Final = (214, 226, 235)
+"""Colour where nothing is."""
+_LIGHT: Final = (-2.0, -3.0, 5.0)
+"""Where the light comes from."""
+_AMBIENT, _DIFFUSE = 0.62, 0.42
+"""Shares of the light that come from everywhere, and from there."""
+_OUT_OF_SIGHT = (0.0, 0.0, -1000.0)
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+_NOTHING = 0.999_999
+"""Depth from which on nothing was drawn."""
+
+
+class Studio:
+    """Shapes that stand somewhere, and pictures of them. Nothing collides, and no time passes."""
+
+    def __init__(self) -> None:
+        """Begin with nothing; `close` it in the end."""
+        self._world = World(gravity=0.0, dt=1.0)
+        self._figures: list[tuple[int, ...]] = []
+
+    def close(self) -> None:
+        """Disconnect the world; a second call does nothing."""
+        self._world.close()
+
+    def add(self, shape: LinkShape) -> int:
+        """Take a shape, as it stands in the world's frame; the number by which it's moved."""
+        colours, of = np.unique(shape.face_colours, axis=0, return_inverse=True)
+        bodies = [
+            self._body(shape.vertices[shape.faces[of.ravel() == k]], colour.tolist())
+            for k, colour in enumerate(colours)
+        ]
+        self._figures.append(tuple(bodies))
+        return len(self._figures) - 1
+
+    def _body(self, triangles: Array, colour: Sequence[float]) -> int:
+        """Make a body of triangles, (m, 3, 3), each flat in its own plane."""
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        bullet, client = self._world.bullet, self._world.client
+        shape = bullet.createVisualShape(
+            bullet.GEOM_MESH,
+            vertices=triangles.reshape(-1, 3).tolist(),
+            indices=list(range(3 * len(triangles))),
+            normals=np.repeat(normals, 3, axis=0).tolist(),
+            rgbaColor=[*colour, 1.0],
+            specularColor=[0.0, 0.0, 0.0],
+            physicsClientId=client,
+        )
+        return int(bullet.createMultiBody(0.0, -1, shape, physicsClientId=client))
+
+    def place(self, figure: int, X: Array | None) -> None:
+        """Put a shape at a pose in the world, (4, 4); None takes it away."""
+        position, turn = (_OUT_OF_SIGHT, _UPRIGHT) if X is None else (X[:3, 3].tolist(), _quaternion(X[:3, :3]))
+        put, client = self._world.bullet.resetBasePositionAndOrientation, self._world.client
+        for body in self._figures[figure]:
+            put(body, position, turn, physicsClientId=client)
+
+    def draw(self, X_WC: Array, *, width: int, height: int, view: float, near: float, far: float) -> Picture:
+        """Draw what a camera sees.
+
+        Args:
+            X_WC: Its pose, (4, 4): x along the line of sight, z up.
+            width: Pixels across.
+            height: Pixels down.
+            view: Horizontal angle of view [rad].
+            near: Nothing nearer is drawn [m].
+            far: Nothing farther is drawn [m].
+        """
+        bullet, client = self._world.bullet, self._world.client
+        eye, ahead, up = X_WC[:3, 3], X_WC[:3, 0], X_WC[:3, 2]
+        vertical = 2.0 * math.atan(math.tan(view / 2) * height / width)
+        image: tuple[Any, ...] = bullet.getCameraImage(
+            width,
+            height,
+            bullet.computeViewMatrix(eye.tolist(), (eye + ahead).tolist(), up.tolist()),
+            bullet.computeProjectionMatrixFOV(math.degrees(vertical), width / height, near, far),
+            lightDirection=_LIGHT,
+            lightColor=(1.0, 1.0, 1.0),
+            lightAmbientCoeff=_AMBIENT,
+            lightDiffuseCoeff=_DIFFUSE,
+            lightSpecularCoeff=0.0,
+            shadow=0,
+            renderer=bullet.ER_TINY_RENDERER,
+            flags=bullet.ER_NO_SEGMENTATION_MASK,
+            physicsClientId=client,
+        )
+        colours = np.reshape(np.asarray(image[2], dtype=np.uint8), (height, width, 4))
+        depth = np.reshape(np.asarray(image[3]), (height, width))
+        picture = np.ascontiguousarray(colours[..., :3])
+        picture[depth >= _NOTHING] = SKY
+        return picture
+
+
+def _quaternion(R: Array) -> tuple[float, float, float, float]:
+    """A turn about the vertical as PyBullet takes it, (x, y, z, w)."""
+    half = 0.5 * math.atan2(R[1, 0], R[0, 0])
+    return 0.0, 0.0, math.sin(half), math.cos(half)

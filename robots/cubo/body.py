@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike
 from robots.bullet.rooms import Room
 from robots.cubo import parameters as p
 from robots.ipr.body import MobileBody
-from robots.ipr.chassis import Limb, Senses, SonarModel
+from robots.ipr.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.ipr.position import FusedPosition, TruePosition
-from robots.ipr.reality import MobileReality
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import clipped

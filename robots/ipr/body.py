@@ -19,11 +19,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from robots.bullet.room_bodies import CHASSIS, FLOOR, THING, WHEEL, RoomBodies
 from robots.bullet.serial_arm import RigidLink, quaternion
-from robots.bullet.world import World
-from robots.ipr.chassis import Chassis
-from robots.ipr.reality import MobileReality
+from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, RoomBodies, World
+from robots.ipr.chassis import Chassis, MobileReality
 from robots.ipr.robot import MobileRobot
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError, VrsError

@@ -15,9 +15,9 @@ from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from robots.bullet.camera import Picture, Studio
 from robots.bullet.rooms import EMPTY, Room
-from robots.ipr.parameters import IPR_AXLE_OFFSET
+from robots.bullet.world import Picture, Studio
+from robots.ipr.model import IPR_AXLE_OFFSET
 from robots.ipr.shapes import GROUND, box, door_shape, headless, person_shape, room_shapes, upright
 from robots.solids import Builder, LinkShape
 from vrs.checks import finite, number_in, validated, within

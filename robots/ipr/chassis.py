@@ -1,4 +1,4 @@
-"""Sizes, masses and drives of the two robots of Han, Kim, Kim, Kim 2001: the IPR and the micro-robot.
+"""Sizes, masses, drives and senses of the two robots of Han, Kim, Kim, Kim 2001: the IPR and the micro-robot.
 
 The robot's frame stands on the floor in the middle of the driving axle, x forward, y left, z up. The paper gives
 outer sizes, masses, motors and the number of sonars; the rest is chosen here and says so.
@@ -6,22 +6,36 @@ outer sizes, masses, motors and the number of sonars; the rest is chosen here an
 The robot's centre C is D ahead of the middle M of its driving axle, eq. (2). Everything else here counts from M.
 The IPR's axle is 6 cm ahead of its centre, so its D is −0.06 m. Eq. (1) is `vrs.mobile.speeds`.
 
+How real their simulation is is `MobileReality`.
+
 Source: Kim, Han, Kim, Kim 2002, section 2.2.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Final
 
 import numpy as np
 
-from robots.ipr import parameters as p
-from robots.ipr.model import Kind
+from robots.bullet.serial_arm import Payload
+from robots.ipr.model import (
+    IPR_AXLE_OFFSET,
+    IPR_HEIGHT,
+    IPR_LENGTH,
+    IPR_WHEEL_RADIUS,
+    IPR_WIDTH,
+    MICRO_AXLE_OFFSET,
+    MICRO_SIDE,
+    MICRO_WHEEL_BASE,
+    MICRO_WHEEL_RADIUS,
+    Kind,
+)
 from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
 from robots.onboard.laser import LaserModel
-from vrs.checks import one_of, validated, within
+from vrs.checks import number_in, one_of, validated, within
+from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
 from vrs.model import Array, frozen_array
 
@@ -175,10 +189,10 @@ class Chassis:
 
 IPR: Final = Chassis(
     kind=Kind.IPR,
-    length=p.IPR_LENGTH,
-    width=p.IPR_WIDTH,
-    height=p.IPR_HEIGHT,
-    centre_x=-p.IPR_AXLE_OFFSET,
+    length=IPR_LENGTH,
+    width=IPR_WIDTH,
+    height=IPR_HEIGHT,
+    centre_x=-IPR_AXLE_OFFSET,
     ground_clearance=0.05,
     lumps=(
         Lump("battery, 12 V 100 Ah", (0.30, 0.20, 0.20), (-0.12, 0.0, 0.18), 28.0),
@@ -190,7 +204,7 @@ IPR: Final = Chassis(
         Lump("head with two cameras", (0.12, 0.22, 0.08), (0.04, 0.0, 0.70), 3.5),
         Lump("display", (0.04, 0.30, 0.24), (0.11, 0.0, 0.55), 3.1),
     ),
-    wheel_radius=p.IPR_WHEEL_RADIUS,
+    wheel_radius=IPR_WHEEL_RADIUS,
     wheel_base=IPR_WHEEL_BASE,
     wheel_width=0.05,
     wheel_mass=1.8,
@@ -217,10 +231,10 @@ line bears its share and the robot can't rock.
 
 MICRO: Final = Chassis(
     kind=Kind.MICRO,
-    length=p.MICRO_SIDE,
-    width=p.MICRO_SIDE,
-    height=p.MICRO_SIDE,
-    centre_x=-p.MICRO_AXLE_OFFSET,
+    length=MICRO_SIDE,
+    width=MICRO_SIDE,
+    height=MICRO_SIDE,
+    centre_x=-MICRO_AXLE_OFFSET,
     ground_clearance=0.004,
     lumps=(
         Lump("battery", (0.030, 0.050, 0.015), (-0.016, 0.0, 0.018), 0.120),
@@ -229,8 +243,8 @@ MICRO: Final = Chassis(
         Lump("boards", (0.060, 0.060, 0.016), (0.0, 0.0, 0.052), 0.060),
         Lump("shell", (0.070, 0.056, 0.066), (0.0, 0.0, 0.038), 0.080),
     ),
-    wheel_radius=p.MICRO_WHEEL_RADIUS,
-    wheel_base=p.MICRO_WHEEL_BASE,
+    wheel_radius=MICRO_WHEEL_RADIUS,
+    wheel_base=MICRO_WHEEL_BASE,
     wheel_width=0.007,
     wheel_mass=0.020,
     casters=((0.028, 0.0), (-0.028, 0.0)),
@@ -313,3 +327,114 @@ class Senses:
     """None, which it is unless given, is a robot without a laser scanner."""
     encoder_rate: Annotated[float, within(1.0, 240.0)] = 20.0
     """How often encoders are read [Hz], in [1, 240]."""
+
+
+Pair = tuple[float, float]
+"""Of the right and of the left wheel."""
+
+_RANGES = {
+    "slip_spread": (0.0, 0.2),
+    "slip_time": (0.01, 1000.0),
+    "base_error": (-0.2, 0.2),
+    "friction": (0.02, 2.0),
+    "rolling": (0.0, 20.0),
+    "encoder_noise": (0.0, 1000.0),
+    "gravity": (0.1, 100.0),
+    "dt": (1e-4, 0.02),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MobileReality:
+    """What the simulated robot has of a real one. The default is all of it; `MobileReality.ideal()` none.
+
+    Natural slip hardly exists in PyBullet between friction 0.3 and 0.1, so slip is said here.
+    """
+
+    slip: Pair = (0.004, 0.006)
+    """Share of the way that each wheel loses against the floor, right and left, in [-0.5, 0.5]."""
+    slip_spread: float = 0.004
+    """Standard deviation of what each slip wanders by, in [0, 0.2]."""
+    slip_time: float = 1.0
+    """Correlation time of the wandering [s], in [0.01, 1000]."""
+    radius_error: Pair = (0.002, -0.001)
+    """By how much the wheels' radii, right and left, are greater than nominal, as shares, in [-0.2, 0.2]."""
+    base_error: float = 0.005
+    """By how much the wheel base is greater than nominal, as a share, in [-0.2, 0.2]."""
+    friction: float = 0.7
+    """Coulomb friction between tyres and floor, in [0.02, 2]."""
+    rolling: float = 1.0
+    """Resistance of the casters as a multiple of the nominal, in [0, 20]."""
+    servo_lag: bool = True
+    """Whether wheels follow with their servos' time constant."""
+    ramps: bool = True
+    """Whether speeds change within a_max and the turning acceleration; without, they jump."""
+    torque_limits: bool = True
+    """Whether the drives' torques end at their limits."""
+    encoder_counts: int | None = -1
+    """Counts a motor turn, 1 to 10,000,000; -1 takes the chassis's, None reads angles exactly."""
+    encoder_noise: float = 0.5
+    """Standard deviation of a reading [counts], in [0, 1000]."""
+    payload: Payload | None = None
+    """What the robot carries; its centre counts in the robot's frame, and nobody tells the servos."""
+    gravity: float = 9.81
+    """Acceleration of free fall [m/s²], in [0.1, 100]."""
+    dt: float = 1 / 240
+    """Step of physics and servos [s], in [1e-4, 0.02]."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.type == "bool" and not isinstance(value, bool):
+                raise InvalidValueError(item.name, value, "True or False")
+        for name, (low, high) in _RANGES.items():
+            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
+        for name, most in (("slip", 0.5), ("radius_error", 0.2)):
+            object.__setattr__(self, name, _pair(name, getattr(self, name), most))
+        counts = self.encoder_counts
+        if counts is not None and (
+            isinstance(counts, bool)
+            or not isinstance(counts, int)
+            or not (counts == -1 or 1 <= counts <= 10_000_000)
+        ):
+            raise InvalidValueError("encoder_counts", counts, "None, -1 or an integer in [1, 10000000]")
+        if self.payload is not None and not isinstance(self.payload, Payload):
+            raise InvalidValueError("payload", self.payload, "a Payload or None")
+
+    @classmethod
+    def ideal(cls, *, dt: float = 1 / 240) -> MobileReality:
+        """Wheels that are as they should be, roll and turn at once as told: the virtual robot's model."""
+        return cls(
+            slip=(0.0, 0.0),
+            slip_spread=0.0,
+            radius_error=(0.0, 0.0),
+            base_error=0.0,
+            rolling=0.0,
+            servo_lag=False,
+            ramps=False,
+            torque_limits=False,
+            encoder_counts=None,
+            encoder_noise=0.0,
+            dt=dt,
+        )
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> MobileReality:
+        """Return a robot of its own from a workshop, for runs over many robots.
+
+        Radii within 0.3 %, the base within 1 % and mean slips of 0.5 % ± 0.3 % (standard deviations, cut off at
+        three): what Borenstein and Feng 1996 report of robots that nobody calibrated is of this size.
+        """
+        right, left, base, slip_right, slip_left = np.clip(rng.standard_normal(5), -3.0, 3.0).tolist()
+        return cls(
+            radius_error=(0.003 * right, 0.003 * left),
+            base_error=0.01 * base,
+            slip=(0.005 + 0.003 * slip_right, 0.005 + 0.003 * slip_left),
+        )
+
+
+def _pair(name: str, value: object, most: float) -> Pair:
+    allowed = f"two numbers, right and left, in [{-most:g}, {most:g}]"
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise InvalidValueError(name, value, allowed)
+    return number_in(name, value[0], -most, most), number_in(name, value[1], -most, most)

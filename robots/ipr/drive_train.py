@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.ipr.chassis import Chassis
-from robots.ipr.reality import MobileReality
+from robots.ipr.chassis import Chassis, MobileReality
 from vrs.checks import finite_array, number_in
 from vrs.mobile import DriveLimits
 

@@ -1,16 +1,52 @@
-"""The mobile robot as a value: limits and geometry of either body."""
+"""The mobile robot IPR and the micro-robot that stood in for it in the experiment: geometry and limits, as a value.
+
+Sources: Han, Kim, Kim, Kim, 2001 [H]: section 2.1, 4.2. Kim, Han, Kim, Kim, 2002 [K]: sizes of the
+same robot. What neither gives is an assumption; its reason stands beside it.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import hypot
+from typing import Final
 
-from robots.ipr import parameters as p
 from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, Wheels
+
+PERIOD: Final = 0.1
+"""T: time between commands [s], an assumption: [H] has 'every sampling time T' without a figure."""
+
+CELLS: Final = (125, 61)
+"""Cells of the virtual environment along x and y; [H], section 3.2."""
+CELL: Final = 0.1
+"""Side of a cell [m], an assumption: a room of 12.5 m × 6.1 m, and a robot of about five cells across."""
+
+IPR_LENGTH: Final = 0.52
+"""Along the direction of travel [m]; [K]: 45 × 52 × 75 cm."""
+IPR_WIDTH: Final = 0.45
+"""Across it [m]."""
+IPR_HEIGHT: Final = 0.75
+"""[m]."""
+IPR_MASS: Final = 75.0
+"""[kg]; [K]."""
+IPR_WHEEL_RADIUS: Final = 0.10
+"""[m], an assumption: passes the door sills of a house, and 0.5 m/s is a common gear motor's 48 turns/min."""
+IPR_AXLE_OFFSET: Final = 0.06
+"""How far the driving axle is ahead of the body's centre [m], D of [K], eq. (2); its size is an assumption."""
+
+MICRO_SIDE: Final = 0.075
+"""Length, width and height [m]; [H], section 4.2."""
+MICRO_MASS: Final = 0.430
+"""[kg]; [H], section 4.2."""
+MICRO_WHEEL_BASE: Final = 0.068
+"""L [m], an assumption: wheels 7 mm thick flush with the sides."""
+MICRO_WHEEL_RADIUS: Final = 0.022
+"""[m], an assumption: usual for soccer robots of this size, on which it's built."""
+MICRO_AXLE_OFFSET: Final = 0.0
+"""How far the driving axle is ahead of the body's centre [m], an assumption: they turn about their centre."""
 
 
 class Kind(StrEnum):
@@ -50,7 +86,7 @@ class Ipr:
     limits: DriveLimits
     wheels: Wheels
     body: Body
-    period: float = p.PERIOD
+    period: float = PERIOD
     """T: time between commands [s], positive."""
     kind: Kind = Kind.IPR
     name: str = "ipr"
@@ -70,7 +106,7 @@ def model(kind: Kind | str = Kind.IPR, *, limits: DriveLimits | None = None, per
 
     Args:
         kind: `ipr`, 45 × 52 × 75 cm and 75 kg, or `micro`, 7.5 cm and 430 g.
-        limits: Limits of its commands; None means 0.5 m/s, 45 deg/s and 0.52 m/s² of `robots.ipr.parameters`.
+        limits: Limits of its commands; None means 0.5 m/s, 45 deg/s and 0.52 m/s² of `robots.ipr.model`.
         period: T, time between commands [s]; None means 0.1.
 
     Raises:
@@ -81,11 +117,11 @@ def model(kind: Kind | str = Kind.IPR, *, limits: DriveLimits | None = None, per
     except ValueError:
         raise InvalidValueError("kind", kind, f"one of {', '.join(Kind)}") from None
     if which is Kind.IPR:
-        wheels = Wheels(IPR_WHEEL_BASE, p.IPR_WHEEL_RADIUS)
-        body = Body(p.IPR_LENGTH, p.IPR_WIDTH, p.IPR_HEIGHT, p.IPR_MASS, p.IPR_AXLE_OFFSET)
+        wheels = Wheels(IPR_WHEEL_BASE, IPR_WHEEL_RADIUS)
+        body = Body(IPR_LENGTH, IPR_WIDTH, IPR_HEIGHT, IPR_MASS, IPR_AXLE_OFFSET)
     else:
-        wheels = Wheels(p.MICRO_WHEEL_BASE, p.MICRO_WHEEL_RADIUS)
-        body = Body(p.MICRO_SIDE, p.MICRO_SIDE, p.MICRO_SIDE, p.MICRO_MASS, p.MICRO_AXLE_OFFSET)
+        wheels = Wheels(MICRO_WHEEL_BASE, MICRO_WHEEL_RADIUS)
+        body = Body(MICRO_SIDE, MICRO_SIDE, MICRO_SIDE, MICRO_MASS, MICRO_AXLE_OFFSET)
     if limits is None:
         limits = drive_limits(wheels.base)
     made = Ipr(limits, wheels, body, kind=which)

@@ -9,6 +9,15 @@ from robots.onboard.command_filter import (
     FilterOutput,
 )
 from robots.onboard.curve import Curve, CurveKind, CurvePoint, load_curve, read_curve
+from robots.onboard.curve_trackers import (
+    Backwards,
+    PurePursuit,
+    PurePursuitConfig,
+    QuadraticCurveTracker,
+    QuadraticTrackerConfig,
+    parabola_drive,
+    wheel_rates,
+)
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, SensorFault, SensorMonitor, too_far
 from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
@@ -26,36 +35,28 @@ from robots.onboard.laser import (
 from robots.onboard.lease import Ended, Grant, Lease, LeaseConfig, LeaseEnd, LeaseRefusal, LeaseState, Pending
 from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.line_filter import LineFilter, MatchingConfig, MotionConfig
-from robots.onboard.localization import LocalizationConfig, Observability, Tracker
+from robots.onboard.localization import LocalizationConfig, Observability, PaperConfig, PaperLocalizer, Tracker
 from robots.onboard.localizer import Event, Localizer, LocalizerConfig, Status
 from robots.onboard.map_building import BuildingConfig, MapBuilder, Surveyor
 from robots.onboard.movers import Mover, MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.navigator import Navigator, NavigatorConfig
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
-from robots.onboard.paper_localization import PaperConfig, PaperLocalizer
 from robots.onboard.path import Arc, MovingPath, PathGenerator, PathGeneratorConfig, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
-from robots.onboard.pure_pursuit import PurePursuit, PurePursuitConfig
-from robots.onboard.quadratic_tracker import (
-    Backwards,
-    QuadraticCurveTracker,
-    QuadraticTrackerConfig,
-    parabola_drive,
-    wheel_rates,
-)
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
-from robots.onboard.servo import FeedForward, Servo, ServoGains
-from robots.onboard.stamps import Kind, Stamp, Verdict
-from robots.onboard.stops import StopMotion, from_commanded, from_measured
+from robots.onboard.servo import FeedForward, Servo, ServoGains, StopMotion, from_commanded, from_measured
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
 from robots.onboard.trajectory_tracking import KnownTrajectory, Reference, TrackingConfig, TrajectoryTracker
 from robots.onboard.watchdog import (
     AcceptedFuture,
     BeginStop,
     GoOn,
+    Kind,
     LossPolicy,
     Manner,
+    Stamp,
     StopReason,
+    Verdict,
     Watchdog,
     WatchdogConfig,
     WatchdogState,

@@ -1,14 +1,15 @@
 """A smooth path in the plane by the way along it: cubic splines through points, or quadratic curves between them.
 
 A *cubic* curve goes through its points and has a continuous curvature; a *quadratic* one touches the polygon of its
-points in the middle of each side, its curvature jumps there, and its nearest point is the root of a cubic.
+points in the middle of each side, its curvature jumps there, and its nearest point is the root of a cubic. A piece
+is (degree + 1, 2): coefficients of x and y [m] in ascending powers of a parameter u from 0 to 1.
 
 Path files: points and what becomes of them, a line each.
 
-path 1                  the format's version, first
-curve cubic             or quadratic, see `CurveKind`; cubic unless given
-0 1                     a point: x and y [m], two or more in the order in which they're passed
-1.5 1.8                 `#` begins a comment
+    path 1                  the format's version, first
+    curve cubic             or quadratic, see `CurveKind`; cubic unless given
+    0 1                     a point: x and y [m], two or more in the order in which they're passed
+    1.5 1.8                 `#` begins a comment
 """
 
 from __future__ import annotations
@@ -22,11 +23,189 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robots.onboard import plane_pieces as pieces_of
-from robots.text_files import bounded_text
-from vrs.checks import finite_array, one_of
+from vrs.checks import bounded_text, finite_array, one_of
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
+
+_TINY = 1e-12
+"""A leading coefficient smaller than this share of the largest counts as 0."""
+_NEAR = 1e-4
+"""The closed form isn't off by more than this, as a share of the roots' size: further away is another root."""
+_TWINS = 1e-9
+"""Two roots that aren't real by no more than this, as a share of the third one's square, count as one."""
+_ROUNDED = 1e-14
+"""And those by no more than this times the cube of all roots' mean over the third one: rounding does as much."""
+
+
+def real_roots(a: float, b: float, c: float, d: float) -> list[float]:
+    """Return the real roots of a x³ + b x² + c x + d, in no order; none of a constant.
+
+    Source: Cardano for the root that is farthest from the others, with Viète's cosine where there are three; the
+    others are those of the quadratic that is left.
+    """
+    largest = max(abs(a), abs(b), abs(c), abs(d))
+    if abs(a) <= _TINY * largest:
+        return _quadratic_roots(b, c, d, largest)
+    b, c, d = b / a, c / a, d / a
+    # With x = t − b/3 the square goes: t³ + p t + q.
+    shift = b / 3
+    p, q = c - b * shift, 2 * shift**3 - shift * c + d
+    t = _farthest(p, q)
+    near = _NEAR * (abs(t) + abs(shift))
+    root = _polished(t - shift, near, b, c, d)
+    inside = -3 * t * t - 4 * p
+    if inside < -_TWINS * t * t - _ROUNDED * abs(shift) ** 3 / max(abs(t), 1e-300):
+        return [root]
+    half = 0.5 * math.sqrt(max(inside, 0.0))
+    return [root, *(_polished(-0.5 * t + side - shift, near, b, c, d) for side in (half, -half))]
+
+
+def _farthest(p: float, q: float) -> float:
+    """The real root of t³ + p t + q that is largest in size; of a pair that is complex, the other."""
+    half, third = 0.5 * q, p / 3
+    inside = half * half + third**3
+    if inside > 0:
+        found = math.cbrt(abs(half) + math.sqrt(inside))
+        return math.copysign(found - third / found, -half)
+    size = math.sqrt(max(-third, 0.0))
+    cube = size**3
+    if cube == 0:
+        return 0.0
+    return math.copysign(2 * size * math.cos(math.acos(min(abs(half) / cube, 1.0)) / 3), -half)
+
+
+def _polished(x: float, near: float, b: float, c: float, d: float) -> float:
+    """A step of Newton's method nearer to a root, if it is one and near by: the closed form cancels."""
+    slope = (3 * x + 2 * b) * x + c
+    value = ((x + b) * x + c) * x + d
+    moved = x - value / slope if slope else x
+    nearer = abs(((moved + b) * moved + c) * moved + d) < abs(value)
+    return moved if nearer and abs(moved - x) <= near else x
+
+
+def _quadratic_roots(a: float, b: float, c: float, largest: float) -> list[float]:
+    if abs(a) <= _TINY * largest:
+        return [-c / b] if abs(b) > _TINY * largest else []
+    inside = b * b - 4 * a * c
+    if inside < 0:
+        return []
+    far = -0.5 * (b + math.copysign(math.sqrt(inside), b))
+    return [far / a, c / far] if far else [0.0]
+
+
+_NEWTON = 8
+"""Most steps to the nearest point of a cubic piece."""
+_CLOSE = 1e-14
+"""Change of the parameter that ends them."""
+
+
+def _cubic_spline(points: Array) -> Array:
+    """Coefficients of a natural cubic spline by chord length, (k − 1, 4, 2), ascending in u from 0 to 1."""
+    h = np.hypot(*np.diff(points, axis=0).T)
+    slope = np.diff(points, axis=0) / h[:, None]
+    bend = np.zeros_like(points)
+    if len(points) > 2:
+        bend[1:-1] = _tridiagonal(h, 6.0 * np.diff(slope, axis=0))
+    h = h[:, None]
+    tangent = slope - h * (2 * bend[:-1] + bend[1:]) / 6
+    return np.stack([points[:-1], h * tangent, h * h * bend[:-1] / 2, h * h * np.diff(bend, axis=0) / 6], 1)
+
+
+def _tridiagonal(h: Array, right: Array) -> Array:
+    """Second derivatives at the inner points of a natural spline with chords h. Source: Thomas's algorithm."""
+    n = len(right)
+    diagonal, over = 2.0 * (h[:-1] + h[1:]), h[1:-1]
+    share, made = np.zeros(n), np.array(right)
+    for k in range(n):
+        below = over[k - 1] if k else 0.0
+        pivot = diagonal[k] - below * (share[k - 1] if k else 0.0)
+        share[k] = over[k] / pivot if k < n - 1 else 0.0
+        made[k] = (right[k] - (below * made[k - 1] if k else 0.0)) / pivot
+    for k in range(n - 2, -1, -1):
+        made[k] -= share[k] * made[k + 1]
+    return made
+
+
+def _quadratic_spline(points: Array) -> Array:
+    """Coefficients of a quadratic B-spline, (max(k − 2, 1), 3, 2), ascending in u from 0 to 1."""
+    if len(points) == 2:
+        points = np.array([points[0], points.mean(axis=0), points[1]])
+    middles = 0.5 * (points[:-1] + points[1:])
+    knots = np.concatenate([points[:1], middles[1:-1], points[-1:]])
+    start, control, end = knots[:-1], points[1:-1], knots[1:]
+    return np.stack([start, 2 * (control - start), start - 2 * control + end], 1)
+
+
+def _rough_length(piece: Array) -> float:
+    """Length of a piece [m], by eight chords."""
+    at = _evaluated(np.broadcast_to(piece, (9, *piece.shape)), np.linspace(0.0, 1.0, 9))[0]
+    return float(np.hypot(*np.diff(at, axis=0).T).sum())
+
+
+def _evaluated(pieces: Array, u: Array) -> tuple[Array, Array, Array]:
+    """Places and their first two derivatives, (k, 2) each, of pieces (k, degree + 1, 2) at u (k,)."""
+    degree = pieces.shape[-2] - 1
+    powers = u[:, None] ** np.arange(degree + 1)
+    k = np.arange(1, degree + 1, dtype=np.float64)
+    first = pieces[:, 1:] * k[:, None]
+    second = first[:, 1:] * k[:-1, None]
+    return tuple(np.einsum("kj,kjd->kd", powers[:, : rows.shape[1]], rows) for rows in (pieces, first, second))
+
+
+def _speeds(pieces: Array, u: Array) -> Array:
+    """|dp/du| at u (k, m) of pieces (k, degree + 1, 2), (k, m)."""
+    pieces = pieces.reshape(len(u), -1, 2)
+    k = np.arange(1, pieces.shape[1], dtype=np.float64)
+    powers = u[..., None] ** (k - 1)
+    velocity = np.einsum("kmj,kjd->kmd", powers, pieces[:, 1:] * k[:, None])
+    speed: Array = np.hypot(velocity[..., 0], velocity[..., 1])
+    return speed
+
+
+def _derivatives(rows: list[list[float]], u: float) -> tuple[tuple[float, float], ...]:
+    """Place, first and second derivative of a piece."""
+    (ax, ay), (bx, by), (cx, cy) = rows[:3]
+    dx, dy = rows[3] if len(rows) == 4 else (0.0, 0.0)
+    return (
+        (ax + u * (bx + u * (cx + u * dx)), ay + u * (by + u * (cy + u * dy))),
+        (bx + u * (2 * cx + 3 * u * dx), by + u * (2 * cy + 3 * u * dy)),
+        (2 * cx + 6 * u * dx, 2 * cy + 6 * u * dy),
+    )
+
+
+def _squared_distance(rows: list[list[float]], u: float, x: float, y: float) -> float:
+    """Squared distance of a piece at u from (x, y) [m²]."""
+    at = _derivatives(rows, u)[0]
+    return (at[0] - x) ** 2 + (at[1] - y) ** 2
+
+
+def _quadratic_nearest(rows: list[list[float]], x: float, y: float) -> list[float]:
+    """Where the distance to a quadratic piece is stationary: the roots of a cubic."""
+    (ax, ay), (bx, by), (cx, cy) = rows
+    px, py = ax - x, ay - y
+    return real_roots(
+        2 * (cx * cx + cy * cy),
+        3 * (bx * cx + by * cy),
+        bx * bx + by * by + 2 * (px * cx + py * cy),
+        px * bx + py * by,
+    )
+
+
+def _cubic_nearest(rows: list[list[float]], x: float, y: float, low: float, high: float) -> list[float]:
+    """Where the distance to a cubic piece is stationary between two parameters, by Newton's method."""
+    u = 0.5 * (low + high)
+    for _ in range(_NEWTON):
+        (px, py), (dx, dy), (ddx, ddy) = _derivatives(rows, u)
+        ex, ey = px - x, py - y
+        slope = dx * dx + dy * dy + ex * ddx + ey * ddy
+        if slope <= 0:
+            break
+        moved = min(max(u - (ex * dx + ey * dy) / slope, low), high)
+        if abs(moved - u) < _CLOSE:
+            break
+        u = moved
+    return [u]
+
 
 MOST_POINTS = 2000
 LARGEST = 1e4
@@ -92,14 +271,14 @@ class Curve:
         self.kind = CurveKind(one_of("kind", kind, list(CurveKind)))
         self.points = _checked(points)
         """As given, (k, 2) [m]."""
-        pieces = pieces_of.cubic(self.points) if self.kind is CurveKind.CUBIC else pieces_of.quadratic(self.points)
+        pieces = _cubic_spline(self.points) if self.kind is CurveKind.CUBIC else _quadratic_spline(self.points)
         self._pieces: list[list[list[float]]] = pieces.tolist()
         self._tabulate(pieces)
 
     def at(self, s: float) -> CurvePoint:
         """Return the place at a way along the curve [m]; before its start or after its end, that one's."""
         piece, u = self._parameter(min(max(s, 0.0), self.length))
-        (x, y), (dx, dy), (ddx, ddy) = pieces_of.derivatives(self._pieces[piece], u)
+        (x, y), (dx, dy), (ddx, ddy) = _derivatives(self._pieces[piece], u)
         speed = math.hypot(dx, dy)
         return CurvePoint(x, y, math.atan2(dy, dx), (dx * ddy - dy * ddx) / speed**3)
 
@@ -143,7 +322,7 @@ class Curve:
     def _tabulate(self, pieces: Array) -> None:
         """Lay out rows along the curve: their way, place, curvature, and speed along the parameter."""
         index, u, step = _laid_out(pieces)
-        position, velocity, acceleration = pieces_of.evaluated(pieces[index], u)
+        position, velocity, acceleration = _evaluated(pieces[index], u)
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         if speed.min() <= _CUSP * speed.mean():
             raise InvalidValueError(
@@ -151,10 +330,10 @@ class Curve:
             )
         cross = velocity[:, 0] * acceleration[:, 1] - velocity[:, 1] * acceleration[:, 0]
         self._xy, self._bend = frozen_array(position), frozen_array(np.abs(cross) / speed**3)
-        inner = pieces_of.speed(pieces[index[:-1]], u[:-1, None] + step[:, None] * _GAUSS)
+        inner = _speeds(pieces[index[:-1]], u[:-1, None] + step[:, None] * _GAUSS)
         self._s = frozen_array(np.concatenate([[0.0], np.cumsum(step * (inner @ _WEIGHTS))]))
         self._s_list: list[float] = self._s.tolist()
-        ends = pieces_of.speed(pieces[index[:-1]], (u[:-1] + step)[:, None])[:, 0]
+        ends = _speeds(pieces[index[:-1]], (u[:-1] + step)[:, None])[:, 0]
         columns = (index[:-1], u[:-1], step, speed[:-1] * step, ends * step)
         self._rows = [_Row(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
@@ -181,19 +360,19 @@ class Curve:
         rows = self._pieces[piece]
         high = low + step
         found = (
-            pieces_of.quadratic_nearest(rows, x, y)
+            _quadratic_nearest(rows, x, y)
             if self.kind is CurveKind.QUADRATIC
-            else pieces_of.cubic_nearest(rows, x, y, low, high)
+            else _cubic_nearest(rows, x, y, low, high)
         )
         best = min(
-            (pieces_of.squared(rows, u, x, y), u) for u in (low, high, *(u for u in found if low < u < high))
+            (_squared_distance(rows, u, x, y), u) for u in (low, high, *(u for u in found if low < u < high))
         )
         return best[0], self._way(row, best[1])
 
 
 def _laid_out(pieces: Array) -> tuple[NDArray[np.intp], Array, Array]:
     """Rows along pieces: piece and parameter where each begins, and the last one's end; how far each goes."""
-    rough = np.array([pieces_of.rough_length(piece) for piece in pieces])
+    rough = np.array([_rough_length(piece) for piece in pieces])
     spacing = max(_SPACING, float(rough.sum()) / _MOST_ROWS)
     counts = np.maximum(np.ceil(rough / spacing).astype(int), 4)
     u = np.concatenate([*(np.arange(n) / n for n in counts), np.ones(1)])

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robots.text_files import bounded_text
+from vrs.checks import bounded_text
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 

@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
-from robots.onboard.stamps import LARGEST, whole
+from robots.onboard.watchdog import LARGEST, whole
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 

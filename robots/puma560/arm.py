@@ -17,18 +17,23 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.puma560 import turns
 from robots.puma560.batch import inverse_along
 from robots.puma560.branches import (
+    NEARLY_SINGULAR,
     ORTHONORMAL,
     TIE,
     Asked,
     Branch,
     Joints,
     Pose,
+    all_turns,
     branches,
+    distance2,
     flipped,
     forward,
+    limit_violation,
+    nearest_joints,
+    nearest_turns,
     reach,
     reaches,
     shortfall,
@@ -284,7 +289,7 @@ class Puma560:
         found: list[Joints] = []
         for branch in branches(pose_rows(X)):
             if within_limits:
-                found += turns.all_turns(branch, self._low, self._high)
+                found += all_turns(branch, self._low, self._high)
             else:
                 found.append(branch.q)
         return np.array(found).reshape(-1, DOF)
@@ -359,13 +364,13 @@ class Puma560:
         if righty is None or above is None or noflip is None or triangle is None or bottom != _BOTTOM:
             return None
         p, sin5 = solve(rows, triangle, righty, above)
-        if not sin5 >= turns.NEARLY_SINGULAR:
+        if not sin5 >= NEARLY_SINGULAR:
             return None
         if not noflip:
             p = flipped(p)
         if not reaches(p, rows):
             return None
-        return turns.nearest_turns(p, near, self._low, self._high)
+        return nearest_turns(p, near, self._low, self._high)
 
     def _best(self, X: Pose, near: Joints, asked: Asked, *, strict: bool) -> Joints:
         """Search all branches; if strict, only those that match what was asked.
@@ -377,10 +382,10 @@ class Puma560:
         every = list(branches(X))
         wanted = [branch for branch in every if branch.matches(asked)]
         for choice in (wanted,) if strict else (wanted, every):
-            solutions = [turns.nearest(branch, near, self._low, self._high) for branch in choice]
+            solutions = [nearest_joints(branch, near, self._low, self._high) for branch in choice]
             found = [solution for solution in solutions if solution is not None]
             if found:
-                return min(found, key=lambda solution: turns.distance2(solution, near))
+                return min(found, key=lambda solution: distance2(solution, near))
         raise UnreachablePoseError(shortfall(X) or self._obstacle(wanted if strict else every))
 
     def _admits(self, q: Joints, asked: Asked) -> bool:
@@ -392,7 +397,7 @@ class Puma560:
         """Say which joint's limits the branch that comes closest to obeying them breaks."""
         if not tried:
             return "no arm solution reaches it to 1e-9"
-        misses = [(*turns.violation(branch, self._low, self._high), branch.words) for branch in tried]
+        misses = [(*limit_violation(branch, self._low, self._high), branch.words) for branch in tried]
         miss, joint, value, words = min(misses)
         low, high, given, over = np.degrees((self._low[joint], self._high[joint], value, miss)).tolist()
         return (

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.bullet.drives import Drives
-from robots.bullet.reality import Payload, Reality
-from robots.bullet.serial_arm import RigidLink, load_arm
+from robots.bullet.serial_arm import Payload, Reality, RigidLink, load_arm
 from robots.bullet.world import World
 from robots.onboard.servo import Servo, ServoGains
 from robots.puma560 import dynamics

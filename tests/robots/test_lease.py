@@ -17,7 +17,7 @@ from robots.onboard.lease import (
     LeaseState,
     Pending,
 )
-from robots.onboard.stamps import LARGEST
+from robots.onboard.watchdog import LARGEST
 from vrs.errors import InvalidValueError
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robots import puma560
-from robots.onboard.stops import StopMotion, from_commanded, from_measured
+from robots.onboard.servo import StopMotion, from_commanded, from_measured
 from vrs import Engine, JointTarget, ManualClock, Motion, MotionCommand, PoseTarget, Profile, SteerCommand, Timeline
 from vrs.errors import InvalidValueError
 

@@ -8,14 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.onboard.stamps import LARGEST, Kind, SequenceWindow, Stamp, Verdict
 from robots.onboard.watchdog import (
+    LARGEST,
     AcceptedFuture,
     BeginStop,
     GoOn,
+    Kind,
     LossPolicy,
     Manner,
+    SequenceWindow,
+    Stamp,
     StopReason,
+    Verdict,
     Watchdog,
     WatchdogConfig,
     WatchdogState,

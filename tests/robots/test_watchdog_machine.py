@@ -9,14 +9,16 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from robots.onboard.stamps import Kind, Stamp, Verdict
 from robots.onboard.watchdog import (
     AcceptedFuture,
     BeginStop,
     GoOn,
+    Kind,
     LossPolicy,
     Manner,
+    Stamp,
     StopReason,
+    Verdict,
     Watchdog,
     WatchdogConfig,
     WatchdogState,

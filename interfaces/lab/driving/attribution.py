@@ -15,7 +15,7 @@ from interfaces.lab.driving.operators import operator
 from interfaces.lab.driving.run import run
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures.compositions import SENSING
-from robots.ipr.reality import MobileReality
+from robots.ipr.chassis import MobileReality
 from robots.ipr.robot import place
 from vrs.comparison import PathComparison
 

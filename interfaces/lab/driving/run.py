@@ -28,9 +28,8 @@ from interfaces.teleop.architectures.compositions import (
 )
 from robots import ipr
 from robots.bullet.rooms import Room
-from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
-from robots.ipr.robot import MobileRobot
+from robots.ipr.robot import BareBody, MobileRobot
 from robots.onboard.driving import IPR_LIMITS, STAND, Posture
 from robots.onboard.laser import LaserModel
 from vrs.model import Array

@@ -8,12 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.navigation import BodyNavigator, route_map
 from robots.ipr.position import LaserPosition
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import Collision, MobileRobot
+from robots.ipr.robot import BareBody, Collision, MobileRobot
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel

@@ -22,11 +22,9 @@ from interfaces.link.losses import loss_model
 from interfaces.rsp.model import RobotModel, read_model
 from interfaces.rsp.schemes import LocalEnd, ReportedPosition, Rims, RobotEnd, SchemeConfig, scheme
 from robots.cubo import parameters as p
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.position import FusedPosition
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import MobileRobot
+from robots.ipr.robot import BareBody, MobileRobot
 from vrs.checks import one_of, validated, within
 from vrs.comparison import match_paths
 from vrs.mobile import clipped, wrapped

@@ -26,9 +26,9 @@ from interfaces.lab.localization.trial import (
 )
 from robots.ipr.floor_plan import plan_map
 from robots.onboard.gsp_map import GspMap
+from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer
 from robots.onboard.map_building import MapBuilder
-from robots.onboard.paper_localization import PaperLocalizer
 from vrs.model import Array
 
 SWEEP, SLOW_SWEEP = 0.03, 0.1

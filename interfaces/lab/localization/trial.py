@@ -12,9 +12,8 @@ import numpy as np
 from interfaces.lab.localization.wandering import Wanderer
 from robots.bullet.rooms import Room
 from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import Senses
-from robots.ipr.reality import MobileReality
+from robots.ipr.chassis import MobileReality, Senses
+from robots.ipr.robot import BareBody
 from robots.onboard.driving import Drive
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserModel, LaserScan

@@ -23,13 +23,11 @@ from interfaces.middleware import (
     MiddlewareConfig,
     default_network,
 )
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import Senses
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import MobileRobot
+from robots.ipr.chassis import MobileReality, Senses
+from robots.ipr.robot import BareBody, MobileRobot
 from robots.onboard.curve import Curve
+from robots.onboard.curve_trackers import QuadraticCurveTracker, QuadraticTrackerConfig
 from robots.onboard.driving import Posture
-from robots.onboard.quadratic_tracker import QuadraticCurveTracker, QuadraticTrackerConfig
 from vrs.checks import number_in, one_of, validated, within
 from vrs.mobile import DriveLimits, clipped
 from vrs.model import Array

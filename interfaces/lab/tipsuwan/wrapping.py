@@ -25,10 +25,9 @@ from interfaces.lab.tipsuwan.s_paths import s_path
 from interfaces.lab.tipsuwan.success import SuccessResult, reasons, seen
 from interfaces.middleware import Controller
 from robots.onboard.curve import Curve
+from robots.onboard.curve_trackers import PurePursuit, PurePursuitConfig, QuadraticCurveTracker
 from robots.onboard.path import Arc, MovingPath
 from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
-from robots.onboard.pure_pursuit import PurePursuit, PurePursuitConfig
-from robots.onboard.quadratic_tracker import QuadraticCurveTracker
 
 SPEED: Final = 1.2
 """Of pure pursuit, and largest of the uni-vector field [m/s]."""

@@ -44,9 +44,9 @@ from robots.ipr.position import LaserPosition
 from robots.ipr.robot import MobileRobot
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
+from robots.onboard.following import SoundPosition
 from robots.onboard.journey import GOING, Goal
 from robots.onboard.laser import LaserModel, LaserScan, beam_angles
-from robots.onboard.sensor_watch import SoundPosition
 from vrs.checks import one_of
 from vrs.clock import WallClock
 

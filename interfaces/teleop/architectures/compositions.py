@@ -23,8 +23,8 @@ from interfaces.teleop.architectures.surroundings import OperatorSurroundings, R
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
+from robots.ipr.model import CELL, CELLS
 from robots.ipr.navigation import mounts_of, outline_of
-from robots.ipr.parameters import CELL, CELLS
 from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance

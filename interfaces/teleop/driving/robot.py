@@ -22,7 +22,7 @@ from interfaces.teleop.driving.messages import (
 )
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, kept
-from robots.onboard.sensor_watch import SoundPosition
+from robots.onboard.following import SoundPosition
 from vrs.checks import validated, within
 from vrs.mobile import DriveLimits
 from vrs.mobile.model import braking

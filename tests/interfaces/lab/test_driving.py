@@ -18,9 +18,8 @@ from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
-from robots.ipr.bare import BareBody
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import place
+from robots.ipr.chassis import MobileReality
+from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import advanced

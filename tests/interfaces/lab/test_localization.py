@@ -25,13 +25,13 @@ from interfaces.lab.localization.unobservable import measure_axis
 from interfaces.runs.drive_run import DriveCase
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.apartments import ApartmentConfig, apartment
+from robots.ipr.chassis import MobileReality
 from robots.ipr.floor_plan import FloorPlan, plan_map
-from robots.ipr.reality import MobileReality
 from robots.onboard.driving import STAND, Drive
 from robots.onboard.global_localization import Answer, locate
+from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer, Status
 from robots.onboard.map_building import MapBuilder, Surveyor
-from robots.onboard.paper_localization import PaperLocalizer
 from vrs.mobile import wrapped
 
 ROOM = read_room(

@@ -20,11 +20,10 @@ from interfaces.middleware import (
     predicted,
 )
 from robots.onboard.curve import Curve
+from robots.onboard.curve_trackers import PurePursuit, QuadraticCurveTracker
 from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import Arc, MovingPath
 from robots.onboard.path_following import PathFollowingController
-from robots.onboard.pure_pursuit import PurePursuit
-from robots.onboard.quadratic_tracker import QuadraticCurveTracker
 from vrs.errors import InvalidValueError
 
 HERE = Posture(1.0, 2.0, 0.3)

@@ -12,7 +12,7 @@ from robots.cubo import parameters as p
 from robots.cubo.body import COMMANDS, EVENTS, MEASURES, MOVES, CuboBody
 from robots.cubo.shapes import links, shapes
 from robots.ipr.body import DRIVES
-from robots.ipr.reality import MobileReality
+from robots.ipr.chassis import MobileReality
 from vrs.errors import InvalidValueError
 
 IDEAL = replace(MobileReality.ideal(), ramps=True)

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import CHASSES, CameraModel, Senses, SonarModel, chassis
+from robots.ipr.chassis import CHASSES, CameraModel, MobileReality, Senses, SonarModel, chassis
 from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import MobileRobot
+from robots.ipr.robot import BareBody, MobileRobot
 from robots.ipr.sensing import SonarRing
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced

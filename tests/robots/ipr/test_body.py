@@ -11,13 +11,12 @@ import pytest
 import trimesh
 
 from robots import ipr
-from robots.bullet.reality import Payload
 from robots.bullet.rooms import read_room
+from robots.bullet.serial_arm import Payload
 from robots.bullet.world import WorldClosedError
-from robots.ipr.bare import BareBody
 from robots.ipr.body import LostError, MobileBody
-from robots.ipr.chassis import CHASSES, IPR, CameraModel, Chassis, Senses, SonarModel, chassis
-from robots.ipr.reality import MobileReality
+from robots.ipr.chassis import CHASSES, IPR, CameraModel, Chassis, MobileReality, Senses, SonarModel, chassis
+from robots.ipr.robot import BareBody
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.bullet.room_bodies import RoomBodies
 from robots.bullet.rooms import Door, DoorKind, read_room
-from robots.bullet.world import World
+from robots.bullet.world import RoomBodies, World
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import place
 from vrs.errors import FormatError, InvalidValueError

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from robots.bullet.room_bodies import RoomBodies
 from robots.bullet.rooms import Room, read_room
-from robots.bullet.world import World
+from robots.bullet.world import RoomBodies, World
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import PLACES, place
 from vrs.model import Array

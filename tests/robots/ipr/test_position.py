@@ -8,10 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import CameraModel, Senses
+from robots.ipr.chassis import CameraModel, MobileReality, Senses
 from robots.ipr.position import FusedPosition, FusionConfig, LaserPosition, OdometryPosition, TruePosition
-from robots.ipr.reality import MobileReality
+from robots.ipr.robot import BareBody
 from vrs.errors import InvalidValueError
 
 EXACT = Senses(sonar=None, camera=CameraModel(latency=0.4, noise=0.0, noise_angle=0.0))

@@ -7,12 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from robots.ipr.bare import BareBody
 from robots.ipr.body import MobileBody
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.reality import MobileReality
-from robots.ipr.robot import MobileRobot, place
+from robots.ipr.robot import BareBody, MobileRobot, place
 from robots.onboard.laser import LaserModel
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots.bullet.camera import SKY, Picture
 from robots.bullet.rooms import EMPTY, read_room
+from robots.bullet.world import SKY, Picture
 from robots.ipr.camera import Lens, Look, Sight, lens_pose
 from robots.ipr.shapes import upright
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.onboard.plane_pieces import real_roots
+from robots.onboard.curve import real_roots
 
 ROOTS = st.floats(-10, 10)
 

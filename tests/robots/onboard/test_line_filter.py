@@ -9,8 +9,7 @@ import pytest
 
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.line_filter import OWN, LineFilter, MatchingConfig, MotionConfig, Sights, matched
-from robots.onboard.localization import observability
-from robots.onboard.paper_localization import injected_update, mean_update, weighted_update, weights
+from robots.onboard.localization import injected_update, mean_update, observability, weighted_update, weights
 from vrs.mobile import advanced
 from vrs.model import Array
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.bare import BareBody
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.floor_plan import plan_map
-from robots.ipr.reality import MobileReality
+from robots.ipr.robot import BareBody
 from robots.onboard.laser import LaserModel
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig, Tracker

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.bare import BareBody
 from robots.ipr.navigation import BodyNavigator
+from robots.ipr.robot import BareBody
 from robots.onboard.driving import Posture
 from robots.onboard.navigator import Navigator
 

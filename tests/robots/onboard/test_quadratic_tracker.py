@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robots.onboard.curve import Curve
-from robots.onboard.pure_pursuit import PurePursuit, PurePursuitConfig
-from robots.onboard.quadratic_tracker import (
+from robots.onboard.curve_trackers import (
     Backwards,
+    PurePursuit,
+    PurePursuitConfig,
     QuadraticCurveTracker,
     QuadraticTrackerConfig,
     parabola_drive,

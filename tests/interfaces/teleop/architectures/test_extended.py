@@ -15,10 +15,9 @@ from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import ArchitectureReport, CellChanges, OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.compositions import BodySonar, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
-from robots.ipr.bare import BareBody
 from robots.ipr.chassis import IPR, SonarModel
 from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.robot import place
+from robots.ipr.robot import BareBody, place
 from robots.ipr.sensing import SonarRing
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture

@@ -22,8 +22,8 @@ from interfaces.teleop.driving import (
     JourneyPilot,
 )
 from robots import ipr
-from robots.ipr.bare import BareBody
 from robots.ipr.position import FusedPosition
+from robots.ipr.robot import BareBody
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import IPR_LIMITS, Posture
 from robots.onboard.journey import Journey

@@ -16,12 +16,11 @@ from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.stream.control import Role
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving.messages import DriveReport
-from robots.ipr.bare import BareBody
 from robots.ipr.chassis import Senses
-from robots.ipr.robot import place
+from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture
+from robots.onboard.following import SensorWatch, SoundPosition
 from robots.onboard.laser import LaserModel
-from robots.onboard.sensor_watch import SensorWatch, SoundPosition
 from tests.interfaces.teleop.driving.rig import Rig
 
 BAD = [math.nan, math.inf, 1e300, -1e300]
