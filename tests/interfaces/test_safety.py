@@ -125,7 +125,7 @@ def uses(name: str, text: str) -> bool:
 def test_nothing_on_board_is_for_tests_alone() -> None:
     """Each name of safety that `robots.onboard` gives is used by what isn't a test, not only defined."""
     root = DOCUMENT.parents[1]
-    own = {"lease", "watchdog", "following", "sensor_watch", "stops", "playout", "stamps"}
+    own = {"lease", "watchdog", "following", "servo", "playout"}
     modules = {
         path: path.read_text()
         for folder in ("interfaces", "robots")
