@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
 from interfaces.lab.tipsuwan.gain import behind_a_network
-from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, network_of, run
-from interfaces.lab.tipsuwan.s_paths import START, s_path
+from interfaces.lab.tipsuwan.run import START, NetworkControl, NetworkRunSetting, agent, network_of, run, s_path
 from interfaces.middleware import GainScheduler, default_network, optimal_way, train
 from robots.onboard.curve_trackers import QuadraticCurveTracker
 from robots.onboard.driving import Drive, Posture

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 from interfaces.lab.driving.run import run
 from interfaces.recording import open_recording
-from interfaces.recording.figures import drive_summary as summary
+from interfaces.recording.figures import summary
 from interfaces.recording.playback import Playback
 from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import DriveRecorder

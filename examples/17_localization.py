@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from interfaces.lab.localization.wandering import Wanderer
+from interfaces.lab.localization.trial import Wanderer
 from robots.ipr.apartments import ApartmentConfig, apartment
 from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.floor_plan import plan_map

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import typer
 
-from interfaces.cli.doors import access_for
 from interfaces.cli.main import app
+from interfaces.cli.options import access_for
 
 HOME = Path(__file__).resolve().parents[1]
 

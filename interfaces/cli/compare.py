@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.report.driven import FIGURES, shown
+from interfaces.report.tables import FIGURES, shown
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -81,7 +81,7 @@ def _summary(recording: Recording) -> dict[str, Any]:
     Raises:
         FormatError: If too little is left of it.
     """
-    from interfaces.report.recorded import summary
+    from interfaces.recording.figures import summary
 
     value = summary(recording)
     for line in value.get("missing", ()):

@@ -49,7 +49,7 @@ def export(
 
 
 def _report(recording: Recording, path: Path) -> None:
-    from interfaces.report.recorded import render
+    from interfaces.report.html import render_recording as render
 
     text, missing = render(recording)
     for line in missing:

@@ -1,23 +1,102 @@
-"""`vrs lab`: seeded experiments with a mobile robot, with confidence intervals."""
+"""vrs lab: seeded experiments with a mobile robot, with confidence intervals; localization; goals."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.goals import GOALS, send
-from interfaces.cli.localization import LOCALIZATION, localize, refuse
 from interfaces.cli.options import PROFILES
+from interfaces.cli.reproduce import measured, show
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from interfaces.lab.pool import Calls, Made
+    from interfaces.lab import Paper, Reproduction, Study
+    from interfaces.lab.runner import Calls, Made
+
+LOCALIZATION: Final = "localization"
+"""What the command line calls it."""
+
+
+def refuse(what: str, others: Mapping[str, object]) -> None:
+    """Raise if options are given that are of other experiments than this one, and would do nothing.
+
+    Raises:
+        InvalidValueError: If there's one.
+    """
+    given = [name for name, value in others.items() if value]
+    if given:
+        raise InvalidValueError("options", " ".join(given), f"left out for {what}")
+
+
+def localize(
+    out: Path, seed: int, rooms: int | None, length: float | None, starts: int, workers: int, *, as_json: bool
+) -> None:
+    """Measure it, write summary.json, runs.csv and pictures, and show tables or JSON.
+
+    Args:
+        out: Where they go.
+        seed: Of everything random.
+        rooms: In which accuracy is measured, 2 to 1000; 30 if None.
+        length: Of a drive [s]; 60 if None.
+        starts: From which a robot that knows nothing is found.
+        workers: Processes at once.
+        as_json: Whether JSON goes to standard output, instead of tables.
+    """
+    from interfaces.lab import Study
+    from interfaces.lab.localization import study as rooms_study
+
+    most = rooms_study.ROOMS if rooms is None else rooms
+    study = Study(seed, most, rooms_study.LENGTH if length is None else length)
+    _measured(rooms_study.study_of(most, starts), study, out, rooms_study.write, workers, as_json=as_json)
+
+
+def _measured(
+    paper: Paper,
+    study: Study,
+    out: Path,
+    write: Callable[[Reproduction, Path], None],
+    workers: int,
+    *,
+    as_json: bool,
+) -> None:
+    """Measure a study, write what came of it, and show tables or JSON."""
+    from interfaces.lab.output import to_json
+
+    prepare(out, "runs.csv", "summary.json")
+    found = measured(paper, study, workers)
+    write(found, out)
+    if as_json:
+        typer.echo(to_json(found), nl=False)
+    else:
+        show(found, out / "summary.json")
+
+
+GOALS: Final = "goals"
+"""What the command line calls it."""
+
+
+def send(out: Path, seed: int, goals: int | None, workers: int, *, as_json: bool) -> None:
+    """Measure it, write summary.json, runs.csv and maps, and show tables or JSON.
+
+    Args:
+        out: Where they go.
+        seed: Of everything random.
+        goals: Among furniture and doors, 2 to 1000; 100 if None.
+        workers: Processes at once.
+        as_json: Whether JSON goes to standard output, instead of tables.
+    """
+    from interfaces.lab import Study
+    from interfaces.lab.goals import study as trips
+
+    study = Study(seed, trips.GOALS if goals is None else goals)
+    _measured(trips.study_of(study.runs), study, out, trips.write, workers, as_json=as_json)
 
 
 def lab(
@@ -125,12 +204,18 @@ def lab(
         return
     refuse("the architectures", {"--starts": starts})
     runs, length = runs or 5, length or 120.0
-    from interfaces.lab.driving.attribution import attributed
     from interfaces.lab.driving.operators import operator as make
-    from interfaces.lab.driving.output import attributions, causes_table, rich_table, summary, write
-    from interfaces.lab.driving.pictures import drawn, pictures
-    from interfaces.lab.driving.recorded import Kept, measure_recorded, paths
-    from interfaces.lab.driving.sweep import cases
+    from interfaces.lab.driving.output import (
+        attributions,
+        causes_table,
+        drawn,
+        pictures,
+        rich_table,
+        summary,
+        write,
+    )
+    from interfaces.lab.driving.run import Kept, measure_recorded, paths
+    from interfaces.lab.driving.sweep import attributed, cases
     from interfaces.link.delays import delay_profile
     from interfaces.runs.drive_run import ROBOTS
     from interfaces.teleop.architectures import Constants, Transport, controller
@@ -203,7 +288,7 @@ def _worked(calls: Calls[Made], what: str, workers: int) -> list[Made]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from interfaces.lab.pool import pooled
+    from interfaces.lab.runner import pooled
 
     columns = (TextColumn(what), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:

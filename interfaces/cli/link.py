@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.doors import end_on_signal
-from interfaces.cli.options import PROFILES
+from interfaces.cli.options import PROFILES, end_on_signal
 
 if TYPE_CHECKING:
     from interfaces.link import Conditions, DelayProfile

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from interfaces.cli.doors import (
+from interfaces.cli.options import (
     abandon,
     access_for,
     asked_for,
@@ -29,7 +29,7 @@ from vrs.checks import number_in, one_of
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
-    from interfaces.cli.doors import Hosts
+    from interfaces.cli.options import Hosts
     from interfaces.link import LinkConditions
     from interfaces.link.proxy import Address
     from interfaces.runtime.live.mobile_robot import LiveMobileRobot

@@ -1,11 +1,30 @@
-"""Options that several commands have."""
+"""Options that several commands have, and what those that listen share: who may come in, and what ends them."""
 
 from __future__ import annotations
 
+import gc
+import ipaddress
+import os
+import re
+import signal
+import socket
+import sys
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
+
+from vrs.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    import asyncio
+    from contextlib import AsyncExitStack
+
+    from interfaces.link import LinkConditions
+    from interfaces.stream.access import Access
+    from interfaces.stream.control import Attached, Role
+    from robots.onboard import LossPolicy
 
 PROFILES = (
     "none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar, gamma:MEAN,SD[,MIN], "
@@ -35,3 +54,192 @@ Host: TypeAlias = Annotated[
 Port: TypeAlias = Annotated[
     int, typer.Option("--port", min=0, max=65535, metavar="N", help="0 for any that's free.")
 ]
+
+
+TokenFile: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
+]
+"""What lets other machines in: see `access_for`."""
+ReachedAs: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--reached-as",
+        metavar="HOST[:PORT]",
+        help="Another address that it's reached by, as behind a forwarded port or a proxy; may be repeated.",
+    ),
+]
+"""What else requests may ask for: see `asked_for`."""
+Hosts: TypeAlias = Callable[[int], frozenset[str]]
+"""What the Host of a request may be, by the port that a server listens on."""
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(:[0-9]{1,5})?", re.IGNORECASE)
+"""What a request's Host is made of."""
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> Access:
+    """Who may come in: with a token file whoever has a token, without one whoever is on this machine.
+
+    Args:
+        host: Where it listens.
+        token_file: Read, or made if it's missing.
+        free: Roles that need no token on loopback without a token file.
+
+    Raises:
+        InvalidValueError: If other machines would come in without tokens.
+        FormatError: If the file can't be used.
+    """
+    from interfaces.stream.access import Access, make_tokens, read_tokens
+
+    if token_file is None:
+        if not is_loopback(host):
+            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
+        return Access(free=free)
+    return Access(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), free=())
+
+
+def names_of(host: str) -> list[str]:
+    """Names by which a server is rightly addressed that listens on a host."""
+    if is_loopback(host):
+        return ["127.0.0.1", "localhost", "::1"]
+    if host not in {"0.0.0.0", "::"}:  # noqa: S104 - compared, not listened on
+        return [host]
+    own = socket.gethostname()
+    try:
+        found = {str(info[4][0]) for info in socket.getaddrinfo(own, None)}
+    except OSError:
+        found = set()
+    return sorted({"127.0.0.1", "localhost", "::1", own, *found})
+
+
+def asked_for(host: str, also: Iterable[str]) -> Hosts:
+    """What the Host of a request may be, by the port that a server listens on.
+
+    Args:
+        host: Where it listens.
+        also: Other addresses that it's reached by, just as a browser's address line has them.
+
+    Raises:
+        InvalidValueError: If one of those is no address.
+    """
+    others = [address.lower() for address in also]
+    for address in others:
+        if not _HOST.fullmatch(address):
+            raise InvalidValueError("reached-as", address, "HOST or HOST:PORT, as a browser's address line has it")
+
+    def allowed(port: int) -> frozenset[str]:
+        from interfaces.stream.access import hosts
+
+        return hosts(names_of(host), port).union(others)
+
+    return allowed
+
+
+def end_with_input(ended: asyncio.Event) -> None:
+    """Set an event of the running loop when standard input ends; none, or a file, has ended."""
+    import asyncio
+
+    if sys.stdin is None:
+        ended.set()
+        return
+    loop, source = asyncio.get_running_loop(), sys.stdin.fileno()
+
+    def look() -> None:
+        if not os.read(source, 4096):
+            loop.remove_reader(source)
+            ended.set()
+
+    try:
+        loop.add_reader(source, look)
+    except PermissionError:
+        # Files and /dev/null can't be waited for: there's always something to read, or the end.
+        ended.set()
+
+
+def end_on_signal(ended: asyncio.Event) -> None:
+    """Let Ctrl-C and SIGTERM set an event of the running loop, and do nothing else."""
+    import asyncio
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+
+
+ROUNDS = 2000
+"""The collector looks at old objects after so many passes over young ones, each after some 7,000 new objects."""
+LEISURE = 10.0
+"""Time between two looks at whether old garbage may be collected [s]."""
+
+
+def keep_quiet() -> None:
+    """Let the garbage collector pass over all that is old: its long passes would stop a robot for 20 to 500 ms."""
+    gc.collect()
+    gc.freeze()
+    young, middle, _ = gc.get_threshold()
+    gc.set_threshold(young, middle, ROUNDS)
+
+
+async def collect_at_leisure(free: Callable[[], bool]) -> None:
+    """Collect old garbage whenever it's convenient, until it's cancelled.
+
+    Args:
+        free: Whether a moment's pause matters to nobody.
+    """
+    import asyncio
+
+    while True:
+        await asyncio.sleep(LEISURE)
+        if gc.get_count()[2] and free():
+            gc.collect()
+
+
+async def start_robot(
+    robots: AsyncExitStack, robot_at: str | None, options: Sequence[str], ended: Callable[[str], None]
+) -> str:
+    """Where the robot is; one is started if there's none, and if that ends it's told why."""
+    from interfaces.runtime.live.process import local_robot
+
+    return await robots.enter_async_context(local_robot(options, ended)) if robot_at is None else robot_at
+
+
+def say_lost(lose: Callable[[str], None], lost: asyncio.Future[str]) -> None:
+    """Say once that the robot is lost for good, here and to whoever commands it."""
+    if not lost.cancelled():
+        typer.echo(f"vrs: {lost.result()}", err=True)
+        lose(lost.result())
+
+
+async def abandon(task: asyncio.Task[str]) -> None:
+    """Let a task end that nobody waits for any more."""
+    import asyncio
+
+    task.cancel()
+    await asyncio.wait([task])
+
+
+def say_robot(url: str, conditions: LinkConditions, link_loss: LossPolicy | None) -> None:
+    """Say on standard error where the robot is, what is emulated on the way there, and what it's asked to do."""
+    asked = "" if link_loss is None else f", link loss: {link_loss}"
+    typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}{asked}", err=True)
+
+
+def saying_policy() -> Callable[[Attached], None]:
+    """What says on standard error what a robot does when the link is lost, for each operator where that's news."""
+    said = ""
+
+    def say(attached: Attached) -> None:
+        nonlocal said
+        if attached.link_loss != said:
+            said = attached.link_loss
+            typer.echo(f"vrs: operator's site connected, link loss: {said}", err=True)
+
+    return say

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import ReachedAs, TokenFile, access_for, asked_for, end_on_signal
-from interfaces.cli.options import Host, Port
+from interfaces.cli.options import Host, Port, ReachedAs, TokenFile, access_for, asked_for, end_on_signal
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from interfaces.cli.doors import Hosts
+    from interfaces.cli.options import Hosts
     from interfaces.recording.playback import Playback
     from interfaces.recording.recording import Recording
     from interfaces.stream.access import Access

@@ -11,7 +11,7 @@ from interfaces.cli.demo import prepare
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
-    from interfaces.report.verdicts import ClaimReport
+    from interfaces.report.claims import ClaimReport
 
 
 def reproduce(
@@ -61,8 +61,7 @@ def reproduce(
     """Measure each claim of a paper: expected, measured, holds; with figures, and all claims on one page."""
     from interfaces.lab import Study, papers
     from interfaces.lab.output import to_json, write
-    from interfaces.report.claims import write_claims
-    from interfaces.report.verdicts import read_verdicts
+    from interfaces.report.claims import read_verdicts, write_claims
 
     chosen = papers(paper)
     more = [found for path in beyond or () for found in read_verdicts(path)]

@@ -10,21 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.doors import (
-    Hosts,
-    ReachedAs,
-    TokenFile,
-    abandon,
-    access_for,
-    asked_for,
-    collect_at_leisure,
-    end_on_signal,
-    end_with_input,
-    keep_quiet,
-    say_lost,
-    say_robot,
-    start_robot,
-)
 from interfaces.cli.mobile import (
     ARCHITECTURE,
     CAMERA,
@@ -43,7 +28,24 @@ from interfaces.cli.mobile import (
     serve_mobile,
     without,
 )
-from interfaces.cli.options import PROFILES, Host, Port
+from interfaces.cli.options import (
+    PROFILES,
+    Host,
+    Hosts,
+    Port,
+    ReachedAs,
+    TokenFile,
+    abandon,
+    access_for,
+    asked_for,
+    collect_at_leisure,
+    end_on_signal,
+    end_with_input,
+    keep_quiet,
+    say_lost,
+    say_robot,
+    start_robot,
+)
 from interfaces.system import software
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError

@@ -2,7 +2,7 @@
 
 from interfaces.lab.claims import Claim, Figure, Findings, Paper, PaperPart, Reproduction, Study, Table
 from interfaces.lab.papers import PAPERS, papers
-from interfaces.lab.running import reproduce
+from interfaces.lab.runner import reproduce
 
 __all__ = [
     "PAPERS",

@@ -148,11 +148,15 @@ def summary(recording: Recording) -> Json:
     """The run's summary: of a whole recording of the laboratory the run's own, else with a list `missing`.
 
     Raises:
-        FormatError: As `figures`.
+        FormatError: If the recording has too little of it.
     """
-    found = figures(recording)
-    value = summarize(found.run, found.attributions, found.offsets)
-    return value | {"missing": list(found.missing)} if found.missing else value
+    if recording.session.drive is None:
+        arm = figures(recording)
+        value, missing = summarize(arm.run, arm.attributions, arm.offsets), arm.missing
+    else:
+        found = driven(recording)
+        value, missing = figures_of(recording, found), found.missing
+    return value | {"missing": list(missing)} if missing else value
 
 
 class _Reading:
@@ -370,17 +374,6 @@ class Driven:
     """What isn't in the recording, and what stands for it; nothing in a whole one."""
     gap_s: float
     """For how long nothing was measured of the real robot, between its samples [s]."""
-
-
-def drive_summary(recording: Recording) -> dict[str, Any]:
-    """The run's figures, with a list `missing` where something is.
-
-    Raises:
-        FormatError: As `driven`.
-    """
-    found = driven(recording)
-    value = figures_of(recording, found)
-    return value | {"missing": list(found.missing)} if found.missing else value
 
 
 def figures_of(recording: Recording, found: Driven) -> dict[str, Any]:

@@ -1,10 +1,11 @@
-"""The page of all claims, those of the papers and those beyond them: one HTML file and the same as JSON."""
+"""The page of all claims, read back from studies and benchmarks: one HTML file and the same as JSON."""
 
 from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -12,13 +13,115 @@ from string import Template
 from typing import Any, Final
 
 from interfaces.lab.claims import interval_said, said
-from interfaces.report.markup import table
-from interfaces.report.verdicts import ClaimReport, Json
+from interfaces.lab.output import SCHEMA
+from interfaces.report.tables import table
 from vrs.errors import FormatError
+
+Json = Mapping[str, Any]
+COLUMNS: Final = ("claim", "source", "expected", "measured", "interval", "holds")
+"""What each claim says of itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimReport:
+    """The claims of one paper, study or benchmark."""
+
+    name: str
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    """How it was measured, in pairs of a name and a value."""
+    claims: tuple[Json, ...]
+    """Each with the keys of `COLUMNS`."""
+    timings: tuple[Json, ...] = ()
+    """Claims on the speed of the machine."""
+    tables: tuple[Json, ...] = ()
+    """`title`, `columns` and `rows`."""
+    figures: tuple[tuple[str, str], ...] = ()
+    """Titles and SVG texts."""
+
+    @property
+    def total(self) -> int:
+        """How many claims there are."""
+        return len(self.claims) + len(self.timings)
+
+    @property
+    def held(self) -> int:
+        """How many of them hold."""
+        return sum(bool(claim["holds"]) for claim in (*self.claims, *self.timings))
+
+
+def read_verdicts(path: Path) -> tuple[ClaimReport, ...]:
+    """Read a study's `PAPER.json` with the figures beside it, or the `results.json` of the benchmarks.
+
+    Raises:
+        FormatError: If it's neither, or can't be read.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
+    except ValueError as error:
+        raise FormatError(str(path), f"isn't JSON: {error}") from None
+    try:
+        if document.get("schema") == SCHEMA:
+            return (_study(path, document),)
+        return tuple(found for name, part in document["parts"].items() if (found := _benchmark(name, part)).claims)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FormatError(str(path), f"isn't a reproduction or a benchmark's results: {error!r}") from None
+
+
+def _study(path: Path, document: Json) -> ClaimReport:
+    length = f"{document['length_s']:g} s"
+    facts = ("seed", str(document["seed"])), ("runs", str(document["runs"])), ("length", length)
+    return ClaimReport(
+        document["paper"],
+        document["citation"],
+        facts,
+        tuple(map(_claim, document["claims"])),
+        tuple(map(_claim, document["timings"])),
+        tuple(document["tables"]),
+        tuple((figure["title"], _svg(path.parent / figure["file"])) for figure in document["figures"]),
+    )
+
+
+def _claim(claim: Json) -> Json:
+    return {name: claim[name] for name in COLUMNS}
+
+
+def _svg(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
+
+
+def _benchmark(name: str, part: Json) -> ClaimReport:
+    asked = [_measured(name, result) for result in part["results"] if result["holds"] is not None]
+    return ClaimReport(name, part["title"], (("pace of the machine", f"{part['pace_us']:.0f} µs"),), tuple(asked))
+
+
+def _measured(name: str, result: Json) -> Json:
+    """A benchmark's row as a claim: medians, the 99th percentile, the ratio to a peer."""
+    beside = f", beside {result['peer']}" if result["peer"] else ""
+    unit, ours = result["unit"], result["ours"]
+    words = [f"{ours['median']:.3g} {unit}".rstrip()]
+    if ours["p99"] is not None:
+        words.append(f"p99 {ours['p99']:.3g} {unit}".rstrip())
+    if result["ratio"] is not None:
+        words.append(f"ratio {result['ratio']:.2f}")
+    return {
+        "claim": f"{result['name']}{beside}".replace("`", "") + (f" [{unit}]" if unit else ""),
+        "source": f"python -m benchmarks {name}",
+        "expected": result["asked"],
+        "measured": ", ".join(words),
+        "interval": None,
+        "holds": bool(result["holds"]),
+    }
+
 
 PAGE: Final = "reproduce.html"
 DATA: Final = "reproduce.json"
-SCHEMA: Final = "vrs-claims/1"
+CLAIMS_SCHEMA: Final = "vrs-claims/1"
 HEAD: Final = ("claim", "", "expected", "measured", "interval", "source")
 """Of the table; the verdict has no name."""
 
@@ -48,7 +151,7 @@ def write_claims(out: Path, papers: Sequence[ClaimReport], beyond: Sequence[Clai
 def to_json(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> str:
     """Every claim as JSON; equal findings give equal texts."""
     document = {
-        "schema": SCHEMA,
+        "schema": CLAIMS_SCHEMA,
         "claims": sum(found.total for found in (*papers, *beyond)),
         "hold": sum(found.held for found in (*papers, *beyond)),
         "papers": [_plain(found) for found in papers],

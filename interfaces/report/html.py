@@ -1,21 +1,31 @@
-"""The report of a run: one HTML file that opens without a network."""
+"""Reports of runs, also from recordings: one HTML file that opens without a network, or a frame in a notebook."""
 
 from __future__ import annotations
 
+import base64
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from interfaces.clients.appearance import viewer_bundle
-from interfaces.report.markup import card, figures, receipts, table, tiles, words
+from interfaces.lab.claims import Figure
+from interfaces.lab.driving.output import of_drives
+from interfaces.recording.figures import driven, figures_of
+from interfaces.recording.figures import figures as run_figures
+from interfaces.recording.recording import Recording
 from interfaces.report.plots import Plot, plots
 from interfaces.report.scene import scene
-from interfaces.runs.twin_run import TwinRun
+from interfaces.report.tables import FIGURES, card, figures, receipts, shown, table, tiles, words
+from interfaces.runs.drive_run import DriveRun
+from interfaces.runs.summary import summarize
+from interfaces.runs.twin_run import RunEvent, TwinRun
 
 
 def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> None:
@@ -111,3 +121,107 @@ def _script_json(value: object) -> str:
 def _script(text: str) -> str:
     """Keep a script's own strings from ending its element."""
     return re.sub(r"</(script)", r"<\\/\1", text, flags=re.IGNORECASE).replace("<!--", "<\\!--")
+
+
+FACTS: Final = ("architecture", "transport", "delay", "robot", "operator", "seed")
+"""What a run is, of its summary."""
+
+
+def render_drive(drive: DriveRun, summary: Mapping[str, Any], events: Sequence[RunEvent]) -> str:
+    """Return the report as one HTML text; equal runs give equal texts.
+
+    Args:
+        drive: The run.
+        summary: Its figures, by the names of the columns of runs.csv.
+        events: What else happened.
+    """
+    case = drive.case
+    rows = [(name, shown(summary[key], scale, unit), unit) for key, name, scale, unit in FIGURES]
+    facts = "".join(f"<li><span>{name}</span>{escape(str(summary[name]))}</li>" for name in FACTS)
+    facts += f"<li><span>duration</span>{summary['duration_s']:.1f} s</li>"
+    if summary["gap_s"] > 0:
+        facts += f"<li><span>not measured</span>{summary['gap_s']:.1f} s</li>"
+    drawn = of_drives({f"{case.architecture}, {case.transport}": drive}, f"{case.robot}, {case.operator}")
+    happened = [(f"{event.t:.2f} s", event.kind, event.text) for event in events]
+    return Template(_asset("drive.html")).substitute(
+        title=escape(str(summary["title"])),
+        css=_asset("report.css"),
+        facts=facts,
+        figures=card("By the definitions of docs/lab.md", table(("", "value", "unit"), rows)),
+        pictures="".join(_picture(figure) for figure in drawn),
+        events="<h2>Events</h2>" + card("By time", table(("time", "kind", "what"), happened)) if happened else "",
+    )
+
+
+def _picture(figure: Figure) -> str:
+    data = base64.b64encode(figure.svg.encode("utf-8")).decode("ascii")
+    image = f'<img alt="{escape(figure.title)}" src="data:image/svg+xml;base64,{data}">'
+    return f'<figure class="card picture">{image}</figure>'
+
+
+MOST_SAMPLES: Final = 1200
+"""Of each robot, in the picture of a drive."""
+
+
+class Framed:
+    """An HTML page in a frame of its own, as notebooks show what has `_repr_html_`."""
+
+    def __init__(self, page: str, height: int) -> None:
+        """Take a whole page, and the height that it's shown at [px]."""
+        self.page, self.height = page, height
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self.page)}" sandbox="allow-scripts" title="Both robots" loading="lazy" '
+            f'style="width: 100%; height: {self.height}px; border: 0; border-radius: 12px"></iframe>'
+        )
+
+
+def inline_report(run: TwinRun, *, height: int = 760) -> Framed:
+    """The report of two arms, its 3D view first; it needs no network.
+
+    Args:
+        run: Both arms.
+        height: Of the frame [px].
+    """
+    from interfaces.runs.summary import summarize
+
+    return Framed(render(run, summarize(run)), height)
+
+
+def inline_drive(drive: DriveRun, *, height: int = 560) -> Framed:
+    """Both mobile robots from above, with a play button and a slider; it needs no network.
+
+    Args:
+        drive: The run.
+        height: Of the frame [px].
+    """
+    data = json.dumps(_drive(drive), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    text = resources.files("interfaces.report").joinpath("inline.html").read_text(encoding="utf-8")
+    case = drive.case
+    return Framed(Template(text).substitute(title=escape(f"{case.architecture}, {case.delay}"), data=data), height)
+
+
+def _drive(drive: DriveRun) -> dict[str, Any]:
+    step = max(1, -(-len(drive.t) // MOST_SAMPLES))
+    both = np.concatenate([drive.virtual[:, :2], drive.real[:, :2]])
+    return {
+        "t": np.round(drive.t[::step], 3).tolist(),
+        "virtual": np.round(drive.virtual[::step], 4).tolist(),
+        "real": np.round(drive.real[::step], 4).tolist(),
+        "low": (both.min(axis=0) - 0.6).tolist(),
+        "high": (both.max(axis=0) + 0.6).tolist(),
+    }
+
+
+def render_recording(recording: Recording) -> tuple[str, tuple[str, ...]]:
+    """The run's report as HTML, and what isn't in the recording.
+
+    Raises:
+        FormatError: If the recording has too little of it.
+    """
+    if recording.session.drive is None:
+        arm = run_figures(recording)
+        return render(arm.run, summarize(arm.run, arm.attributions, arm.offsets)), arm.missing
+    found = driven(recording)
+    return render_drive(found.drive, figures_of(recording, found), recording.events), found.missing

@@ -1,13 +1,42 @@
-"""The comparison table of a run, for a terminal."""
+"""Tables of a run's figures, for a terminal and as HTML; all that a user or a run gives is escaped in HTML."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any, Final
+
+from vrs.ledger import Receipt
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-Json = dict[str, Any]
+FIGURES: Final = (
+    ("path_error_mean", "path error, mean", 1e2, "cm"),
+    ("path_error_p95", "path error, 95 %", 1e2, "cm"),
+    ("path_error_max", "path error, max", 1e2, "cm"),
+    ("time_difference_mean", "time difference, mean", 1.0, "s"),
+    ("time_difference_sd", "time difference, sd", 1.0, "s"),
+    ("time_difference_max", "time difference, max", 1.0, "s"),
+    ("time_difference_bound", "time difference, bound", 1.0, "s"),
+    ("speed_error", "speed error", 1e2, "cm/s"),
+    ("progress", "progress", 1e2, "%"),
+    ("collisions", "collisions", 1.0, ""),
+    ("limits_passed", "limits passed", 1.0, ""),
+    ("sent_bytes", "bytes sent", 1.0, ""),
+    ("longest_delay", "longest delay", 1.0, "s"),
+)
+"""Name in a summary, name for people, factor and unit (none: a count)."""
+
+
+def shown(value: float | None, scale: float, unit: str) -> str:
+    """A value in its unit; without one it's a count."""
+    if value is None:
+        return "undefined"
+    return f"{scale * value:z.3f}" if unit else f"{value:z.0f}"
+
+
+Summary = dict[str, Any]
 ROWS = (
     ("timeline_time", "timeline"),
     ("lag_removed", "… no lag"),
@@ -16,7 +45,7 @@ ROWS = (
 )
 
 
-def error_table(summary: Json) -> Table:
+def error_table(summary: Summary) -> Table:
     """Joint and tool errors, a row a way of comparing."""
     from rich.table import Table
 
@@ -44,13 +73,13 @@ def error_table(summary: Json) -> Table:
     return table
 
 
-def attribution_table(summary: Json) -> Table:
+def attribution_table(summary: Summary) -> Table:
     """Errors split among their causes, a row a measure."""
     from rich.table import Table
 
     order = summary["attribution_order"]
-    table = Table(title=f"Why: switched off in turn, {', '.join(map(_words, order))}", title_justify="left")
-    for name in ("measure (rms)", "total", *map(_words, order), "residual"):
+    table = Table(title=f"Why: switched off in turn, {', '.join(map(_cause_words, order))}", title_justify="left")
+    for name in ("measure (rms)", "total", *map(_cause_words, order), "residual"):
         table.add_column(name, justify="left" if name.startswith("measure") else "right")
     for item in summary["attribution"]:
         label, scale, unit = MEASURES[item["measure"]]
@@ -59,7 +88,7 @@ def attribution_table(summary: Json) -> Table:
     return table
 
 
-def offset_table(summary: Json) -> Table:
+def offset_table(summary: Summary) -> Table:
     """What other choices of the offset make of the same network."""
     from rich.table import Table
 
@@ -71,7 +100,7 @@ def offset_table(summary: Json) -> Table:
     return table
 
 
-def offset_rows(summary: Json) -> list[tuple[str | float, ...]]:
+def offset_rows(summary: Summary) -> list[tuple[str | float, ...]]:
     """Cells below the heads of OFFSETS."""
     return [
         (
@@ -98,7 +127,7 @@ def _times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"
 
 
-def time_lines(summary: Json) -> list[str]:
+def time_lines(summary: Summary) -> list[str]:
     """Time difference, path error and what became of the commands, a sentence each."""
     path, commands, behind = summary["path"], summary["commands"], summary["behind"]
     lag = summary["lag_timeline_s"]
@@ -128,7 +157,7 @@ def time_lines(summary: Json) -> list[str]:
     return lines
 
 
-def _words(cause: str) -> str:
+def _cause_words(cause: str) -> str:
     return cause.replace("_", " ")
 
 
@@ -142,3 +171,231 @@ def _millimetres(value: float | None) -> str:
 
 def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{number} {status}" for status, number in counts.items())
+
+
+Json = Mapping[str, Any]
+
+ELSEWHERE: Final = frozenset(
+    {
+        "schema",
+        "title",
+        "robot",
+        "seed",
+        "delay",
+        "service",
+        "link_loss",
+        "offset",
+        "offsets",
+        "corrections",
+        "receipts_virtual",
+        "receipts_real",
+        "packets",
+        "events",
+        "attribution_order",
+        "errors",
+        "attribution",
+        "commands",
+        "path",
+    }
+)
+"""Parts of a summary that the report shows in a form of its own."""
+UNITS: Final = {
+    "path_error": "mm", "time_difference": "s", "speed_error": "m/s", "progress": "%", "cell": "m", "v_max": "m/s",
+}  # fmt: skip
+"""Units of the figures on the tool path, by the start of their names."""
+COMPARISONS: Final = {
+    "timeline_time": "equal timeline time",
+    "lag_removed": "best lag removed",
+    "user_time": "as the user sees it",
+    "servo": "real against its reference",
+}
+"""Heads of the error table."""
+SUFFIXES: Final = {"_deg": "deg", "_rad": "rad", "_m": "mm", "_s": "s"}
+SCALES: Final = {"mm": 1e3, "%": 100.0}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, markup: bool = False) -> str:
+    """Build a table whose first column names the row and whose numbers stand right.
+
+    Args:
+        head: Column heads.
+        rows: Cells; texts are escaped.
+        markup: Whether cells that are texts are HTML already.
+    """
+    body = [[_cell(value, markup) for value in row] for row in rows]
+    numeric = [
+        bool(body) and all(row[i][1] for row in body) and any(row[i][0] != "–" for row in body)
+        for i in range(len(head))
+    ]
+    style = [' class="number"' if is_number else "" for is_number in numeric]
+    top = "".join(f'<th scope="col"{style[i]}>{escape(text)}</th>' for i, text in enumerate(head))
+    lines = []
+    for row in body:
+        first = f'<th scope="row"{style[0]}>{row[0][0]}</th>'
+        rest = "".join(f"<td{style[i + 1]}>{text}</td>" for i, (text, _) in enumerate(row[1:]))
+        lines.append(f"<tr>{first}{rest}</tr>")
+    thead = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
+    return f'<div class="scroll"><table>{thead}<tbody>{"".join(lines)}</tbody></table></div>'
+
+
+def card(title: str, body: str, note: str = "", *, wide: bool = False) -> str:
+    """Frame a piece of the page."""
+    hint = f'<p class="note">{escape(note)}</p>' if note else ""
+    return f'<section class="card{" wide" if wide else ""}"><h3>{escape(title)}</h3>{body}{hint}</section>'
+
+
+def tiles(summary: Json) -> str:
+    """Build the few figures that a reader looks for first, as far as the summary has them."""
+    timeline = _part(_part(summary, "errors"), "timeline_time")
+    user = _part(_part(summary, "errors"), "user_time")
+    path, commands = _part(summary, "path"), _part(summary, "commands")
+    joint_rms = timeline.get("joint_rms_deg") or [None]
+    late, lost, behind = commands.get("late"), commands.get("lost"), _part(summary, "behind")
+    shares = [behind.get("mean_s"), summary.get("lag_timeline_s")]
+    played = None if None in shares else " + ".join(map(_number, shares))
+    found = [
+        (_with_unit(max(joint_rms, key=lambda x: x or 0.0), "deg"), "worst joint, rms, equal timeline time"),
+        (_with_unit(timeline.get("tool_rms_m"), "mm"), "tool, rms, equal timeline time"),
+        (_with_unit(user.get("tool_rms_m"), "mm"), "tool, rms, as the user sees it"),
+        (_with_unit(path.get("time_difference_mean"), "s"), "mean time difference along the path"),
+        (None if played is None else f"{played} s", "network: behind by the clock, mean; control: the joints' lag"),
+        (None if late is None or lost is None else f"{late} / {lost}", "commands late / lost"),
+    ]
+    shown = [
+        f'<div class="card tile"><b>{escape(value)}</b><span>{escape(label)}</span></div>'
+        for value, label in found
+        if value is not None
+    ]
+    return f'<h2>In short</h2><div class="tiles">{"".join(shown)}</div>' if shown else ""
+
+
+def figures(summary: Json) -> str:
+    """Build the tables of every figure in a summary, also of those that this module doesn't know by name."""
+    out = []
+    if errors := _part(summary, "errors"):
+        out.append(card("Errors, real against virtual", _errors(errors), wide=True))
+    if attribution := summary.get("attribution"):
+        order = [str(cause) for cause in summary.get("attribution_order", attribution[0]["parts"])]
+        note = f"Counterfactual runs, switched off one after the other: {', then '.join(map(words, order))}."
+        out.append(card("Where the error comes from (rms)", _attribution(attribution, order), note, wide=True))
+    if offsets := summary.get("offsets"):
+        note = (
+            "The same messages with the same delays. A fixed offset postpones commands that take longer; an "
+            "adaptive one slows the robot down along the committed path. The body follows exactly here, so that "
+            "what is left is the network's."
+        )
+        body = table(OFFSETS, offset_rows({"offsets": offsets}))
+        out.append(card("What the choice of the offset does", body, note, wide=True))
+    if path := _part(summary, "path"):
+        rows = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
+        out.append(card("Tool path and time difference, user time", table(("", ""), rows)))
+    if commands := _part(summary, "commands"):
+        out.append(card("Commands", table(("", ""), _flat(commands))))
+    rest = {name: value for name, value in summary.items() if name not in ELSEWHERE}
+    if rest:
+        out.append(card("The run", table(("", ""), _flat(rest))))
+    return "".join(out)
+
+
+def receipts(title: str, items: Sequence[Receipt]) -> str:
+    """Build the table of one engine's receipts."""
+    head = ("id", "status", "asked [s]", "execute [s]", "end [s]", "reason")
+    rows = []
+    for r in items:
+        status = f'<span class="status status-{escape(str(r.status))}">{escape(str(r.status))}</span>'
+        reason = r.reason
+        if r.superseded_by is not None:
+            by = r.superseded_by or "a correction"
+            reason += f"{'; ' if reason else ''}superseded by {by}"
+        rows.append((str(r.command_id), status, r.asked_at, r.execute_at, r.end, escape(reason)))
+    body = table(head, rows, markup=True) if rows else '<p class="note">None.</p>'
+    return card(title, body)
+
+
+def words(name: str) -> str:
+    """Turn a name of the summary into words, its unit taken off."""
+    for suffix in SUFFIXES:
+        name = name.removesuffix(suffix)
+    return name.replace("_", " ")
+
+
+def _errors(errors: Json) -> str:
+    columns = [str(key) for key in errors]
+    names: dict[str, None] = {str(name): None for key in columns for name in errors[key]}
+    rows: list[list[object]] = []
+    for name in names:
+        values = [errors[key].get(name) for key in columns]
+        unit = _unit(name)
+        size = max((len(v) for v in values if isinstance(v, list)), default=0)
+        if not size:
+            rows.append([_label(name, unit), *(_scaled(v, unit) for v in values)])
+        for j in range(size):
+            label = _label(name.replace("joint_", f"joint_{j + 1}_", 1), unit)
+            rows.append([label, *(_scaled(v[j], unit) if isinstance(v, list) else None for v in values)])
+    return table(("", *(COMPARISONS.get(key, words(key)) for key in columns)), rows)
+
+
+def _attribution(items: Sequence[Json], order: Sequence[str]) -> str:
+    rows = []
+    for item in items:
+        label, scale, unit = MEASURES.get(item["measure"], (words(item["measure"]), 1.0, _unit(item["measure"])))
+        values = [item["total"], *(item["parts"].get(cause) for cause in order), item["residual"]]
+        rows.append([f"{label} [{unit}]", *(None if v is None else scale * float(v) for v in values)])
+    return table(("", "total", *map(words, order), "residual"), rows)
+
+
+def _flat(values: Json, prefix: str = "") -> list[tuple[str, object]]:
+    rows: list[tuple[str, object]] = []
+    for name, value in values.items():
+        label = f"{prefix}{words(str(name))}"
+        if isinstance(value, Mapping):
+            rows.extend(_flat(value, f"{label}: "))
+        elif isinstance(value, (list, tuple)):
+            rows.append((label, ", ".join(_number(x) if isinstance(x, float) else str(x) for x in value)))
+        else:
+            rows.append((label, _with_unit(value, _unit(str(name)))))
+    return rows
+
+
+def _part(values: Json, name: str) -> Json:
+    part = values.get(name)
+    return part if isinstance(part, Mapping) else {}
+
+
+def _unit(name: str) -> str:
+    return next((unit for suffix, unit in SUFFIXES.items() if name.endswith(suffix)), "")
+
+
+def _path_unit(name: str) -> str:
+    return next((unit for start, unit in UNITS.items() if name.startswith(start)), _unit(name))
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{words(name)} [{unit}]" if unit else words(name)
+
+
+def _scaled(value: object, unit: str) -> object:
+    return value * SCALES.get(unit, 1.0) if isinstance(value, float) else value
+
+
+def _with_unit(value: object, unit: str) -> str | None:
+    """Text of a figure in its unit; None where it isn't defined."""
+    if value is None or isinstance(value, str):
+        return value
+    text = _number(_scaled(value, unit))
+    return f"{text} {unit}" if unit else text
+
+
+def _number(value: object) -> str:
+    if isinstance(value, bool) or not isinstance(value, float):
+        return str(value)
+    return f"{value:.0f}" if abs(value) >= 1e4 else f"{round(value, 3) + 0.0:.3f}".replace("-", "−")
+
+
+def _cell(value: object, markup: bool) -> tuple[str, bool]:
+    """A cell's HTML and whether it may stand in a column of numbers."""
+    if value is None:
+        return "–", True
+    if isinstance(value, str):
+        return (value if markup else escape(value)), False
+    return escape(_number(value)), True

@@ -13,8 +13,7 @@ from interfaces.cli.main import _status
 from interfaces.lab import Claim, Findings, Paper, Reproduction, Study, Table
 from interfaces.lab.claims import Figure
 from interfaces.lab.output import write
-from interfaces.report.claims import DATA, render, write_claims
-from interfaces.report.verdicts import COLUMNS, read_verdicts
+from interfaces.report.claims import COLUMNS, DATA, read_verdicts, render, write_claims
 from vrs.errors import FormatError
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks" / "results.json"

@@ -223,7 +223,7 @@ def test_a_terminal_that_knows_no_unicode_gets_what_it_knows():
 def test_standard_input_that_is_no_pipe_has_ended(redirected):
     """A service has none, or /dev/null, which can't be waited for."""
     script = (
-        "import asyncio\nfrom interfaces.cli.doors import end_with_input\n"
+        "import asyncio\nfrom interfaces.cli.options import end_with_input\n"
         "async def main():\n    ended = asyncio.Event()\n    end_with_input(ended)\n"
         "    await asyncio.wait_for(ended.wait(), 5)\nasyncio.run(main())"
     )
@@ -248,7 +248,7 @@ def test_a_server_answers_to_its_own_addresses_and_those_it_was_told_of(asked, s
     from starlette.responses import PlainTextResponse
     from starlette.routing import Route
 
-    from interfaces.cli.doors import asked_for
+    from interfaces.cli.options import asked_for
     from interfaces.stream.server import application
 
     allowed = asked_for("127.0.0.1", ["127.0.0.1:9000", "Lab.example"])(8600)
@@ -282,7 +282,7 @@ def test_an_address_that_isnt_one_is_refused(capsys, text):
 
 
 def test_a_token_file_is_made_for_its_owner_alone(tmp_path):
-    from interfaces.cli.doors import access_for
+    from interfaces.cli.options import access_for
     from interfaces.stream.access import read_tokens
     from interfaces.stream.control import Role
 

@@ -17,7 +17,7 @@ from interfaces.cli.main import _status
 from interfaces.lab import PAPERS, Claim, Findings, Paper, PaperPart, Study, Table, papers, reproduce
 from interfaces.lab.doulgeri import agreement, broadcasting, causality, delays, dragging, encoding, jitter, segments
 from interfaces.lab.output import rich_tables, write
-from interfaces.lab.running import joined
+from interfaces.lab.runner import joined
 from interfaces.lab.statistics import bootstrap, median
 from vrs import Timeline
 from vrs.errors import InvalidValueError

@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script
-from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, interval_name, median
 from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory

@@ -12,7 +12,7 @@ from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, target
-from interfaces.lab.drawing import REAL, VIRTUAL, draw
+from interfaces.lab.output import REAL, VIRTUAL, draw
 from interfaces.messages import Broadcast, Reply, ViewForm
 from vrs import Engine, ManualClock, MotionCommand, WallClock
 

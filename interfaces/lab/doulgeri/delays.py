@@ -10,7 +10,7 @@ from interfaces import Designer, Viewer
 from interfaces.clients.ports import RemotePort
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import ScriptedSite, arrivals, target
-from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
 from interfaces.messages import Broadcast, FrameStatus, Outcome, Reply, ViewForm
 from vrs import MotionCommand

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, played, tool
-from interfaces.lab.drawing import INK, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.output import INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory

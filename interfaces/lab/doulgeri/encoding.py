@@ -10,7 +10,7 @@ import numpy as np
 from interfaces.engine_server.journal import Journal, changed
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, arrivals, target, tool
-from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw
+from interfaces.lab.output import MUTED, REAL, VIRTUAL, draw
 from interfaces.lab.statistics import bootstrap
 from interfaces.messages import Change
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, PolynomialSegment, SteerCommand, Timeline

@@ -12,7 +12,7 @@ from interfaces.engine_server.site import SitePart
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
-from interfaces.lab.drawing import BAD, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.messages import ViewForm
 from vrs import JointTarget, MotionCommand, Timeline
 from vrs.commands import Cancel, Command, InsertVia, Resume, Retime, ScaleTime, Stop

@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script, tool
-from interfaces.lab.drawing import MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.output import MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, clustered, interval_name
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory

@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.lab.claims import Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.script import HOME, MODEL, target
-from interfaces.lab.drawing import BAD, MUTED, VIRTUAL, draw, legend
+from interfaces.lab.output import BAD, MUTED, VIRTUAL, draw, legend
 from vrs import Engine, JointTarget, MotionCommand, PolynomialSegment, Profile, Timeline
 from vrs.model import Array, frozen_array
 

@@ -1,26 +1,93 @@
-"""Who drives: seeded styles, and recorded inputs. An operator sees the virtual robot alone, and knows no delay.
-
-A style follows a course of its own: lines to pursue forwards or backwards, turns on the spot, pauses. Speeds, sizes
-and small unsteadiness are drawn from its seed. All keep headroom: at most 0.35 of 0.5 m/s, 30 of 45 deg/s and 0.36
-of 0.52 m/s², so that a robot that has fallen behind can catch up.
-"""
+"""Who drives: seeded styles along a course, and recorded inputs; they see the virtual robot, and know no delay."""
 
 from __future__ import annotations
 
 import csv
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Protocol
 
 import numpy as np
 
-from interfaces.lab.driving.legs import GoalLeg, Leg, LineLeg, PauseLeg, TurnLeg, point_ahead, share_of, way_left
 from interfaces.system import checked, is_own, own
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.checks import one_of
 from vrs.errors import FormatError
 from vrs.mobile import clipped, wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class LineLeg:
+    """To be pursued."""
+
+    points: tuple[tuple[float, float], ...]
+    """Two or more [m]."""
+    reverse: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TurnLeg:
+    """On the spot."""
+
+    heading: float
+    """Where to [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PauseLeg:
+    """Standing."""
+
+    duration: float
+    """[s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalLeg:
+    """A place to get to, by whatever way."""
+
+    point: tuple[float, float]
+    """[m]."""
+    patience: float
+    """After so long [s] he gives up, and goes on to the next."""
+
+
+Leg = LineLeg | TurnLeg | PauseLeg | GoalLeg
+
+
+def share_of(points: Sequence[tuple[float, float]], i: int, x: float, y: float) -> float:
+    """How far a point is along the i-th piece, as a share of it."""
+    (ax, ay), (bx, by) = points[i], points[i + 1]
+    dx, dy = bx - ax, by - ay
+    return ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
+
+
+def way_left(points: Sequence[tuple[float, float]], i: int, x: float, y: float) -> float:
+    """Way left along the line [m]; only as far as it matters to somebody who brakes."""
+    share = min(max(share_of(points, i, x, y), 0.0), 1.0)
+    left = (1.0 - share) * math.dist(points[i], points[i + 1])
+    for k in range(i + 1, len(points) - 1):
+        if left > 1.0:
+            break
+        left += math.dist(points[k], points[k + 1])
+    return left
+
+
+def point_ahead(
+    points: Sequence[tuple[float, float]], i: int, x: float, y: float, distance: float
+) -> tuple[float, float]:
+    """The point a distance [m] ahead; beyond the end on its last piece's line."""
+    share = max(share_of(points, i, x, y), 0.0)
+    while True:
+        (ax, ay), (bx, by) = points[i], points[i + 1]
+        length = math.hypot(bx - ax, by - ay)
+        if share * length + distance <= length or i == len(points) - 2:
+            share += distance / length
+            return ax + share * (bx - ax), ay + share * (by - ay)
+        distance -= (1.0 - share) * length
+        i, share = i + 1, 0.0
+
 
 SPEED: Final = (0.22, 0.34)
 """Least and largest cruising speed of a style [m/s]."""

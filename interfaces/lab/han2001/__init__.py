@@ -1,5 +1,23 @@
 """Han, Kim, Kim, Kim: *Internet Control Architecture for Internet-Based Personal Robot*, reproduced."""
 
-from interfaces.lab.han2001.paper import PAPER
+from __future__ import annotations
+
+from typing import Final
+
+from interfaces.lab.claims import Paper, PaperPart
+from interfaces.lab.han2001 import architectures, information
+
+PAPER: Final = Paper(
+    "han2001",
+    "Han, Kim, Kim, Kim: Internet Control Architecture for Internet-Based Personal Robot, "
+    "Autonomous Robots 10, 2001",
+    (
+        PaperPart.single("Information loss", information.work),
+        PaperPart.single("Command filter", information.work_filter),
+        PaperPart("Architectures", architectures.work, architectures.conclude, architectures.CASES),
+    ),
+    length=120.0,
+)
+"""As `vrs reproduce han2001` runs it."""
 
 __all__ = ["PAPER"]

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
-from interfaces.lab.driving.pictures import of_drives
+from interfaces.lab.driving.output import of_drives
 from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
 from interfaces.lab.statistics import Estimate, bootstrap, clustered, median

@@ -1,5 +1,25 @@
 """Kim, Han, Kim, Kim: *Internet-Based Personal Robot System using Map-Based Localization*, reproduced."""
 
-from interfaces.lab.kim2002.paper import PAPER
+from __future__ import annotations
+
+from typing import Final
+
+from interfaces.lab.claims import Paper, PaperPart
+from interfaces.lab.kim2002.scenario import TOGETHER, conclude, measure
+from interfaces.lab.localization.accuracy import conclude_rooms, measure_room
+
+ROOMS: Final = ("0", "1")
+"""Of the localization."""
+
+PAPER: Final = Paper(
+    "kim2002",
+    "Kim, Han, Kim, Kim: Internet-Based Personal Robot System using Map-Based Localization",
+    (
+        PaperPart("The scenario", measure, conclude, tuple(str(k) for k in range(TOGETHER))),
+        PaperPart("Localization", measure_room, conclude_rooms, ROOMS),
+    ),
+    runs=5,
+)
+"""As `vrs reproduce kim2002` runs it."""
 
 __all__ = ["PAPER"]

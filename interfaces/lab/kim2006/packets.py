@@ -8,8 +8,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
-from interfaces.lab.drawing import GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.kim2006.following import cubo_model
+from interfaces.lab.output import GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.rsp import header
 from interfaces.rsp.header import PacketType
 from interfaces.rsp.local import LocalConfig, LocalCore, LocalState, PeriodConfig

@@ -1,13 +1,17 @@
-"""The study behind `vrs lab localization`: what's asked of the localization, measured."""
+"""The study behind vrs lab localization, and its part on what can't be known: the way along a wall."""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
+from dataclasses import dataclass
 from pathlib import Path
 
-from interfaces.lab.claims import Paper, PaperPart, Reproduction
-from interfaces.lab.localization.accuracy import conclude_rooms, measure_room
+import numpy as np
+
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Paper, PaperPart, Reproduction, Study, Table
+from interfaces.lab.localization.accuracy import INSIDE, conclude_rooms, measure_room
 from interfaces.lab.localization.searching import (
     STARTS,
     conclude_carried,
@@ -17,9 +21,103 @@ from interfaces.lab.localization.searching import (
     measure_starts,
     measure_symmetric,
 )
-from interfaces.lab.localization.unobservable import PLACES, conclude_axes, measure_axis
+from interfaces.lab.localization.trial import body_of, drive, setting
 from interfaces.lab.output import to_json, write_files
+from robots.bullet.rooms import Room, read_room
+from robots.ipr.floor_plan import plan_map
+from robots.onboard.driving import Drive
+from robots.onboard.localizer import Localizer
 from vrs.checks import number_in
+from vrs.mobile import clipped
+
+ALONG_LENGTH, SPEED = 20.0, 0.3
+"""Of the drive [s], and its speed [m/s]."""
+MIDDLE = 10.0
+"""The way's y [m]."""
+ALONG = math.radians(2)
+"""The axis that is named lies so near the walls' direction [rad]."""
+PLACES = ("corridor", "single wall", "room")
+"""The last is for comparison: nothing is unknown there."""
+
+
+def place(name: str) -> Room:
+    """A corridor, a wall, both longer than the laser sees, or a room."""
+    walls = {
+        "corridor": "wall 0 9 40 9\nwall 0 11 40 11\n",
+        "single wall": "wall 0 9 40 9\n",
+        "room": "wall 15 8 25 8\nwall 25 8 25 12\nwall 25 12 15 12\nwall 15 12 15 8\n",
+    }[name]
+    return read_room(f"room 1\nname {name}\nsize 40 20\nstart 17 {MIDDLE:g} 0\n{walls}", name)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What was said of an axis."""
+
+    place: str
+    named: float
+    """Share of the scans after which just the walls' direction was named as unobservable."""
+    none: float
+    """Share after which nothing was."""
+    along: float
+    """Standard deviation along the walls at the end [m]."""
+    across: float
+    """And across [m]."""
+    inside: float
+    """Share of normalised errors inside the 95 % bound."""
+
+
+def measure_axis(study: Study, case: str) -> Axis:
+    """Drive along the walls."""
+    chosen = setting(place(case), 1, 0.03, (study.seed, PLACES.index(case), 23))
+    said: list[tuple[bool, bool]] = []
+    with body_of(chosen) as body:
+        localizer = Localizer(plan_map(chosen.room), body.truth)
+
+        def look(_: float) -> None:
+            tracker = localizer.tracker
+            assert tracker is not None
+            if tracker.sights is None:
+                return
+            unknown = tracker.observability.unobservable
+            named = len(unknown) == 1 and abs(math.asin(min(1.0, abs(unknown[0, 1])))) <= ALONG
+            said.append((named, len(unknown) == 0))
+
+        record = drive(body, ALONG_LENGTH, _swinging, {"": localizer}, look)
+    track = record.tracks[""]
+    last = track.covariances[-1]
+    named, none = np.mean(said, axis=0).tolist()
+    inside = float(np.mean(track.normalised[20:] <= INSIDE))
+    return Axis(case, named, none, math.sqrt(last[0, 0]), math.sqrt(last[1, 1]), inside)
+
+
+def _swinging(t: float, posture: tuple[float, float, float]) -> Drive:
+    """Along the walls, swinging by 17 deg to either side."""
+    _, y, theta = posture
+    return Drive(SPEED, clipped(2.0 * (0.3 * math.sin(0.8 * t) - 0.5 * (y - MIDDLE) - theta), 0.7))
+
+
+def conclude_axes(study: Study, found: tuple[Axis, ...]) -> Findings:  # noqa: ARG001
+    """Whether the axis is named, and the doubt along it honest."""
+    claims = []
+    for one in found:
+        if one.place == "room":
+            what = "room: scans after which nothing is called unobservable [%]"
+            claims.append(Claim(what, OWN_BAR, "≥ 95", 100 * one.none, one.none >= 0.95))
+            continue
+        what = f"{one.place}: scans after which the way along is named as unobservable [%]"
+        claims.append(Claim(what, OWN_BAR, "≥ 95", 100 * one.named, one.named >= 0.95))
+        what = f"{one.place}: doubt along the walls, times that across"
+        claims.append(Claim(what, OWN_BAR, "≥ 10", one.along / one.across, one.along >= 10 * one.across))
+    rows = tuple(
+        (a.place, 100 * a.named, 100 * a.none, 100 * a.along, 100 * a.across, 100 * a.inside) for a in found
+    )
+    columns = (
+        "place", "way along named [%]", "nothing named [%]", "doubt along at the end [cm]", "across [cm]",
+        "inside 95 % [%]",
+    )  # fmt: skip
+    return Findings(tuple(claims), (Table("unobservable", "what can't be known", columns, rows),))
+
 
 ROOMS, LENGTH, FULL_STARTS = 30, 60.0, 200
 """Rooms, length of a drive [s] and starts, unless said otherwise."""

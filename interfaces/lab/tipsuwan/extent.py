@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from interfaces.lab.claims import Cell, Figure, Findings, Study, Table
-from interfaces.lab.drawing import INK, draw
-from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, leg, no_delay, run
-from interfaces.lab.tipsuwan.s_paths import s_path
+from interfaces.lab.output import INK, draw
+from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, leg, no_delay, run, s_path
 from interfaces.lab.tipsuwan.success import MOST_RATIO, SuccessResult, seen, succeeds
 from interfaces.link import DelayProfile
 from interfaces.link.delays import CORRELATION_TIME

@@ -1,16 +1,15 @@
-"""One run of section VII: a robot tracks a path over a network, with or without the middleware, in virtual time."""
+"""S-shaped paths at random, a robot's run along one over a network, and what is said of the run."""
 
 from __future__ import annotations
 
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Final, Protocol
+from typing import Annotated, Final, NamedTuple, Protocol
 
 import numpy as np
 
 from interfaces.lab.tipsuwan.predictive import PredictiveConfig, PredictiveController
-from interfaces.lab.tipsuwan.s_paths import START
 from interfaces.link import Channel, Conditions, ConstantDelay, DelayProfile, Echo, HeavyTailedDelay, Probe
 from interfaces.link.delays import CORRELATION_TIME
 from interfaces.middleware import (
@@ -31,6 +30,90 @@ from robots.onboard.driving import Posture
 from vrs.checks import number_in, one_of, validated, within
 from vrs.mobile import DriveLimits, clipped
 from vrs.model import Array
+
+START: Final = (-0.1, 1.0, 0.0)
+"""Where the robot begins: the paper's (x, y, θ) [m, m, rad]."""
+BEGIN: Final = (0.0, 1.0)
+"""Where every path begins [m]."""
+MOST_CURVATURE: Final = 6.0
+"""[1/m]."""
+T_PRED: Final = (8.0, 9.0)
+"""Of the random paths [s]: at most 9, so that the middleware has the time; not much less, as a robot without it
+gets to the end of a short path in 15 s, too, swinging (the map has the shorter ones)."""
+SHORTER: Final = (6.0, 9.0)
+"""Of random paths of which many are shorter [s]."""
+SLOWEST: Final = 0.23
+"""Round trip that counts in T_pred [s]: the longest median."""
+_FLATTER: Final = 0.95
+"""How deep an S is beside the one before that bent too much."""
+
+
+def predicted_time(curve: Curve, tau: float, epsilon: float) -> float:
+    """Return T_pred = (τ/ε) ∫ √(1 + κ²) ds [s]: how long the path takes where J = ε all along.
+
+    Args:
+        curve: The path.
+        tau: Round trip [s].
+        epsilon: Tolerance ε.
+    """
+    s, _, curvature = curve.table
+    root = np.sqrt(1.0 + curvature * curvature)
+    return tau / epsilon * float(np.sum(np.diff(s) * 0.5 * (root[1:] + root[:-1])))
+
+
+def s_path(
+    seed: int,
+    t_pred: float | None = None,
+    *,
+    within: tuple[float, float] = T_PRED,
+    tau: float = SLOWEST,
+    epsilon: float = 0.25,
+) -> Curve:
+    """Draw an S: two bends, one to either side, as a cubic spline from (0, 1) on.
+
+    Shapes that bend more than 6 /m are drawn anew, flatter and flatter: a short path holds no deep S.
+
+    Args:
+        seed: Of the shape.
+        t_pred: Its predicted time, which sets its size [s]; drawn, unless given.
+        within: From where it's drawn, least and most [s].
+        tau: Round trip of that time [s].
+        epsilon: Tolerance ε of that time.
+    """
+    rng = np.random.default_rng([seed, 13])
+    wanted = float(rng.uniform(*within)) if t_pred is None else t_pred
+    depth = 1.0
+    while True:
+        curve = _sized(_shape(rng, depth), wanted, tau, epsilon)
+        if float(curve.table[2].max()) <= MOST_CURVATURE:
+            return curve
+        depth *= _FLATTER
+
+
+def _shape(rng: np.random.Generator, depth: float) -> list[tuple[float, float]]:
+    """Points of an S from (0, 0) on, about 3 m wide."""
+    side = float(rng.choice((-1.0, 1.0)))
+    x = np.cumsum(rng.uniform(0.7, 1.3, 3)).tolist()
+    first, second = (depth * rng.uniform(0.5, 1.0, 2)).tolist()
+    last = depth * float(rng.uniform(-0.3, 0.3))
+    return [(0.0, 0.0), (x[0], side * first), (x[1], -side * second), (x[2], last)]
+
+
+def _sized(points: list[tuple[float, float]], wanted: float, tau: float, epsilon: float) -> Curve:
+    """The shape at the size of which T_pred is what is wanted, by bisection: it grows with the size."""
+    low, high = 0.05, 50.0
+    for _ in range(40):
+        scale = (low * high) ** 0.5
+        if predicted_time(_scaled(points, scale), tau, epsilon) < wanted:
+            low = scale
+        else:
+            high = scale
+    return _scaled(points, low)
+
+
+def _scaled(points: list[tuple[float, float]], scale: float) -> Curve:
+    return Curve([(BEGIN[0] + scale * x, BEGIN[1] + scale * y) for x, y in points])
+
 
 ARRIVAL: Final = 0.05
 """Distance from the path's end at which the robot stops: the paper's [m]."""
@@ -279,3 +362,87 @@ class _NetworkRun:
         probe = driver.to_send(now=now)
         if probe is not None:
             there.send(probe, now, _PROBE)
+
+
+EVERY: Final = 0.05
+"""Between postures that are measured [s]."""
+LAST: Final = 5.0
+"""Of a run that failed, what its reason is read from [s]."""
+WINDOW: Final = 0.2
+"""How far along the path a robot is looked for from where it was [m]: twice what it goes in 0.05 s at 2 m/s."""
+_SWINGS: Final = 4
+"""Changes of side or of direction in the last seconds that make a cycle."""
+
+
+class Reason(enum.StrEnum):
+    """Why a robot didn't arrive."""
+
+    ARRIVED = "arrived"
+    """It did."""
+    CIRCLING = "circling"
+    """It turned round and round, one way: by a full turn or more in the last 5 s."""
+    LIMIT_CYCLE = "limit cycle"
+    """It swung from side to side of the path, or to and fro, four times or more in the last 5 s."""
+    STUCK = "stuck"
+    """It made less than 1 cm/s in the last 5 s."""
+    SLOW = "slow"
+    """It was on its way."""
+
+
+def beside(track: DriveTrace) -> tuple[Array, Array]:
+    """Distances to the path's nearest point, left positive [m], and ways along it [m], every 0.05 s, (k,) each.
+
+    The way is looked for about where the robot was, so that none is made by a robot that comes across a later part;
+    the distance is that to the whole path.
+    """
+    curve, away, ways, at = track.curve, [], [], 0.0
+    for x, y, _ in _sampled(track).tolist():
+        place = curve.at(curve.nearest(x, y))
+        left = math.cos(place.theta) * (y - place.y) - math.sin(place.theta) * (x - place.x)
+        away.append(math.copysign(math.hypot(x - place.x, y - place.y), left))
+        at = curve.nearest(x, y, around=at, window=WINDOW)
+        ways.append(at)
+    return np.array(away), np.array(ways)
+
+
+class PathMeasures(NamedTuple):
+    """What is said of a run."""
+
+    error: float
+    """Mean distance of the robot from the path until it arrived, or the run was over [m]."""
+    progress: float
+    """Share of the path that was made, in [0, 1]."""
+    reason: Reason
+    """Why it didn't arrive."""
+
+
+def measured(track: DriveTrace) -> PathMeasures:
+    """Measure a run."""
+    away, ways = beside(track)
+    progress = 1.0 if track.arrived else float(ways.max()) / track.curve.length
+    return PathMeasures(float(np.abs(away).mean()), progress, _reason(track, away, ways))
+
+
+def _reason(track: DriveTrace, away: Array, ways: Array) -> Reason:
+    """Why the robot didn't arrive, read from its last 5 s."""
+    if track.arrived:
+        return Reason.ARRIVED
+    count = round(LAST / EVERY)
+    heading = _sampled(track)[-count:, 2]
+    if abs(heading[-1] - heading[0]) >= math.tau:
+        return Reason.CIRCLING
+    since = track.t >= track.t[-1] - LAST
+    if max(_changes(away[-count:]), _changes(track.drives[since, 0])) >= _SWINGS:
+        return Reason.LIMIT_CYCLE
+    return Reason.STUCK if ways[-1] - ways[-count:][0] < 0.01 * LAST else Reason.SLOW
+
+
+def _sampled(track: DriveTrace) -> Array:
+    period = float(track.t[1] - track.t[0]) if len(track.t) > 1 else EVERY
+    return track.postures[:: max(round(EVERY / period), 1)]
+
+
+def _changes(values: Array) -> int:
+    """How often values change their sign."""
+    signs = np.sign(values[values != 0])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))

@@ -1,4 +1,4 @@
-"""Section VII, Fig. 7: no delay, delay without and delay with the middleware, on 20 S paths over networks."""
+"""Section VII: how often the middleware brings a robot to the end of its path, also on shorter ones."""
 
 from __future__ import annotations
 
@@ -9,20 +9,27 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
-from interfaces.lab.drawing import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
+from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import clustered
-from interfaces.lab.tipsuwan.measures import EVERY, Reason, beside, measured
 from interfaces.lab.tipsuwan.run import (
+    EVERY,
     ROBOTS,
+    SHORTER,
+    SLOWEST,
+    T_PRED,
     DriveTrace,
     NetworkControl,
     NetworkRunSetting,
+    Reason,
     agent,
+    beside,
+    measured,
     network_of,
     no_delay,
+    predicted_time,
     run,
+    s_path,
 )
-from interfaces.lab.tipsuwan.s_paths import SLOWEST, T_PRED, predicted_time, s_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
@@ -222,3 +229,21 @@ def _figure(robot: str, tracks: dict[str, DriveTrace]) -> Figure:
         legend(left, place="lower left")
 
     return draw(f"fig7_{robot}", f"{robot}: an S path over a network, Fig. 7", paint, height=3.4)
+
+
+SHORTER_ROBOT: Final = "kinematic"
+SHORTER_CONTROLS: Final = (NetworkControl.DIRECT, NetworkControl.NETWORK)
+SHORTER_CASES: Final = tuple(str(path) for path in range(PATHS))
+
+
+def work_shorter(study: Study, case: str) -> PathSuccess:
+    """Both controls and all delay seeds on a path."""
+    found = ran(study, SHORTER_ROBOT, s_path(1000 * study.seed + int(case), within=SHORTER), SHORTER_CONTROLS)
+    return found._replace(tracks={})
+
+
+def conclude_shorter(study: Study, results: tuple[Any, ...]) -> Findings:
+    """The share of success, and what became of both controls."""
+    paths: list[PathSuccess] = list(results)
+    table = controls(SHORTER_ROBOT, paths, "shorter", f", T_pred {SHORTER[0]:g} to {SHORTER[1]:g} s")
+    return Findings((claim(SHORTER_ROBOT, NetworkControl.NETWORK, paths, SHORTER, study.seed),), (table,), ())

@@ -20,8 +20,8 @@ from interfaces.lab.tipsuwan.run import (
     network_of,
     no_delay,
     run,
+    s_path,
 )
-from interfaces.lab.tipsuwan.s_paths import s_path
 from interfaces.lab.tipsuwan.success import SuccessResult, reasons, seen
 from interfaces.middleware import Controller
 from robots.onboard.curve import Curve

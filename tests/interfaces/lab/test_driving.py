@@ -11,11 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from interfaces.cli.main import app
-from interfaces.lab.driving.attribution import attributed
 from interfaces.lab.driving.operators import STYLES, operator
 from interfaces.lab.driving.output import COMPARED, summary
 from interfaces.lab.driving.run import run
-from interfaces.lab.driving.sweep import cases, grouped, measure, paired, sweep
+from interfaces.lab.driving.sweep import attributed, cases, grouped, measure, paired, sweep
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
 from robots.ipr.chassis import MobileReality

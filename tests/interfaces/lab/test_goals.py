@@ -17,8 +17,7 @@ from interfaces.cli.main import app
 from interfaces.lab import Study, reproduce
 from interfaces.lab.claims import Findings, Paper, PaperPart
 from interfaces.lab.goals import study as goals_study
-from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, SHUT, setting
-from interfaces.lab.goals.shortest import Shortest
+from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, SHUT, Shortest, setting
 from interfaces.lab.goals.study import (
     EACH,
     MeasuredTrip,

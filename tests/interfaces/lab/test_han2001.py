@@ -10,7 +10,7 @@ import pytest
 
 from interfaces.lab.claims import Claim, Findings, Study
 from interfaces.lab.driving.run import run
-from interfaces.lab.han2001 import PAPER, architectures, filtering, information
+from interfaces.lab.han2001 import PAPER, architectures, information
 from interfaces.lab.han2001.architectures import CASES, REPEATED, STREAMED, ArchitectureResult, ArchitectureSummary
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
@@ -44,9 +44,9 @@ def test_a_sine_that_arrives_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_the_modified_filter_saves_what_the_formula_says() -> None:
-    found = filtering.work(SMALL, "")
+    found = information.work_filter(SMALL, "")
     assert found.claims[0].holds
-    assert filtering.last_output(7, 0.1) == pytest.approx(0.7)
+    assert information.last_output(7, 0.1) == pytest.approx(0.7)
 
 
 def test_a_case_is_run_by_all_compositions() -> None:

@@ -13,9 +13,17 @@ import pytest
 from interfaces.jobs import JobStage
 from interfaces.lab import Study
 from interfaces.lab.claims import Claim, Figure
-from interfaces.lab.kim2002 import PAPER, paper
-from interfaces.lab.kim2002.paper import ORDER, conclude
-from interfaces.lab.kim2002.scenario import PLEASE, Scenario, ScenarioResult, ScenarioStop, _ScenarioRun, play
+from interfaces.lab.kim2002 import PAPER, scenario
+from interfaces.lab.kim2002.scenario import (
+    ORDER,
+    PLEASE,
+    Scenario,
+    ScenarioResult,
+    ScenarioStop,
+    _ScenarioRun,
+    conclude,
+    play,
+)
 from interfaces.lab.papers import papers
 from robots.bullet.rooms import Person
 from robots.ipr.body import Cargo, MobileBody
@@ -69,8 +77,8 @@ GOOD = ScenarioResult(
 
 
 def concluded(monkeypatch: pytest.MonkeyPatch, *runs: ScenarioResult) -> dict[str, Claim]:
-    monkeypatch.setattr(paper, "_picture", lambda _: Figure("", "", ""))
-    measured = tuple(tuple(runs[k :: paper.TOGETHER]) for k in range(paper.TOGETHER))
+    monkeypatch.setattr(scenario, "_picture", lambda _: Figure("", "", ""))
+    measured = tuple(tuple(runs[k :: scenario.TOGETHER]) for k in range(scenario.TOGETHER))
     return {claim.claim: claim for claim in conclude(Study(runs=len(runs)), measured).claims}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from interfaces.lab.claims import Study
-from interfaces.lab.kim2006 import PAPER, links, narrow, packets
+from interfaces.lab.kim2006 import PAPER, links, packets
 from interfaces.lab.kim2006.following import Followed, FollowingCase, PathLeader, course, run
 from interfaces.lab.kim2006.links import LinkResult, Pair, pair
 from interfaces.rsp.schemes import SCHEMES, ReportedPosition
@@ -139,10 +139,12 @@ def test_narrow_links_are_concluded_by_the_ages() -> None:
     def made(age: float) -> list[tuple[float, ...]]:
         return [(0.01, 0.02, 1.0, age + 0.001 * k, 0.1, 0.0, 1.0, 1.0) for k in range(3)]
 
-    good = tuple(narrow.BandwidthResult(made(0.1), made(4.0 if case == "16" else 0.1)) for case in narrow.CASES)
-    assert all(claim.holds for claim in narrow.conclude(SMALL, good).claims)
-    bad = tuple(narrow.BandwidthResult(made(0.5), made(0.1)) for _ in narrow.CASES)
-    assert not any(claim.holds for claim in narrow.conclude(SMALL, bad).claims)
+    good = tuple(
+        links.BandwidthResult(made(0.1), made(4.0 if case == "16" else 0.1)) for case in links.NARROW_CASES
+    )
+    assert all(claim.holds for claim in links.conclude_narrow(SMALL, good).claims)
+    bad = tuple(links.BandwidthResult(made(0.5), made(0.1)) for _ in links.NARROW_CASES)
+    assert not any(claim.holds for claim in links.conclude_narrow(SMALL, bad).claims)
 
 
 def test_the_paper_is_in_the_list() -> None:

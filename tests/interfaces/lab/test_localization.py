@@ -15,13 +15,12 @@ from typer.testing import CliRunner
 
 from interfaces.cli.main import app
 from interfaces.lab.claims import Study
-from interfaces.lab.driving.attribution import attributed
 from interfaces.lab.driving.run import run
+from interfaces.lab.driving.sweep import attributed
 from interfaces.lab.localization.accuracy import METHODS
-from interfaces.lab.localization.distinctive import distinctive
-from interfaces.lab.localization.searching import measure_carried, measure_symmetric, symmetric
+from interfaces.lab.localization.searching import distinctive, measure_carried, measure_symmetric, symmetric
+from interfaces.lab.localization.study import measure_axis
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
-from interfaces.lab.localization.unobservable import measure_axis
 from interfaces.runs.drive_run import DriveCase
 from robots.bullet.rooms import Room, read_room
 from robots.ipr.apartments import ApartmentConfig, apartment

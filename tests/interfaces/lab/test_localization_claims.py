@@ -29,8 +29,8 @@ from interfaces.lab.localization.searching import (
     conclude_starts,
     conclude_symmetric,
 )
+from interfaces.lab.localization.study import Axis, conclude_axes
 from interfaces.lab.localization.trial import PostureErrors
-from interfaces.lab.localization.unobservable import Axis, conclude_axes
 from robots.onboard.localizer import Status
 
 SPREAD = np.array([0.002, 0.002, 0.001])

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.lab.pool import pooled
+from interfaces.lab.runner import pooled
 from vrs.errors import InvalidValueError
 
 
@@ -39,7 +39,7 @@ def _runs(pid: int) -> bool:
 
 
 def test_workers_end_with_who_began_them():
-    script = "import time\nfrom interfaces.lab.pool import pooled\npooled([(time.sleep, (120,))] * 2, workers=2)"
+    script = "import time\nfrom interfaces.lab.runner import pooled\npooled([(time.sleep, (120,))] * 2, workers=2)"
     process = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 60
     while len(workers := _begun_by(process.pid)) < 2 and time.monotonic() < deadline:

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from interfaces.lab.driving.legs import point_ahead, way_left
+from interfaces.lab.driving.operators import point_ahead, way_left
 from interfaces.lab.driving.output import rich_table, summary
-from interfaces.lab.driving.recorded import name_of, paths
+from interfaces.lab.driving.run import name_of, paths
 from interfaces.lab.driving.sweep import comparable, grouped, paired
 from interfaces.lab.statistics import bootstrap, clustered, interval_name, median
 from interfaces.runs.drive_run import DriveCase, Row

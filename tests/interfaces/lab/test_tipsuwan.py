@@ -8,23 +8,28 @@ import numpy as np
 import pytest
 
 from interfaces.lab.claims import Study
-from interfaces.lab.tipsuwan import PAPER, extent, gain, shorter, success, wrapping
-from interfaces.lab.tipsuwan.measures import Reason, measured
+from interfaces.lab.tipsuwan import PAPER, extent, gain, success, wrapping
 from interfaces.lab.tipsuwan.predictive import PredictiveConfig
 from interfaces.lab.tipsuwan.run import (
     ARRIVAL,
     LIFTED,
     MEDIANS,
+    MOST_CURVATURE,
+    SHORTER,
+    T_PRED,
     DriveTrace,
     NetworkControl,
     NetworkRunSetting,
+    Reason,
     agent,
     leg,
+    measured,
     network_of,
     no_delay,
+    predicted_time,
     run,
+    s_path,
 )
-from interfaces.lab.tipsuwan.s_paths import MOST_CURVATURE, SHORTER, T_PRED, predicted_time, s_path
 from interfaces.lab.tipsuwan.success import CASES, PATHS, PathSuccess, SuccessResult, succeeds
 from interfaces.middleware import MiddlewareConfig
 from robots.onboard.curve import Curve
@@ -202,14 +207,14 @@ def test_shorter_paths_are_claimed_as_they_are():
     runs = {NetworkControl.DIRECT: (GOOD["without"],) * 10, NetworkControl.NETWORK: (GOOD["behind"],) * 10}
     paths = [PathSuccess(7.0, GOOD["ideal"], runs, {})] * PATHS
     arriving = [PathSuccess(6.1, GOOD["ideal"], runs | {NetworkControl.DIRECT: (GOOD["behind"],) * 10}, {})] * 2
-    assert shorter.conclude(SMALL, tuple(paths)).claims[0].holds
-    findings = shorter.conclude(SMALL, tuple(paths[2:] + arriving))
+    assert success.conclude_shorter(SMALL, tuple(paths)).claims[0].holds
+    findings = success.conclude_shorter(SMALL, tuple(paths[2:] + arriving))
     assert findings.claims[0].measured == pytest.approx(0.9)
     assert not findings.claims[0].holds
     assert findings.claims[0].interval == pytest.approx((0.9, 0.9))
     # A network of ten that fails on all paths: what is uncertain is how many such networks are drawn.
     quick = runs | {NetworkControl.DIRECT: (GOOD["behind"], *(GOOD["without"],) * 9)}
-    claim = shorter.conclude(SMALL, (PathSuccess(7.0, GOOD["ideal"], quick, {}),) * PATHS).claims[0]
+    claim = success.conclude_shorter(SMALL, (PathSuccess(7.0, GOOD["ideal"], quick, {}),) * PATHS).claims[0]
     assert claim.measured == pytest.approx(0.9)
     assert claim.interval == pytest.approx((0.7, 1.0), abs=0.101)
     assert [row[0] for row in findings.tables[0].rows][1:] == ["without middleware", "middleware, network"]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.lab.goals.shortest import Shortest
+from interfaces.lab.goals.scenes import Shortest
 from robots.bullet.rooms import Block, Room
 from robots.ipr.chassis import IPR
 from robots.ipr.navigation import route_config, route_map

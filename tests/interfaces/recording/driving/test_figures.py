@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import _status
-from interfaces.lab.driving.recorded import measure_recorded, name_of
+from interfaces.lab.driving.run import measure_recorded, name_of
 from interfaces.recording import open_recording
-from interfaces.recording.figures import drive_summary as summary
-from interfaces.recording.figures import driven
+from interfaces.recording.figures import driven, summary
 from interfaces.recording.playback import Playback
-from interfaces.report.recorded import render
+from interfaces.report.html import render_recording as render
 from interfaces.runs.drive_run import COLUMNS, METRICS, DriveCase, facts_of, row_of
 from interfaces.station.shelf import checked_name
 from interfaces.teleop.architectures import Transport
