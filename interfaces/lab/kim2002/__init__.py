@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from interfaces.lab.claims import Paper, PaperPart
-from interfaces.lab.kim2002.scenario import TOGETHER, conclude, measure
+from interfaces.lab.kim2002 import scenario
 from interfaces.lab.localization.accuracy import conclude_rooms, measure_room
 
 ROOMS: Final = ("0", "1")
@@ -15,7 +15,9 @@ PAPER: Final = Paper(
     "kim2002",
     "Kim, Han, Kim, Kim: Internet-Based Personal Robot System using Map-Based Localization",
     (
-        PaperPart("The scenario", measure, conclude, tuple(str(k) for k in range(TOGETHER))),
+        PaperPart(
+            "The scenario", scenario.measure, scenario.conclude, tuple(str(k) for k in range(scenario.TOGETHER))
+        ),
         PaperPart("Localization", measure_room, conclude_rooms, ROOMS),
     ),
     runs=5,
