@@ -7,6 +7,7 @@ import graphlib
 import importlib
 import inspect
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -320,3 +321,20 @@ def test_a_private_name_in_a_test_is_seen(tmp_path, line, count):
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).write_text(text)
     assert len(list(private_uses(tmp_path))) == count
+
+
+def test_the_map_of_changes_names_files_that_are_there():
+    """A row of *Where to change what* gives a path; names without a folder after it stand beside it."""
+    text = (HOME / "docs/architecture.md").read_text(encoding="utf-8")
+    table = text.partition("## Where to change what")[2].partition("\n## ")[0]
+    rows = [row.split("|") for row in table.splitlines() if row.startswith("| ")]
+    missing = []
+    for _, _what, where, _ in rows:
+        beside = HOME
+        for name in re.findall(r"`([\w./]+(?:\.py|\.js|/))`", where):
+            path = HOME / name if "/" in name else beside / name
+            beside = path if name.endswith("/") else path.parent
+            if beside != HOME and not path.exists():
+                missing.append(name)
+    assert len(rows) > 40
+    assert missing == []
