@@ -35,7 +35,7 @@ def circle(body: MobileRobot) -> None:
 
 def bare_steps(body: MobileBody, count: int) -> None:
     """Step a robot's world without anything around it."""
-    step, client = body._world.bullet.stepSimulation, body._world.client
+    step, client = body.world.bullet.stepSimulation, body.world.client
     for _ in range(count):
         step(physicsClientId=client)
 

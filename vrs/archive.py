@@ -204,7 +204,7 @@ class Keeper:
                     _warn(error)
 
     def _put_away(self, timeline: Timeline, now: float) -> None:
-        root, height = timeline._root, len(timeline._levels)
+        root, height = timeline.root, timeline.height
         old = len(timeline) - KEPT
         for _ in range(PORTION + max(old - self._done, 0) // BACKLOG):
             if root is None or self._done >= old:

@@ -105,7 +105,7 @@ def match_paths(
         distance = np.linalg.norm(follower - path[0], axis=1)
         return PathMatch(grid, distance, s, t_leader, t_leader[:1], moving)
     moving[1:-1] = 2 * cell > v_min * (t_leader[2:] - t_leader[:-2])
-    match = _match(grid, follower, t_leader, path, max(1, round(2 * v_max * dt / cell)))
+    match = best_match(grid, follower, t_leader, path, max(1, round(2 * v_max * dt / cell)))
     distance, s_follower = _project(follower, *_polyline(s, path, s_of_t, leader), s, match)
     window = (-dt, dt + 0.5 * cell / v_min)
     if seen.all():
@@ -130,7 +130,7 @@ def resample(t: Array, values: Array, t_new: Array) -> Array:
     return np.stack(columns, axis=1)
 
 
-def _match(t: Array, follower: Array, t_leader: Array, path: Array, advance: int) -> NDArray[np.intp]:
+def best_match(t: Array, follower: Array, t_leader: Array, path: Array, advance: int) -> NDArray[np.intp]:
     """Best matched cell at every time, (k,).
 
     Exact, but without the cells that can't lie on the best match: those whose cost, with the least that is still

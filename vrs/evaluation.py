@@ -23,11 +23,11 @@ STACKS = 128
 INDEXES = 512
 """Indexes that are kept in all, the oldest dropped first: 0.3 GB of cubic segments of six joints."""
 
-_DENSE = 1024
+DENSE = 1024
 """Times below one node of height 1 that are worth more than the shortest way."""
 
-_GATHERED = 1024
-"""Times whose coefficients are gathered at once, _DENSE or more: 0.2 MB for six joints, which a cache holds."""
+GATHERED = 1024
+"""Times whose coefficients are gathered at once, DENSE or more: 0.2 MB for six joints, which a cache holds."""
 
 _CELLS = 2
 """Cells of an index a segment."""
@@ -282,7 +282,7 @@ def _fill(
 ) -> None:
     """Write the values at sorted times that lie in a tree into `out`."""
     count, n = out.shape
-    room = min(count, _GATHERED)
+    room = min(count, GATHERED)
     terms, u = np.empty((room, n, QUICK_ORDER)), np.empty(room)
     begin = end = 0
 
@@ -296,7 +296,7 @@ def _fill(
             for row, x in zip(out[low:high], t[low:high].tolist(), strict=True):
                 start, _, coefficients = find(x)
                 row[:] = evaluate(coefficients, x - start, derivative)
-        elif stack.quick and high - low < _DENSE:
+        elif stack.quick and high - low < DENSE:
             if low != end or high - begin > room:
                 finish()
                 begin = low
@@ -349,7 +349,7 @@ def _ascending(starts: Array) -> Array:
 
 def _sorted_into(starts: Array, t: Array) -> _Integers:
     """Index of the last start that isn't after each of the sorted times, none before the first start."""
-    if len(t) < _DENSE:
+    if len(t) < DENSE:
         near: _Integers = starts.searchsorted(t, "right")
         near -= 1
         return near

@@ -486,7 +486,7 @@ class Scheduler(BaseScheduler[Timeline]):
         self._session = _Session(command_id, self.timeline.version, start)
 
     def edit(self, command: PlanEdit, now: float | None) -> Receipt:
-        """Carry out an edit of the self.
+        """Carry out an edit of what is scheduled.
 
         Args:
             command: The edit.

@@ -80,6 +80,16 @@ class BaseTimeline(Generic[S]):
         return self._end
 
     @property
+    def root(self) -> Node | None:
+        """The tree that holds the segments; None while there's none."""
+        return self._root
+
+    @property
+    def height(self) -> int:
+        """Levels of nodes above the tree's leaves."""
+        return len(self._levels)
+
+    @property
     def segments(self) -> SegmentView[S]:
         """The segments, made when they're looked at."""
         return SegmentView(self)

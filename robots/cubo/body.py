@@ -161,7 +161,7 @@ class CuboBody(MobileBody):
     def angles(self) -> Values:
         """Angles of the right arm, the left arm and the head [rad]."""
         joints = [self._joint(k) for k in range(len(p.CUBO.limbs))]
-        states = self._world.bullet.getJointStates(self._body, joints, physicsClientId=self._world.client)
+        states = self.world.bullet.getJointStates(self.body_id, joints, physicsClientId=self.world.client)
         return tuple(float(state[0]) for state in states)
 
     @property
@@ -197,14 +197,14 @@ class CuboBody(MobileBody):
 
     def _swing(self, limb: Limb, number: int, values: Values) -> None:
         speed = (abs(values[1]) if len(values) > 1 else 0.0) or limb.speed
-        self._world.bullet.setJointMotorControl2(
-            self._body,
+        self.world.bullet.setJointMotorControl2(
+            self.body_id,
             self._joint(number),
-            self._world.bullet.POSITION_CONTROL,
+            self.world.bullet.POSITION_CONTROL,
             targetPosition=min(max(values[0], limb.low), limb.high),
             positionGain=0.2,
             velocityGain=1.0,
             force=limb.torque,
             maxVelocity=min(max(speed, 1e-3), limb.speed),
-            physicsClientId=self._world.client,
+            physicsClientId=self.world.client,
         )

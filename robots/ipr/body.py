@@ -303,16 +303,19 @@ class MobileBody(MobileRobot):
     _STEP = 1 / 240
 
     def _begin(self) -> None:
-        self._world = World(gravity=self.reality.gravity, dt=self.reality.dt)
-        self._world.bullet.setPhysicsEngineParameter(
-            numSolverIterations=_ITERATIONS, deterministicOverlappingPairs=1, physicsClientId=self._world.client
+        self.world = World(gravity=self.reality.gravity, dt=self.reality.dt)
+        """The PyBullet world of the robot and its room."""
+        self.world.bullet.setPhysicsEngineParameter(
+            numSolverIterations=_ITERATIONS, deterministicOverlappingPairs=1, physicsClientId=self.world.client
         )
-        self._room_bodies = RoomBodies(self._world, self.room)
+        self._room_bodies = RoomBodies(self.world, self.room)
         self._cargo: list[CargoBody] = []
         train, dt = self._train, self.reality.dt
         start = self._truth
-        loaded = load_chassis(self._world, self.chassis, self.reality, start, train.radii, train.base)
-        self._body, self._centre, self._R_CR = loaded.body, loaded.centre, loaded.R_CR
+        loaded = load_chassis(self.world, self.chassis, self.reality, start, train.radii, train.base)
+        self.body_id = loaded.body
+        """PyBullet's id of the robot."""
+        self._centre, self._R_CR = loaded.centre, loaded.R_CR
         limited = self.reality.torque_limits
         self._torques = [self.chassis.torque if limited else _FREE_TORQUE] * len(DRIVES)
         self._gains = [-math.expm1(-dt / _HOLD_TIME)] * len(DRIVES)
@@ -332,7 +335,7 @@ class MobileBody(MobileRobot):
     @property
     def motion(self) -> tuple[float, float]:
         """True speed v of the middle of the axle, forward [m/s], and ω [rad/s]."""
-        linear, angular = self._world.bullet.getBaseVelocity(self._body, physicsClientId=self._world.client)
+        linear, angular = self.world.bullet.getBaseVelocity(self.body_id, physicsClientId=self.world.client)
         _, R = self._pose()
         velocity = np.array(linear) - np.cross(angular, R @ self._centre)
         return float(velocity @ R[:, 0]), float(angular[2])
@@ -345,7 +348,7 @@ class MobileBody(MobileRobot):
     @property
     def wheels(self) -> tuple[Wheel, Wheel]:
         """What the right and the left wheel do."""
-        bullet, client, body = self._world.bullet, self._world.client, self._body
+        bullet, client, body = self.world.bullet, self.world.client, self.body_id
         found: list[Wheel] = []
         for j in DRIVES:
             _, speed, _, torque = bullet.getJointState(body, j, physicsClientId=client)
@@ -373,7 +376,7 @@ class MobileBody(MobileRobot):
         at, R = self._pose()
         top = at + R @ np.array([x, y, chassis.height])
         there = float(top[0]), float(top[1]), float(top[2]), self._truth[2]
-        self._cargo.append(CargoBody(self._world, cargo, self._body, self._room_bodies.floor, there))
+        self._cargo.append(CargoBody(self.world, cargo, self.body_id, self._room_bodies.floor, there))
 
     @property
     def cargo(self) -> tuple[tuple[float, float, float], ...]:
@@ -385,14 +388,14 @@ class MobileBody(MobileRobot):
     @property
     def closed(self) -> bool:
         """Whether the robot's world is closed."""
-        return self._world.closed
+        return self.world.closed
 
     def close(self) -> None:
         """Disconnect the world; a second call does nothing."""
-        self._world.close()
+        self.world.close()
 
     def _ready(self) -> None:
-        _ = self._world.client
+        _ = self.world.client
 
     def _advance(self, n: int) -> None:
         train, dt, moving = self._train, self.reality.dt, self._room_bodies.moving
@@ -410,9 +413,9 @@ class MobileBody(MobileRobot):
 
     def _turn(self, right: float, left: float) -> None:
         """Step once with the tyres' wanted speeds [rad/s]."""
-        bullet, client = self._world.bullet, self._world.client
+        bullet, client = self.world.bullet, self.world.client
         bullet.setJointMotorControlArray(
-            self._body,
+            self.body_id,
             DRIVES,
             bullet.POSITION_CONTROL,
             targetPositions=(self._target_right, self._target_left),
@@ -439,7 +442,7 @@ class MobileBody(MobileRobot):
         self._truth = float(x), float(y), heading + turns * math.tau
         if self._steps % self._every_encoder:
             return
-        states = self._world.bullet.getJointStates(self._body, DRIVES, physicsClientId=self._world.client)
+        states = self.world.bullet.getJointStates(self.body_id, DRIVES, physicsClientId=self.world.client)
         right, left = states[0][0], states[1][0]
         slip_right, slip_left = self._train.slips
         self._angles = (
@@ -452,8 +455,8 @@ class MobileBody(MobileRobot):
 
     def _look(self) -> None:
         """Note what the chassis touches."""
-        points = self._world.bullet.getContactPoints(
-            bodyA=self._body, linkIndexA=-1, physicsClientId=self._world.client
+        points = self.world.bullet.getContactPoints(
+            bodyA=self.body_id, linkIndexA=-1, physicsClientId=self.world.client
         )
         names = self._room_bodies.names
         # What lies on top has no name in the room.
@@ -463,8 +466,8 @@ class MobileBody(MobileRobot):
 
     def _pose(self) -> tuple[Array, Array]:
         """Where the robot's frame is, (3,), and how it's turned, (3, 3)."""
-        bullet = self._world.bullet
-        position, turn = bullet.getBasePositionAndOrientation(self._body, physicsClientId=self._world.client)
+        bullet = self.world.bullet
+        position, turn = bullet.getBasePositionAndOrientation(self.body_id, physicsClientId=self.world.client)
         R = np.array(bullet.getMatrixFromQuaternion(turn)).reshape(3, 3) @ self._R_CR
         return np.array(position) - R @ self._centre, R
 
@@ -472,14 +475,14 @@ class MobileBody(MobileRobot):
         """Shift what settling moved, so that the robot begins at its start; wheels count from there."""
         self._move(start)
         for j in DRIVES:
-            self._world.bullet.resetJointState(self._body, j, 0.0, physicsClientId=self._world.client)
+            self.world.bullet.resetJointState(self.body_id, j, 0.0, physicsClientId=self.world.client)
         self._target_right = self._target_left = 0.0
 
     def _move(self, start: tuple[float, float, float]) -> None:
         """Turn the robot about the vertical and shift it, so that it stands at a posture."""
         (x, y, _), R = self._pose()
-        bullet, client = self._world.bullet, self._world.client
-        position, turn = bullet.getBasePositionAndOrientation(self._body, physicsClientId=client)
+        bullet, client = self.world.bullet, self.world.client
+        position, turn = bullet.getBasePositionAndOrientation(self.body_id, physicsClientId=client)
         # A turn about the vertical through the robot's own reference point, then a shift.
         angle = math.remainder(start[2] - math.atan2(R[1, 0], R[0, 0]), math.tau)
         c, s = math.cos(angle), math.sin(angle)
@@ -487,7 +490,7 @@ class MobileBody(MobileRobot):
         place = [start[0] + c * dx - s * dy, start[1] + s * dx + c * dy, position[2]]
         upright = [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
         _, turned = bullet.multiplyTransforms([0.0] * 3, upright, [0.0] * 3, turn)
-        bullet.resetBasePositionAndOrientation(self._body, place, turned, physicsClientId=client)
+        bullet.resetBasePositionAndOrientation(self.body_id, place, turned, physicsClientId=client)
 
     def _shafts(self) -> tuple[float, float]:
         return self._angles

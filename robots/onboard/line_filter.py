@@ -153,6 +153,11 @@ class LineFilter:
         """Of the lines' errors, (2 m, 2 m)."""
         return frozen_array(self._P[OWN:, OWN:])
 
+    @property
+    def joint_covariance(self) -> Array:
+        """Of the robot's own errors and the lines' together, (OWN + 2 m, OWN + 2 m)."""
+        return frozen_array(self._P)
+
     def widened(self, place: float, turn: float) -> LineFilter:
         """Return a copy that may be off by so much more: standard deviations [m] and [rad]."""
         other = LineFilter.__new__(LineFilter)

@@ -144,7 +144,8 @@ class RealArm:
             dt=reality.dt,
         )
         self._payload = payload
-        self._world = World(gravity=reality.gravity, dt=reality.dt)
+        self.world = World(gravity=reality.gravity, dt=reality.dt)
+        """The PyBullet world that it's alone in."""
         self._body = self._load()
 
     @property
@@ -170,7 +171,7 @@ class RealArm:
     @property
     def closed(self) -> bool:
         """Whether the arm's world is closed."""
-        return self._world.closed
+        return self.world.closed
 
     def run(self, q_ref: ArrayLike, qd_ref: ArrayLike, qdd_ref: ArrayLike) -> Measured:
         """Follow k references, dt apart; reference i is for the end of step i.
@@ -203,10 +204,10 @@ class RealArm:
 
     def follow(self, prepared: Prepared) -> Measured:
         """Follow references that `prepare` has made ready; returns and raises as `run`."""
-        client = self._world.client
+        client = self.world.client
         if self.reality.ideal:
             return self._follow(prepared)
-        bullet, body, drives, servo = self._world.bullet, self._body, self._drives, self._servo
+        bullet, body, drives, servo = self.world.bullet, self._body, self._drives, self._servo
         control, step, read = bullet.setJointMotorControlArray, bullet.stepSimulation, bullet.getJointStates
         mass_matrix, inverse_dynamics = bullet.calculateMassMatrix, bullet.calculateInverseDynamics
         torque_mode, passive, limited = bullet.TORQUE_CONTROL, drives.passive, self.reality.torque_limits
@@ -249,7 +250,7 @@ class RealArm:
             DivergedError: If the arm's state explodes.
         """
         torques = finite_array("tau", tau, (DOF,), "six finite joint torques [N m]").tolist()
-        bullet, client, body = self._world.bullet, self._world.client, self._body
+        bullet, client, body = self.world.bullet, self.world.client, self._body
         if not self._drives.passive:
             M = bullet.calculateMassMatrix(body, self._q, physicsClientId=client)
             bias = bullet.calculateInverseDynamics(body, self._q, self._qd, _ZERO, physicsClientId=client)
@@ -291,18 +292,18 @@ class RealArm:
             qdd: Joint accelerations [rad/s²], (6,).
         """
         rows = [_row(*item) for item in zip(("q", "qd", "qdd"), (q, qd, qdd), _BOUNDS, strict=True)]
-        tau = self._world.bullet.calculateInverseDynamics(self._body, *rows, physicsClientId=self._world.client)
+        tau = self.world.bullet.calculateInverseDynamics(self._body, *rows, physicsClientId=self.world.client)
         return frozen_array(np.array(tau) + np.array(self._armature) * rows[2])
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Return the joint-space inertia at q [rad], (6, 6) [kg m²]: true payload, rotors if it has any."""
         row = _row("q", q, _BOUNDS[0])
-        M = self._world.bullet.calculateMassMatrix(self._body, row, physicsClientId=self._world.client)
+        M = self.world.bullet.calculateMassMatrix(self._body, row, physicsClientId=self.world.client)
         return frozen_array(np.array(M) + np.diag(self._armature))
 
     def close(self) -> None:
         """Disconnect the world; a second call does nothing."""
-        self._world.close()
+        self.world.close()
 
     def __enter__(self) -> Self:
         return self
@@ -335,20 +336,18 @@ class RealArm:
     def _exchange(self, payload: Payload | None) -> None:
         if payload != self._payload:
             self._payload = payload
-            self._world.clear()
+            self.world.clear()
             self._body = self._load()
 
     def _load(self) -> int:
-        body = load_arm(self._world, puma_links(self._payload))
+        body = load_arm(self.world, puma_links(self._payload))
         self._body = body
         self._set_state()
         return body
 
     def _set_state(self) -> None:
         for j, (x, v) in enumerate(zip(self._q, self._qd, strict=True)):
-            self._world.bullet.resetJointState(
-                self._body, j, x, targetVelocity=v, physicsClientId=self._world.client
-            )
+            self.world.bullet.resetJointState(self._body, j, x, targetVelocity=v, physicsClientId=self.world.client)
 
 
 def _references(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[Array, Array, Array]:

@@ -72,7 +72,7 @@ def parts(timeline: Timeline) -> list:
             for child in node.children:
                 walk(child, height - 1)
 
-    walk(timeline._root, len(timeline._levels))
+    walk(timeline.root, timeline.height)
     return found
 
 
@@ -302,14 +302,14 @@ def test_engines_without_a_clock_and_short_sessions_touch_no_file(monkeypatch: p
     offline = Engine(MODEL, timeline=None)
     for k in range(20):
         offline.execute(MotionCommand(JointTarget(MODEL.poses["nominal"] + 0.1 * (k % 2))))
-    assert offline._keeper.size == 0
+    assert stored_leaves(offline.timeline) == 0
     monkeypatch.setattr(archive, "KEPT", 100_000)
     clock = ManualClock()
     engine = Engine(MODEL, clock=clock)
     for k in range(20):
         engine.execute(MotionCommand(JointTarget(MODEL.poses["nominal"] + 0.1 * (k % 2))))
         clock.advance(2.0)
-    assert engine._keeper.size == 0
+    assert stored_leaves(engine.timeline) == 0
 
 
 def test_memory_does_not_grow(monkeypatch: pytest.MonkeyPatch):

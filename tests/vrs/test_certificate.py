@@ -175,11 +175,11 @@ def test_what_halving_cannot_decide_is_refused(monkeypatch):
     plan = Plan(np.ones(1), (top**5).coef[None, :, None])
     limits = Limits(-np.ones(1), np.ones(1), *np.full((3, 1), 1e6))
     assert violation(plan, limits, jerk=False) is None
-    monkeypatch.setattr(certificate, "_HALVINGS", 1)
+    monkeypatch.setattr(certificate, "HALVINGS", 1)
     assert violation(plan, limits, jerk=False) == "joint 1: can't decide whether its position limit is kept"
     # The start of the right half is beyond already: refused at once, not left undecided.
     low = Limits(-np.ones(1), 0.99 * np.ones(1), *np.full((3, 1), 1e6))
-    monkeypatch.setattr(certificate, "_HALVINGS", 2)
+    monkeypatch.setattr(certificate, "HALVINGS", 2)
     assert violation(plan, low, jerk=False) == "joint 1 would pass its position limit"
 
 

@@ -59,11 +59,11 @@ def test_caches_change_no_bit(monkeypatch: pytest.MonkeyPatch):
         cold = np.array([tau.with_version(0).sample(x) for x in t[:12].tolist()])
         few = tau.sample(t[:8])
         each = np.array([tau.sample(x) for x in t.tolist()])
-        assert any(node.index and node.index.columns for node in tau._root.children)
+        assert any(node.index and node.index.columns for node in tau.root.children)
         assert np.array_equal(each[:12], cold)
         assert np.array_equal(each, [tau.sample(x) for x in t.tolist()])
         many = tau.sample(t)
-        assert any(node.stack is not None for node in tau._root.children)
+        assert any(node.stack is not None for node in tau.root.children)
         assert np.array_equal(many[:8], few)
         assert (np.abs(many - each) <= 1e-14 * np.maximum(1, np.abs(many))).all()
 
@@ -79,7 +79,7 @@ def test_caches_are_bounded(monkeypatch: pytest.MonkeyPatch):
     t = np.linspace(timeline.start, timeline.end, 4000)
     first = timeline.sample(t)
     each = [timeline.sample(x) for x in t.tolist()]
-    nodes = timeline._root.children
+    nodes = timeline.root.children
     assert len(nodes) > 5
     assert sum(node.stack is not None for node in nodes) <= 2
     assert sum(bool(node.index and node.index.columns) for node in nodes) <= 2
@@ -101,7 +101,7 @@ def test_of_a_plan_that_grows_the_newest_versions_alone_keep_caches(monkeypatch:
         many = timeline.sample(t)
         each = np.array([timeline.sample(x) for x in t.tolist()])
         assert (np.abs(many - each) <= 1e-14 * np.maximum(1, np.abs(many))).all()
-    nodes = [node for tau in versions for node in evaluation.places_of(tau._root, len(tau._levels))[2]]
+    nodes = [node for tau in versions for node in evaluation.places_of(tau.root, tau.height)[2]]
     assert 1 <= len({id(node) for node in nodes if node.stack is not None}) <= 4
     assert 1 <= len({id(node) for node in nodes if node.index and node.index.columns}) <= 4
 
@@ -181,8 +181,8 @@ def test_many_times_a_segment_and_few_agree():
 def test_times_over_many_nodes_are_as_the_segments_have_them(derivative: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(tree, "LEAF", 8)
     monkeypatch.setattr(tree, "CAPACITY", 8)
-    monkeypatch.setattr(evaluation, "_DENSE", 200)
-    monkeypatch.setattr(evaluation, "_GATHERED", 400)
+    monkeypatch.setattr(evaluation, "DENSE", 200)
+    monkeypatch.setattr(evaluation, "GATHERED", 400)
     rng = np.random.default_rng(6)
     timeline = Timeline(np.zeros(N))
     # Cubic nodes in a row, more than are gathered at once, and now and then one of a higher degree between them.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vrs.comparison import _match, match_paths, resample
+from vrs.comparison import best_match, match_paths, resample
 from vrs.model import Array
 
 
@@ -47,7 +47,7 @@ def test_the_match_is_that_of_a_plain_programme(seed: int) -> None:
     follower = np.column_stack([np.interp(place, np.arange(cells), path[:, i]) for i in (0, 1)])
     follower += rng.normal(0.0, (0.0, 0.004, 0.2)[seed % 3], follower.shape)
     expected, total = plainly(t, follower, t_leader, path, advance)
-    match = _match(t, follower, t_leader, path, advance)
+    match = best_match(t, follower, t_leader, path, advance)
     assert match.tolist() == expected
     assert np.sum((path[match] - follower) ** 2) == pytest.approx(total, rel=1e-12)
 
@@ -55,7 +55,7 @@ def test_the_match_is_that_of_a_plain_programme(seed: int) -> None:
 def test_standing_on_equal_cells_takes_the_smaller_advance() -> None:
     path = np.zeros((6, 2))
     follower = np.zeros((5, 2))
-    match = _match(np.arange(5) * 0.05, follower, np.zeros(6), path, 5)
+    match = best_match(np.arange(5) * 0.05, follower, np.zeros(6), path, 5)
     assert match.tolist() == [0, 0, 0, 0, 0]
 
 

@@ -171,7 +171,7 @@ def test_stamps_stay_exact_through_deep_restructuring():
         cut = timeline.start_of(index) + 0.3 * (timeline.start_of(index + 1) - timeline.start_of(index))
         new = piece(rng, k, 4)
         timeline = timeline.edited(cut, [new], index + 1, cut + sum(new.durations))
-    assert len(timeline._levels) > 4
+    assert timeline.height > 4
     first = {timeline.owner_of(i): timeline.start_of(i) for i in reversed(range(600))}
     assert all(first[k] == stamps[k] for k in range(1, 140))
 
@@ -182,10 +182,10 @@ def test_a_tree_shrinks_with_what_is_dropped():
     timeline = Timeline(np.zeros(N))
     for k in range(60):
         timeline = timeline.edited(timeline.end, [piece(rng, k + 1, 5)])
-    assert len(timeline._levels) >= 4
+    assert timeline.height >= 4
     short = timeline.edited(timeline.start_of(2), [piece(rng, 99, 1)])
     assert len(short) == 3
-    assert len(short._levels) == 1
+    assert short.height == 1
     assert len(short.edited(short.start, [])) == 0
 
 
@@ -242,7 +242,7 @@ def test_a_node_that_is_made_from_one_keeps_its_offset(monkeypatch: pytest.Monke
         moved = np.array(before[tail:]) + delta
         assert np.abs(np.array(after[index + 4 :]) - moved).max() <= rounding
         assert [timeline.index_at(t) for t in after] == list(range(len(after)))
-    shifts = [shift for node, _ in nodes_of(timeline._root, len(timeline._levels)) for shift in node.offsets]
+    shifts = [shift for node, _ in nodes_of(timeline.root, timeline.height) for shift in node.offsets]
     assert any(shifts)
 
 

@@ -215,13 +215,14 @@ def test_an_edit_of_the_past_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     watch, retimed = watched(clock=clock), watched()
     retimed.execute(Retime(3, 8.0))
     clock.advance(5.5)
-    monkeypatch.setattr(Engine, "execute", lambda engine, _: spoil_past(engine, retimed.engine.receipt(3)))
 
-    def spoil_past(engine: Engine, receipt: Receipt) -> Receipt:
-        engine._plan.timeline = retimed.engine.timeline
-        engine._plan.ledger.rewrite(replace(receipt, execute_at=8.0))
+    def spoil_past(scheduler: Scheduler, _command: Retime, _now: float | None) -> Receipt:
+        receipt = retimed.engine.receipt(3)
+        scheduler.timeline = retimed.engine.timeline
+        scheduler.ledger.rewrite(replace(receipt, execute_at=8.0))
         return receipt
 
+    monkeypatch.setattr(Scheduler, "edit", spoil_past)
     with pytest.raises(LawBrokenError, match="the past"):
         watch.execute(Retime(3, 8.0))
 

@@ -73,7 +73,7 @@ _PASSED = 6e-10
 """Relative overshoot of a point that halving refuses; far enough below _LET_PASS to come to an end."""
 _NOISE = 1e-10
 """Largest relative rounding error that leaves both figures true."""
-_HALVINGS = 60
+HALVINGS = 60
 """After which a piece is as short as rounding; the gap between the figures above ends it long before."""
 _NAMES = ("position", "speed", "acceleration", "jerk")
 
@@ -219,7 +219,7 @@ def _halved(hull: Array, inside: NDArray[np.bool_], form: _Form, box: _Box) -> s
         low_scale, high_scale = box.low_scale[one, 0], box.high_scale[one, 0]
         control = hull[rows, segments, joints].T
         left, right = _halves(control.shape[1] - 1)
-        for _ in range(_HALVINGS):
+        for _ in range(HALVINGS):
             if len(control) == 0:
                 break
             above = (control - high[joints, None]) / high_scale[joints, None]

@@ -313,11 +313,11 @@ def _exact(start: State, goal: State, h: Array, control: Array, order: int) -> C
         error = math.dist(aim, end.ravel().tolist())
         if error <= _AIM:
             return made
-        control = control + _least_change(h, np.array(aim).reshape(end.shape) - end)
+        control = control + least_change(h, np.array(aim).reshape(end.shape) - end)
     return made if error <= _END_ERROR else None
 
 
-def _least_change(h: Array, missing: Array) -> Array:
+def least_change(h: Array, missing: Array) -> Array:
     """The smallest change of the controls, (m, n), that adds what's missing of q, qd (and qdd) at the end.
 
     By Gram and Schmidt with a second pass. Not by the normal equations: where one long cruise outweighs the rest,

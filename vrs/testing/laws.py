@@ -252,7 +252,7 @@ def columns(timeline: Timeline) -> Columns:
             walk(child, offset + own)
 
     if len(timeline):
-        walk(timeline._root, 0.0)
+        walk(timeline.root, 0.0)
     durations = np.array(list(chain.from_iterable(leaf.durations for leaf in leaves)))
     owners = tuple(chain.from_iterable(leaf.owners for leaf in leaves))
     rows = tuple(chain.from_iterable(leaf.rows for leaf in leaves))

@@ -144,8 +144,8 @@ def test_joined_lines_are_one_and_the_posture_gains() -> None:
     assert len(held.lines) == 5
     assert held.line_covariance.shape == (10, 10)
     assert held.covariance[1, 1] < before[1, 1]
-    assert np.linalg.eigvalsh(held._P)[0] > -1e-12
-    assert held._P.shape == (OWN + 10, OWN + 10)
+    assert np.linalg.eigvalsh(held.joint_covariance)[0] > -1e-12
+    assert held.joint_covariance.shape == (OWN + 10, OWN + 10)
 
 
 SQUARE = Lines.of([[0, 2, 0.0], [2, 0, -math.pi / 2]], np.tile([-2.0, 2.0], (2, 1)), np.zeros((2, 2)), [1, 1])
