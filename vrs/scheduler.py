@@ -553,7 +553,7 @@ class Scheduler(BaseScheduler[Timeline]):
                 return self.accept(self._as_planned(receipt, made, moment, reason, at), motion, made, at)
         # It goes past another move: it's taken out, and commanded again at its new time.
         before = self.timeline
-        taken = self._take_out(receipt, start, now)
+        taken, notes = self._take_out(receipt, start, now)
         try:
             made = insert(self.timeline, t, Insertion.SPLICE, receipt.command_id, planner, joiner)
         except REFUSALS:
@@ -566,7 +566,7 @@ class Scheduler(BaseScheduler[Timeline]):
             shift=taken.shift + made.shift,
             shifted_names=partial(_united, taken, answer, "shifted"),
             superseded_names=partial(_united, taken, answer, "superseded"),
-            reason=joined(answer.reason, taken.reason.removeprefix("cancelled; ").removeprefix("cancelled")),
+            reason=joined(answer.reason, notes),
         )
         accepted = self.accept(answer, motion, made, t)
         self.ledger.fuse()
@@ -593,14 +593,18 @@ class Scheduler(BaseScheduler[Timeline]):
     def _cancel(self, command: Cancel, receipt: Receipt, now: float | None) -> Receipt:
         moment = self.moment(command, now, -np.inf)
         start, _ = _scheduled(receipt, moment.t)
-        return self._take_out(receipt, max(start, moment.t), now)
+        return self._take_out(receipt, max(start, moment.t), now)[0]
 
     def _first(self, segments: tuple[int, int] | None) -> float:
         """The knot at which a move begins [s]: its receipt's time may lie a rounding later."""
         return np.inf if segments is None else self.timeline.start_of(segments[0])
 
-    def _take_out(self, receipt: Receipt, t: float, now: float | None) -> Receipt:
-        """Take a move out of the plan from t on; the one after it goes from where the arm then stands."""
+    def _take_out(self, receipt: Receipt, t: float, now: float | None) -> tuple[Receipt, str]:
+        """Take a move out of the plan from t on; the one after it goes from where the arm then stands.
+
+        Returns:
+            The receipt of the move, and what must be said of the moves around it.
+        """
         timeline = self.timeline
         segments = span(timeline, receipt.command_id, receipt.execute_at if receipt.execute_at is not None else t)
         started = receipt.execute_at is not None and receipt.execute_at < t
@@ -626,7 +630,7 @@ class Scheduler(BaseScheduler[Timeline]):
             shifted_names=shifted,
             superseded_names=dropped,
         )
-        return self.accept(answer, self.ledger.command(receipt.command_id), made, t, others=others)
+        return self.accept(answer, self.ledger.command(receipt.command_id), made, t, others=others), made.notes
 
     def _replanned(self, gap: Gap, following: int, cancelled: int) -> tuple[Edit[Timeline], tuple[Entry, ...]]:
         """Plan the move that begins with a segment anew, from where a gap leaves the arm."""

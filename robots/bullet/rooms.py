@@ -97,6 +97,11 @@ class Column:
         return self.start <= t < self.end
 
 
+def is_wall(thing: Block | Column) -> bool:
+    """Whether a thing is a wall: its name begins so."""
+    return thing.name.startswith("wall")
+
+
 @dataclass(frozen=True, slots=True)
 class Person:
     """A cylinder that walks along straight lines between places, at the times that belong to them."""

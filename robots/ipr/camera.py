@@ -15,7 +15,7 @@ from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from robots.bullet.rooms import EMPTY, Room
+from robots.bullet.rooms import EMPTY, Room, is_wall
 from robots.bullet.world import Picture, Studio
 from robots.ipr.model import IPR_AXLE_OFFSET
 from robots.ipr.shapes import GROUND, box, door_shape, headless, person_shape, room_shapes, upright
@@ -243,7 +243,7 @@ class Sight:
 
     def _cover(self) -> None:
         """Put a ceiling on the highest walls, if there are any."""
-        walls = [thing.height for thing in self._room.blocks if thing.name.startswith("wall")]
+        walls = [thing.height for thing in self._room.blocks if is_wall(thing)]
         if not walls or max(walls) < 2.0:
             return
         build = Builder("ceiling", _CEILING)

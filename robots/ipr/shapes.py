@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.bullet.rooms import Block, Column, Door, Person, Room
+from robots.bullet.rooms import Block, Column, Door, Person, Room, is_wall
 from robots.ipr.chassis import IPR, MICRO, Chassis, chassis
 from robots.ipr.drive_train import as_posture
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft
@@ -272,7 +272,7 @@ def room_shapes(room: Room) -> tuple[LinkShape, ...]:
 
 
 def _thing(thing: Block | Column) -> LinkShape:
-    wall = thing.name.startswith("wall")
+    wall = is_wall(thing)
     build = Builder(thing.name, (WALL if wall else WOOD) if thing.known else NEW)
     if isinstance(thing, Column):
         edge = min(0.01, thing.radius / 4, thing.height / 4)

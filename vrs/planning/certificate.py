@@ -78,8 +78,22 @@ HALVINGS = 60
 _NAMES = ("position", "speed", "acceleration", "jerk")
 
 
+class Violation(NamedTuple):
+    """A limit that a plan passes, or may pass."""
+
+    text: str
+    derivative: int | None = None
+    """Of which derivative, 0 for the position; None where the plan can't be certified at all."""
+
+
 def violation(plan: Plan, limits: Limits, *, jerk: bool) -> str | None:
-    """Say which limit a plan passes, at any instant; None if it keeps them all.
+    """Say in words what `find_violation` finds."""
+    found = find_violation(plan, limits, jerk=jerk)
+    return None if found is None else found.text
+
+
+def find_violation(plan: Plan, limits: Limits, *, jerk: bool) -> Violation | None:
+    """Find which limit a plan passes, at any instant; None if it keeps them all.
 
     An overshoot of 5e-10 or less, relative to the limit (for positions to 1 rad, where that is more), passes; one
     of 1e-9 or more never does.
@@ -94,12 +108,12 @@ def violation(plan: Plan, limits: Limits, *, jerk: bool) -> str | None:
         return None
     degree = a.shape[1] - 1
     if degree > MAX_DEGREE:
-        return f"a plan of degree {degree} can't be certified: {MAX_DEGREE} is the highest"
+        return Violation(f"a plan of degree {degree} can't be certified: {MAX_DEGREE} is the highest")
     form, box = _form(degree, 4 if jerk else 3), _box(limits, degree, 4 if jerk else 3)
     with np.errstate(invalid="ignore", over="ignore", under="ignore"):
         c = _shares(a, h, form)
         hull = (form.matrix @ c.reshape(len(c), -1)).reshape(c.shape)
-        hidden = ""
+        hidden = None
         if degree > 3 and _noise(c, form, box):
             exact = _shares(a.astype(np.longdouble), h.astype(np.longdouble), form)
             hidden = _noise(exact, form, box)
@@ -109,7 +123,7 @@ def violation(plan: Plan, limits: Limits, *, jerk: bool) -> str | None:
     if inside.all() and min(h.tolist()) > 0 and not hidden:
         return None
     if not np.isfinite(a).all() or not np.isfinite(h).all() or not (h > 0).all():
-        return "the plan isn't finite"
+        return Violation("the plan isn't finite")
     if degree <= 3:
         doubtful = ~inside.all(axis=(0, 2))
         return _exact(a[doubtful], h[doubtful, None], limits, jerk)
@@ -195,19 +209,19 @@ def _shares(a: NDArray[_Real], h: NDArray[_Real], form: _Form) -> NDArray[_Real]
     return c
 
 
-def _noise(c: NDArray[_Real], form: _Form, box: _Box) -> str:
-    """Say where cancellation of large coefficients hides more than the tolerances; empty if nowhere."""
+def _noise(c: NDArray[_Real], form: _Form, box: _Box) -> Violation | None:
+    """Find where cancellation of large coefficients hides more than the tolerances."""
     # A sum of products of rounded factors, by Higham's bound.
     share = (len(form.exponents) + 4) * float(np.finfo(c.dtype).eps) / 2.0
     error = share * (form.matrix @ np.abs(c).max(axis=1).astype(np.float64)) / box.scale
     if not error.max() > _NOISE:
-        return ""
+        return None
     row, joint = np.unravel_index(int(np.argmax(error)), error.shape)
-    what = _NAMES[int(np.searchsorted(form.first, row, side="right")) - 1]
-    return f"joint {joint + 1}: rounding hides whether its {what} limit is kept"
+    order = int(np.searchsorted(form.first, row, side="right")) - 1
+    return Violation(f"joint {joint + 1}: rounding hides whether its {_NAMES[order]} limit is kept", order)
 
 
-def _halved(hull: Array, inside: NDArray[np.bool_], form: _Form, box: _Box) -> str | None:
+def _halved(hull: Array, inside: NDArray[np.bool_], form: _Form, box: _Box) -> Violation | None:
     """Decide by de Casteljau's halving what the hulls of whole pieces left open."""
     for order in range(len(form.first) - 1):
         rows = slice(form.first[order], form.first[order + 1])
@@ -228,13 +242,15 @@ def _halved(hull: Array, inside: NDArray[np.bool_], form: _Form, box: _Box) -> s
             at_ends = np.maximum(over[:, 0], over[:, -1])
             worst = int(np.argmax(at_ends))
             if at_ends[worst] > _PASSED:
-                return f"joint {joints[worst] + 1} would pass its {_NAMES[order]} limit"
+                return Violation(f"joint {joints[worst] + 1} would pass its {_NAMES[order]} limit", order)
             open_ = over.max(axis=1) > _LET_PASS
             control, joints = control[open_], joints[open_]
             control = np.concatenate([control @ left.T, control @ right.T])
             joints = np.concatenate([joints, joints])
         else:
-            return f"joint {joints[0] + 1}: can't decide whether its {_NAMES[order]} limit is kept"
+            return Violation(
+                f"joint {joints[0] + 1}: can't decide whether its {_NAMES[order]} limit is kept", order
+            )
     return None
 
 
@@ -245,7 +261,7 @@ def _halves(degree: int) -> tuple[Array, Array]:
     return left, left[::-1, ::-1].copy()
 
 
-def _exact(a: Array, h: Array, limits: Limits, jerk: bool) -> str | None:
+def _exact(a: Array, h: Array, limits: Limits, jerk: bool) -> Violation | None:
     """Degree 3 or less: positions at the roots of the velocity, velocities at the roots of the acceleration."""
     c0, c1, c2, c3 = (a[:, k] if k < a.shape[1] else np.zeros_like(a[:, 0]) for k in range(4))
     zero = np.zeros_like(c0)
@@ -262,14 +278,14 @@ def _exact(a: Array, h: Array, limits: Limits, jerk: bool) -> str | None:
     qd = np.abs(c1 + flats * (2.0 * c2 + flats * 3.0 * c3))
     qdd = np.maximum(np.abs(2.0 * c2), np.abs(2.0 * c2 + 6.0 * h * c3))
     over = [
-        ("position", (q - limits.q_max).max((0, 1)) / np.maximum(1.0, np.abs(limits.q_max))),
-        ("position", (limits.q_min - q).max((0, 1)) / np.maximum(1.0, np.abs(limits.q_min))),
-        ("speed", qd.max((0, 1)) / limits.qd_max - 1.0),
-        ("acceleration", qdd.max(0) / limits.qdd_max - 1.0),
+        (0, (q - limits.q_max).max((0, 1)) / np.maximum(1.0, np.abs(limits.q_max))),
+        (0, (limits.q_min - q).max((0, 1)) / np.maximum(1.0, np.abs(limits.q_min))),
+        (1, qd.max((0, 1)) / limits.qd_max - 1.0),
+        (2, qdd.max(0) / limits.qdd_max - 1.0),
     ]
     if jerk:
-        over.append(("jerk", np.abs(6.0 * c3).max(0) / limits.qddd_max - 1.0))
-    for what, excess in over:
+        over.append((3, np.abs(6.0 * c3).max(0) / limits.qddd_max - 1.0))
+    for order, excess in over:
         if excess.max() > TOLERANCE:
-            return f"joint {int(np.argmax(excess)) + 1} would pass its {what} limit"
+            return Violation(f"joint {int(np.argmax(excess)) + 1} would pass its {_NAMES[order]} limit", order)
     return None

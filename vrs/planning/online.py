@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vrs.model import Array, Limits
-from vrs.planning.certificate import TOLERANCE, Bounds, bounds, violation
+from vrs.planning.certificate import TOLERANCE, Bounds, bounds, find_violation
 from vrs.planning.plan import TAYLOR, Plan, end_state, integrate, packed
 from vrs.segment import State
 
@@ -181,10 +181,10 @@ def online(start: State, goal: State, speed: float, limits: Limits, *, order: in
             sure, plan = made.keeps(limits), made.plan()
         else:
             sure, plan = False, made
-        problem = None if sure else violation(plan, limits, jerk=order == 3)
+        problem = None if sure else find_violation(plan, limits, jerk=order == 3)
         if problem is None:
             return plan
-        if "position" in problem:
+        if problem.derivative == 0:
             # A way round that a margin of the other limits doesn't shorten.
             return None
     return None
