@@ -25,7 +25,6 @@ from interfaces.val2.syntax import (
     Assign,
     Call,
     Case,
-    Decompose,
     Expression,
     For,
     Format,
@@ -35,7 +34,6 @@ from interfaces.val2.syntax import (
     Number,
     Program,
     React,
-    Set,
     Statement,
     Step,
     Unary,
@@ -260,9 +258,9 @@ def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
 def _given(statement: Statement) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
-        case Assign() | For() | Decompose():
+        case Assign(keyword="" | "DECOMPOSE") | For():
             return "real"
-        case Set() | Instruction("HERE"):
+        case Assign() | Instruction("HERE"):
             return "frame"
     return ""
 

@@ -22,36 +22,25 @@ from interfaces.val2.memory import MOST_DIMENSIONS, VariableSlot, index, mismatc
 from interfaces.val2.signals import reaction_to
 from interfaces.val2.structure import StructureBlock, structure
 from interfaces.val2.syntax import (
-    AnyValue,
     Assign,
-    Blank,
     Call,
     Case,
-    Decompose,
-    Do,
-    Else,
-    EndBlock,
-    Exit,
+    Conditional,
     Expression,
     For,
     Goto,
-    If,
-    IfGoto,
     Ignored,
     Instruction,
     Local,
-    Next,
+    LoopJump,
+    PlainStatement,
     Program,
     Prompt,
     React,
-    Return,
-    Set,
     Step,
     Type,
-    Until,
     Value,
     Variable,
-    While,
 )  # fmt: skip
 from interfaces.val2.values import Location, Transformation, to_oat
 
@@ -120,30 +109,28 @@ class _Compiler:
     def statement(self, i: int, step: Step) -> StepFunction:
         context, x, following, jumps = self.context, self.x, i + 1, self.structure.jumps
         match step.statement:
-            case Blank() | Do() | AnyValue() as plain:
-                target = self._past(i) if isinstance(plain, AnyValue) else following
-                return lambda _: target
-            case Local():
+            case PlainStatement.BLANK | PlainStatement.DO | Local():
                 return lambda _: following
-            case Value() | Else():
+            case Value() | PlainStatement.ELSE | PlainStatement.ANY:
                 target = self._past(i)
                 return lambda _: target
-            case EndBlock():
+            case PlainStatement.END:
                 return self._end(i)
+            case PlainStatement.RETURN:
+                return self._leave()
+            case Assign(name, value, "SET"):
+                return self._set(name, value, following)
+            case Assign(name, value, "DECOMPOSE"):
+                return self._decompose(name, value, following)
             case Assign(name, value):
                 return self._assign(name, value, following)
-            case Set(name, value):
-                return self._set(name, value, following)
-            case If(condition) | While(condition):
+            case Conditional(_, condition):
                 test, otherwise = x.condition(condition), jumps[i]
                 return lambda s: following if test(s) else otherwise
-            case Until(condition):
-                test, again = x.condition(condition), jumps[i]
-                return lambda s: following if test(s) else again
-            case IfGoto(condition):
+            case Goto(_, condition) if condition is not None:
                 test, target = x.condition(condition), jumps[i]
                 return lambda s: target if test(s) else following
-            case Goto() | Exit() | Next():
+            case Goto() | LoopJump():
                 target = jumps[i]
                 return lambda _: target
             case For() as loop:
@@ -152,14 +139,10 @@ class _Compiler:
                 return self._case(i, value)
             case Call() as call:
                 return self._call(call, following)
-            case Return():
-                return self._leave()
             case Type(items):
                 return type_step(x, items, following)
             case Prompt() as prompt:
                 return prompt_step(x, prompt, following)
-            case Decompose() as decompose:
-                return self._decompose(decompose, following)
             case React() as react:
                 return self._react(react, following)
             case Ignored(keyword, _, at) if keyword in UNAVAILABLE:
@@ -197,7 +180,7 @@ class _Compiler:
     def _end(self, i: int) -> StepFunction:
         block = self._block(i)
         head = self.program.steps[block.start].statement
-        if isinstance(head, While):
+        if isinstance(head, Conditional) and head.keyword == "WHILE":
             start = block.start
             return lambda _: start
         following = i + 1
@@ -305,14 +288,14 @@ class _Compiler:
 
         return assign_any
 
-    def _decompose(self, d: Decompose, following: int) -> StepFunction:
+    def _decompose(self, target: Variable, e: Expression, following: int) -> StepFunction:
         """Six numbers, from the element that is named on; from 0 where none is."""
-        x, context, memory, target = self.x, self.context, self.context.memory, d.target
+        x, context, memory = self.x, self.context, self.context.memory
         if target.prefix:
             raise mismatch(target)
         if len(target.indices) > MOST_DIMENSIONS:
             raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=where(target.at))
-        read, place = x.location(d.value), x.slot(target.name)
+        read, place = x.location(e), x.slot(target.name)
         first = [x.real(i) for i in target.indices] or [lambda _: 0.0]
 
         def decompose(s: Slots) -> int:

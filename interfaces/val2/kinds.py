@@ -15,25 +15,21 @@ from interfaces.val2.syntax import (
     Call,
     Case,
     Compound,
-    Decompose,
+    Conditional,
     Expression,
     For,
     Format,
-    If,
-    IfGoto,
+    Goto,
     Instruction,
     Number,
     Prompt,
     React,
-    Set,
     Statement,
     Text,
     Type,
     Unary,
-    Until,
     Value,
     Variable,
-    While,
 )
 
 
@@ -63,12 +59,12 @@ def parts(expression: Expression) -> Iterator[Expression]:
 def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
     """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
     match statement:
+        case Assign(target, value, "SET"):
+            yield value, "point" if target.prefix == "#" else "frame"
+        case Assign(_, value, "DECOMPOSE"):
+            yield value, "location"
         case Assign(target, value):
             yield value, "string" if target.prefix == "$" else "real"
-        case Set(target, value):
-            yield value, "point" if target.prefix == "#" else "frame"
-        case Decompose(_, value):
-            yield value, "location"
         case Instruction("HERE", (Compound(parts=(*others, _)),)):
             yield from ((other, "frame") for other in others)
         case Instruction("HERE"):
@@ -81,7 +77,7 @@ def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
             for i, operand in enumerate(operands):
                 if operand is not None and slots:
                     yield operand, slots[min(i, len(slots) - 1)].kind
-        case If(condition) | IfGoto(condition) | While(condition) | Until(condition):
+        case Conditional(_, condition) | Goto(_, condition) if condition is not None:
             yield condition, "real"
         case For(_, start, stop, step):
             yield from ((part, "real") for part in (start, stop, step) if part is not None)
@@ -106,7 +102,7 @@ def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
 def writes(statement: Statement) -> Iterator[Variable]:
     """The variables that a statement may set."""
     match statement:
-        case Assign(target) | Set(target) | Decompose(target):
+        case Assign(target):
             yield target
         case Instruction("HERE", (Variable() as target,)):
             yield target
@@ -128,7 +124,7 @@ def writes(statement: Statement) -> Iterator[Variable]:
 def _decoded(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
     """Where `$DECODE` may stand, which shortens its first argument."""
     match statement:
-        case Assign(value=value):
+        case Assign(_, value, ""):
             yield value, "any"
         case Type(items):
             yield from ((item, "any") for item in items if not isinstance(item, Format))

@@ -7,44 +7,33 @@ from typing import Final
 
 from interfaces.val2 import forms
 from interfaces.val2.syntax import (
-    AnyValue,
     Apply,
     Assign,
     Binary,
-    Blank,
     Call,
     Case,
     Compound,
-    Decompose,
-    Do,
-    Else,
-    EndBlock,
-    Exit,
+    Conditional,
     Expression,
     For,
     Format,
     Goto,
-    If,
-    IfGoto,
     Ignored,
     Instruction,
     Local,
-    Next,
+    LoopJump,
     Number,
+    PlainStatement,
     Program,
     Prompt,
     React,
-    Return,
-    Set,
     Statement,
     Step,
     Text,
     Type,
     Unary,
-    Until,
     Value,
     Variable,
-    While,
 )
 
 INDENT: Final = 2
@@ -155,27 +144,21 @@ def _format(item: Format) -> str:
     return f"/{item.code}{width}" + ("" if item.decimals is None else f".{item.decimals}")
 
 
+_OPENING: Final = {"IF": "THEN", "WHILE": "DO", "UNTIL": ""}
+"""What stands behind the condition of a keyword."""
+
+
 def print_statement(statement: Statement) -> str:
     """The text of a statement."""
     match statement:
-        case Blank():
-            return ""
-        case Assign(target, value):
-            return f"{_variable(target)} = {print_expression(value)}"
-        case Set(target, value):
-            return f"SET {_variable(target)} = {print_expression(value)}"
-        case Decompose(target, value):
-            return f"DECOMPOSE {_variable(target)} = {print_expression(value)}"
+        case PlainStatement():
+            return statement.value
+        case Assign(target, value, keyword):
+            return f"{keyword} {_variable(target)} = {print_expression(value)}".lstrip()
         case Instruction():
             return _instruction(statement)
-        case If(condition):
-            return f"IF {print_expression(condition)} THEN"
-        case IfGoto(condition, label):
-            return f"IF {print_expression(condition)} GOTO {label}"
-        case While(condition):
-            return f"WHILE {print_expression(condition)} DO"
-        case Until(condition):
-            return f"UNTIL {print_expression(condition)}"
+        case Conditional(keyword, condition):
+            return f"{keyword} {print_expression(condition)} {_OPENING[keyword]}".rstrip()
         case For(variable, start, stop, step):
             head = f"FOR {_variable(variable)} = {print_expression(start)} TO {print_expression(stop)}"
             return head if step is None else f"{head} STEP {print_expression(step)}"
@@ -183,22 +166,10 @@ def print_statement(statement: Statement) -> str:
             return f"CASE {print_expression(value)} OF"
         case Value(values):
             return f"VALUE {_listed(values)}:"
-        case Else():
-            return "ELSE"
-        case EndBlock():
-            return "END"
-        case Do():
-            return "DO"
-        case AnyValue():
-            return "ANY"
-        case Return():
-            return "RETURN"
-        case Exit(count):
-            return "EXIT" if count == 1 else f"EXIT {count}"
-        case Next(count):
-            return "NEXT" if count == 1 else f"NEXT {count}"
-        case Goto(label):
-            return f"GOTO {label}"
+        case LoopJump(keyword, count):
+            return keyword if count == 1 else f"{keyword} {count}"
+        case Goto(label, condition):
+            return f"GOTO {label}" if condition is None else f"IF {print_expression(condition)} GOTO {label}"
         case _:
             return _other(statement)
 
@@ -262,12 +233,12 @@ def print_program(program: Program) -> str:
 def _shape(statement: Statement) -> tuple[int, int]:
     """How many levels a statement stands further out, and how many what follows it stands further in."""
     match statement:
-        case If() | While() | For() | Case() | Do():
-            return 0, 1
-        case Else() | Value() | AnyValue():
-            return 1, 1
-        case EndBlock() | Until():
+        case PlainStatement.END | Conditional("UNTIL"):
             return 1, 0
+        case PlainStatement.ELSE | Value() | PlainStatement.ANY:
+            return 1, 1
+        case Conditional() | For() | Case() | PlainStatement.DO:
+            return 0, 1
     return 0, 0
 
 

@@ -12,40 +12,30 @@ from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.forms import MISSING, TOO_MANY, InstructionForm, nearest
 from interfaces.val2.grammar import Node, Worded
 from interfaces.val2.syntax import (
-    AnyValue,
     Apply,
     Assign,
     Call,
     Case,
     Compound,
-    Decompose,
-    Do,
-    Else,
-    EndBlock,
-    Exit,
+    Conditional,
     Expression,
     For,
     Format,
     Goto,
-    If,
-    IfGoto,
     Ignored,
     Instruction,
     Local,
-    Next,
+    LoopJump,
     Number,
+    PlainStatement,
     Prompt,
     React,
-    Return,
-    Set,
     Statement,
     Text,
     Type,
     Unary,
-    Until,
     Value,
     Variable,
-    While,
 )
 
 HIGHEST_LABEL: Final = 65535
@@ -271,7 +261,7 @@ def assignment(rest: OperandText) -> Statement:
     """`x = 3`, or a location without SET before it."""
     target, value = _assigned(rest)
     located = target.prefix == "#" or _is_location(value)
-    return Set(target, value) if located else Assign(target, value)
+    return Assign(target, value, "SET" if located else "")
 
 
 def _assigned(rest: OperandText) -> tuple[Variable, Expression]:
@@ -335,24 +325,21 @@ def _at(keyword: str, rest: OperandText) -> Statement:
     return replace(made, begins=rest.expression(time))
 
 
-def _nothing(make: Callable[[], Statement]) -> Callable[[str, OperandText], Statement]:
-    def read(keyword: str, rest: OperandText) -> Statement:
-        if not rest.empty:
-            detail = f"unexpected '{rest.text.strip()}' behind {keyword}; allowed: the end of the line"
-            raise ValError("Syntax error", detail, place=rest.start)
-        return make()
-
-    return read
+def _plain(keyword: str, rest: OperandText) -> Statement:
+    if not rest.empty:
+        detail = f"unexpected '{rest.text.strip()}' behind {keyword}; allowed: the end of the line"
+        raise ValError("Syntax error", detail, place=rest.start)
+    return PlainStatement(keyword)
 
 
 def _set(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
-    return Set(*_assigned(rest))
+    return Assign(*_assigned(rest), "SET")
 
 
 def _decompose(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
-    return Decompose(*_assigned(rest))
+    return Assign(*_assigned(rest), "DECOMPOSE")
 
 
 def _shift(keyword: str, rest: OperandText) -> Statement:
@@ -362,7 +349,7 @@ def _shift(keyword: str, rest: OperandText) -> Statement:
     if len(values) > 3:
         raise ValError(TOO_MANY, f"allowed: {forms.INSTRUCTIONS[keyword].usage}", place=rest.end)
     target = grammar.variable(first, rest.line)
-    return Set(target, Apply("SHIFT", (target, *values), rest.at))
+    return Assign(target, Apply("SHIFT", (target, *values), rest.at), "SET")
 
 
 def _timer(keyword: str, rest: OperandText) -> Statement:
@@ -428,8 +415,8 @@ def _if(keyword: str, rest: OperandText) -> Statement:
     condition, *others = rest.tree("branch")
     built = rest.expression(condition)
     if others and others[-1].type == "NUMBER":
-        return IfGoto(built, label(others[-1], rest), rest.at)
-    return If(built)
+        return Goto(label(others[-1], rest), built, rest.at)
+    return Conditional("IF", built)
 
 
 def _goto(keyword: str, rest: OperandText) -> Statement:
@@ -437,17 +424,17 @@ def _goto(keyword: str, rest: OperandText) -> Statement:
     if len(operands) != 1 or operands[0][1]:
         detail = f"allowed: {forms.INSTRUCTIONS[keyword].usage}"
         raise ValError(MISSING if rest.empty else "Syntax error", detail, place=rest.end)
-    return Goto(label_of(operands[0][0], rest), rest.at)
+    return Goto(label_of(operands[0][0], rest), at=rest.at)
 
 
 def _while(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
-    return While(rest.expression(rest.tree("while")[0]))
+    return Conditional("WHILE", rest.expression(rest.tree("while")[0]))
 
 
 def _until(keyword: str, rest: OperandText) -> Statement:
     rest.require(forms.INSTRUCTIONS[keyword])
-    return Until(rest.expression(rest.tree("until")[0]))
+    return Conditional("UNTIL", rest.expression(rest.tree("until")[0]))
 
 
 def _case(keyword: str, rest: OperandText) -> Statement:
@@ -470,7 +457,7 @@ def _value(keyword: str, rest: OperandText) -> Statement:
 
 def _any(keyword: str, rest: OperandText) -> Statement:
     rest.text = rest.text.rstrip().removesuffix(":")
-    return _nothing(AnyValue)(keyword, rest)
+    return _plain(keyword, rest)
 
 
 def _for(keyword: str, rest: OperandText) -> Statement:
@@ -487,7 +474,7 @@ def _loops(keyword: str, rest: OperandText) -> Statement:
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
     if text and not (plain and 1 <= (count := int(text)) <= MOST_LOOPS):
         raise ValError("Syntax error", f"allowed: a number of loops, 1 to {MOST_LOOPS}", place=rest.start)
-    return Exit(count, rest.at) if keyword == "EXIT" else Next(count, rest.at)
+    return LoopJump("EXIT" if keyword == "EXIT" else "NEXT", count, rest.at)
 
 
 def _call(keyword: str, rest: OperandText) -> Statement:
@@ -554,10 +541,10 @@ _OWN: Final[dict[str, Callable[[str, OperandText], Statement]]] = {
     "REACT": _react,
     "REACTI": _react,
     "IF": _if,
-    "ELSE": _nothing(Else),
-    "END": _nothing(EndBlock),
+    "ELSE": _plain,
+    "END": _plain,
     "WHILE": _while,
-    "DO": _nothing(Do),
+    "DO": _plain,
     "UNTIL": _until,
     "FOR": _for,
     "CASE": _case,
@@ -568,7 +555,7 @@ _OWN: Final[dict[str, Callable[[str, OperandText], Statement]]] = {
     "GOTO": _goto,
     "CALL": _call,
     "GOSUB": _call,
-    "RETURN": _nothing(Return),
+    "RETURN": _plain,
     "TYPE": lambda _, rest: Type(items(rest)),
     "PROMPT": _prompt,
     "AUTO": _local,

@@ -10,31 +10,20 @@ from typing import Final, Literal, TypeAlias
 from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.memory import where
 from interfaces.val2.syntax import (
-    AnyValue,
     Assign,
-    Blank,
     Case,
-    Decompose,
-    Do,
-    Else,
-    EndBlock,
-    Exit,
+    Conditional,
     For,
     Goto,
-    If,
-    IfGoto,
     Instruction,
     Local,
-    Next,
+    LoopJump,
     Number,
+    PlainStatement,
     Program,
-    Return,
-    Set,
     Step,
     Type,
-    Until,
     Value,
-    While,
 )  # fmt: skip
 
 BlockKind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
@@ -141,33 +130,31 @@ class _Surveyor:
 
     def _step(self, i: int, step: Step) -> None:
         match step.statement:
-            case If():
-                self._begin("IF", i)
-            case While():
-                self._begin("WHILE", i)
-            case Do():
+            case Conditional("UNTIL"):
+                self._until(i)
+            case Conditional("IF" | "WHILE" as keyword):
+                self._begin(keyword, i)
+            case PlainStatement.DO:
                 self._begin("DO", i)
             case For():
                 self._begin("FOR", i)
             case Case():
                 self._begin("CASE", i)
-            case Else():
+            case PlainStatement.ELSE:
                 self._else(i)
             case Value():
                 self._value(i, last=False)
-            case AnyValue():
+            case PlainStatement.ANY:
                 self._value(i, last=True)
-            case EndBlock():
+            case PlainStatement.END:
                 self._end(i)
-            case Until():
-                self._until(i)
-            case Exit(count, at) | Next(count, at):
-                self._loop(i, count, at, leaves=isinstance(step.statement, Exit))
-            case Goto(label, at) | IfGoto(_, label, at):
+            case LoopJump(keyword, count, at):
+                self._loop(i, keyword, count, at)
+            case Goto(label, _, at):
                 self._goto(i, label, at)
             case Instruction("GRASP", (_, Number(label))):
                 self._goto(i, int(label), step.statement.at)
-            case Blank():
+            case PlainStatement.BLANK:
                 pass
             case _ if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
                 self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
@@ -232,22 +219,21 @@ class _Surveyor:
                 self.jumps[i] = block.start + 1
             case "CASE":
                 for arm, following in zip((block.start, *block.arms), (*block.arms, i + 1), strict=True):
-                    if not isinstance(self._program.steps[arm].statement, AnyValue):
+                    if self._program.steps[arm].statement is not PlainStatement.ANY:
                         self.jumps[arm] = following
         self.jumps.update(dict.fromkeys(inner.exits, i + 1))
         self.jumps.update(dict.fromkeys(inner.nexts, i))
 
-    def _loop(self, i: int, count: int, at: TextPosition, *, leaves: bool) -> None:
+    def _loop(self, i: int, word: Literal["EXIT", "NEXT"], count: int, at: TextPosition) -> None:
         loops = [block for block in self._open if block.kind in _LOOPS]
         if count > len(loops):
-            word = "EXIT" if leaves else "NEXT"
             shown = word if count == 1 else f"{word} {count}"
             detail = (
                 f"{shown} is allowed within {'a loop' if count == 1 else f'{count} loops'}; here are {len(loops)}"
             )
             self._fail(i, detail, at=at)
         else:
-            (loops[-count].exits if leaves else loops[-count].nexts).append(i)
+            (loops[-count].exits if word == "EXIT" else loops[-count].nexts).append(i)
 
     def _goto(self, i: int, label: int, at: TextPosition) -> None:
         if label in self.labels:
@@ -266,22 +252,9 @@ _MEANWHILE: Final = {
 def standalone_error(step: Step, at: TextPosition) -> ValError | None:
     """Why a step can't stand alone, as DO wants it; None if it can."""
     match step.statement:
-        case (
-            If()
-            | Else()
-            | EndBlock()
-            | While()
-            | Do()
-            | Until()
-            | For()
-            | Case()
-            | Value()
-            | AnyValue()
-            | Exit()
-            | Next()
-        ):
-            return ValError("Control structure error", "it's for programs", place=where(at))
-        case Goto() | IfGoto() | Return() | Local():
+        case PlainStatement.BLANK:
+            return None
+        case PlainStatement() | Conditional() | For() | Case() | Value() | LoopJump() | Goto() | Local():
             return ValError("Control structure error", "it's for programs", place=where(at))
         case _:
             return None
@@ -290,7 +263,7 @@ def standalone_error(step: Step, at: TextPosition) -> ValError | None:
 def runs_beside_program(step: Step) -> bool:
     """Whether a step takes no time and moves nothing."""
     match step.statement:
-        case Assign() | Set() | Type() | Decompose():
+        case Assign() | Type():
             return True
         case Instruction(keyword, _, words):
             return keyword in _MEANWHILE and (keyword != "SPEED" or "MONITOR" in words)

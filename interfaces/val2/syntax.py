@@ -8,7 +8,8 @@ alone are equal.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from enum import StrEnum
+from typing import Literal, TypeAlias
 
 from interfaces.val2.errors import TextPosition
 
@@ -90,25 +91,30 @@ class Compound:
 Expression: TypeAlias = Number | Text | Variable | Apply | Unary | Binary | Compound
 
 
-@dataclass(frozen=True, slots=True)
-class Blank:
+class PlainStatement(StrEnum):
+    """A statement that is its keyword alone."""
+
+    BLANK = ""
     """Nothing, or a comment alone."""
+    ELSE = "ELSE"
+    END = "END"
+    """Of an `IF`, `WHILE`, `FOR` or `CASE`."""
+    DO = "DO"
+    """Until `UNTIL`."""
+    ANY = "ANY"
+    """Of a `CASE`."""
+    RETURN = "RETURN"
+    """From a program that was called."""
 
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """`x = 3`, `$s = "a"`: a real or a string, or an element of an array."""
+    """`x = 3`, `SET p = a:b` or `DECOMPOSE a[1] = location`: variables get a value."""
 
     target: Variable
     value: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Set:
-    """`SET p = a:b`, `SET #p = #PPOINT(..)`: a location."""
-
-    target: Variable
-    value: Expression
+    keyword: Literal["", "SET", "DECOMPOSE"] = ""
+    """Nothing for a real or a string, `SET` for a location, `DECOMPOSE` for six numbers from an element on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,47 +133,10 @@ class Instruction:
 
 
 @dataclass(frozen=True, slots=True)
-class If:
-    """`IF condition THEN`."""
+class Conditional:
+    """`IF condition THEN`, `WHILE condition DO` or `UNTIL condition`."""
 
-    condition: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class IfGoto:
-    """`IF condition GOTO label`."""
-
-    condition: Expression
-    label: int
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Else:
-    """`ELSE`."""
-
-
-@dataclass(frozen=True, slots=True)
-class EndBlock:
-    """`END` of an `IF`, `WHILE`, `FOR` or `CASE`."""
-
-
-@dataclass(frozen=True, slots=True)
-class While:
-    """`WHILE condition DO`."""
-
-    condition: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Do:
-    """`DO`, until `UNTIL`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Until:
-    """`UNTIL condition`."""
-
+    keyword: Literal["IF", "WHILE", "UNTIL"]
     condition: Expression
 
 
@@ -196,31 +165,20 @@ class Value:
 
 
 @dataclass(frozen=True, slots=True)
-class AnyValue:
-    """`ANY` of a `CASE`."""
+class LoopJump:
+    """`EXIT n` leaves the n innermost loops, `NEXT n` goes to the next turn of the n-th innermost one."""
 
-
-@dataclass(frozen=True, slots=True)
-class Exit:
-    """`EXIT n`: leave the n innermost loops."""
-
-    count: int = 1
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Next:
-    """`NEXT n`: go to the next turn of the n-th innermost loop."""
-
+    keyword: Literal["EXIT", "NEXT"]
     count: int = 1
     at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Goto:
-    """`GOTO label`."""
+    """`GOTO label`, or `IF condition GOTO label`."""
 
     label: int
+    condition: Expression | None = None
     at: TextPosition = field(default=NOWHERE, compare=False)
 
 
@@ -233,11 +191,6 @@ class Call:
     keyword: str = "CALL"
     """`CALL` or `GOSUB`."""
     at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Return:
-    """`RETURN` from a program that was called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,14 +232,6 @@ class Prompt:
 
 
 @dataclass(frozen=True, slots=True)
-class Decompose:
-    """`DECOMPOSE a[1] = location`: six numbers from an element of an array on."""
-
-    target: Variable
-    value: Expression
-
-
-@dataclass(frozen=True, slots=True)
 class Local:
     """`AUTO x, y[10]`, `LOCAL x`, `GLOBAL x`: names of the program's own."""
 
@@ -308,8 +253,8 @@ class Ignored:
 
 
 Statement: TypeAlias = (
-    Blank | Assign | Set | Instruction | If | IfGoto | Else | EndBlock | While | Do | Until | For | Case | Value
-    | AnyValue | Exit | Next | Goto | Call | Return | React | Type | Prompt | Decompose | Local | Ignored
+    PlainStatement | Assign | Instruction | Conditional | For | Case | Value | LoopJump | Goto | Call | React | Type
+    | Prompt | Local | Ignored
 )  # fmt: skip
 
 

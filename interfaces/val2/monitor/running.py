@@ -11,7 +11,11 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Style, TerminalState, integer, named, nothing, pieces
 from interfaces.val2.statements import timed
-from interfaces.val2.syntax import Blank, Call, Expression
+from interfaces.val2.syntax import (
+    Call,
+    Expression,
+    PlainStatement,
+)
 
 FOREVER: Final = -1
 """Cycles that never end."""
@@ -23,7 +27,7 @@ _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 def do(state: TerminalState, rest: str) -> None:
     """DO instruction; DO alone does the last again."""
     step = state.step(rest) if rest else state.last_do
-    if step is None or isinstance(step.statement, Blank):
+    if step is None or step.statement is PlainStatement.BLANK:
         raise ValError("Missing argument", "DO what? An instruction follows, such as DO READY")
     state.last_do = step
     state.controller.do(step, now=state.now)

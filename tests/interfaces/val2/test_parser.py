@@ -18,28 +18,24 @@ from interfaces.val2.structure import survey
 from interfaces.val2.syntax import (
     Apply,
     Assign,
-    Blank,
     Call,
-    Decompose,
-    EndBlock,
-    Exit,
+    Conditional,
     For,
     Format,
-    If,
-    IfGoto,
+    Goto,
     Ignored,
     Instruction,
     Local,
+    LoopJump,
     Number,
+    PlainStatement,
     Prompt,
     React,
-    Set,
     Text,
     Type,
     Unary,
     Value,
     Variable,
-    While,
 )
 
 PROGRAMS = sorted((Path(__file__).parent / "programs").glob("*.v2"))
@@ -97,15 +93,15 @@ def statement(text):
         ("HERE a:b", statement("here A:B")),
         ("x = 3", Assign(name("x"), number(3))),
         ('$s[2] = "a;b"', Assign(Variable("$s", (number(2),)), Text("a;b"))),
-        ("SET p = NULL", Set(name("p"), Apply("NULL"))),
-        ("p = TRANS(1,,3)", Set(name("p"), Apply("TRANS", (number(1), None, number(3))))),
-        ("SHIFT p BY 1,,3", Set(name("p"), Apply("SHIFT", (name("p"), number(1), None, number(3))))),
-        ("DECOMPOSE a[1] = p", Decompose(Variable("a", (number(1),)), name("p"))),
-        ("IF a THEN", If(name("a"))),
-        ("IF a GOTO 10", IfGoto(name("a"), 10)),
+        ("SET p = NULL", Assign(name("p"), Apply("NULL"), "SET")),
+        ("p = TRANS(1,,3)", Assign(name("p"), Apply("TRANS", (number(1), None, number(3))), "SET")),
+        ("SHIFT p BY 1,,3", Assign(name("p"), Apply("SHIFT", (name("p"), number(1), None, number(3))), "SET")),
+        ("DECOMPOSE a[1] = p", Assign(Variable("a", (number(1),)), name("p"), "DECOMPOSE")),
+        ("IF a THEN", Conditional("IF", name("a"))),
+        ("IF a GOTO 10", Goto(10, name("a"))),
         ("FOR i = 1 TO n STEP 2", For(name("i"), number(1), name("n"), number(2))),
         ("VALUE 1, -2:", Value((number(1), Unary("-", number(2))))),
-        ("EXIT 2", Exit(2)),
+        ("EXIT 2", LoopJump("EXIT", 2)),
         ("CALL a.b(x, , y[])", Call("a.b", (name("x"), None, Variable("y", array=True)))),
         ("GOSUB sub", Call("sub", (), "GOSUB")),
         ("REACT 1001, halt.it ALWAYS", React(number(1001), "halt.it", always=True)),
@@ -125,7 +121,7 @@ def test_a_line_has_a_label_a_comment_and_places():
     (operand,) = step.statement.operands
     assert (operand.at, operand.parts[1].at) == (TextPosition(1, 13), TextPosition(1, 15))
     assert parse_line("") == parse_line("   \t")
-    assert parse_line("").statement == Blank()
+    assert parse_line("").statement == PlainStatement.BLANK
     assert parse_line("7 ;x").label == 7
     assert parse_line("REMARK it's \"so; or").comment == "it's \"so; or"
     program = parse_program("\n.PROGRAM p\r\n x = 1\r  y = -\t2\n.END")
@@ -180,7 +176,9 @@ def test_slips_are_survived(text, printed):
 @pytest.mark.parametrize("last", [".END", ".end ", ""])
 def test_heads_ends_and_line_ends(ends, head, last):
     program = parse_program(ends.join(["; of the file", head, "", " move a", "end", last]))
-    assert (program.name, [type(step.statement) for step in program.steps]) == ("p", [Blank, Instruction, EndBlock])
+    blank, move, end = (step.statement for step in program.steps)
+    assert (program.name, blank, end) == ("p", PlainStatement.BLANK, PlainStatement.END)
+    assert isinstance(move, Instruction)
 
 
 def test_what_has_no_meaning_is_kept_as_it_is_written():
@@ -194,7 +192,7 @@ def test_words_are_keywords_only_where_they_can_stand():
     for word in ("speed", "move", "then", "always", "end", "for", "value"):
         assert statement(f"{word} = {word} + 1") == statement(f"{word}= {word}+1")
         assert isinstance(statement(f"{word} = 1"), Assign)
-    assert isinstance(statement("WHILE do DO"), While)
+    assert statement("WHILE do DO") == Conditional("WHILE", name("do"))
 
 
 @pytest.mark.parametrize(
