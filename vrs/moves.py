@@ -298,18 +298,21 @@ class Passer:
         ready = starting(onward, limits, _straight(command, self.model))
         known = _straight(self.before, self.model)
         most = inf if self.now is None else (t - self.now) * pace
-        found = continuous(quick, onward, most, (braking(quick, limits, known), ready), limits, jerk=self.jerky)
-        if found.delta > 0.0:
-            return self._at(max(self._before(found.delta), begin), found.plan, found.delta, notes)
+        delta, plan = continuous(
+            quick, onward, most, (braking(quick, limits, known), ready), limits, jerk=self.jerky
+        )
+        if delta > 0.0:
+            return self._at(max(self._before(delta), begin), plan, delta, notes)
         again = None
         if self.before is not None and self.before.deviation < inf and (self.now is None or begin >= self.now):
             again = self.slower_first(scale_limits(limits, 0.5), begin)
         if again is not None:
             slow, more = again
-            found = continuous(slow, onward, inf, (braking(slow, limits, known), ready), limits, jerk=self.jerky)
-            if found.delta > 0.0:
-                lead = _until(slow, slow.duration - found.delta)
-                return self._at(begin, lead.then(found.plan), found.delta, joined(more, notes))
+            ramps = braking(slow, limits, known), ready
+            delta, plan = continuous(slow, onward, inf, ramps, limits, jerk=self.jerky)
+            if delta > 0.0:
+                lead = _until(slow, slow.duration - delta)
+                return self._at(begin, lead.then(plan), delta, joined(more, notes))
         return _Way(t, second, joined(notes, STOPS))
 
     def _before(self, delta: float) -> float:

@@ -29,6 +29,14 @@ class WorldClosedError(VrsError):
         super().__init__("this PyBullet world is closed: make a new one")
 
 
+class LostError(VrsError):
+    """A simulated robot whose state left every sensible range, or that fell over; it's of no more use."""
+
+    def __init__(self, what: str, time: float, problem: str, cause: str = "") -> None:
+        self.time, self.problem = time, problem
+        super().__init__(f"the simulated {what} {problem} at {time:.3f} s{cause}")
+
+
 def load_pybullet() -> Any:
     """Import PyBullet without the build date that its C++ part writes to descriptor 2."""
     if isinstance(loaded := sys.modules.get("pybullet"), ModuleType):

@@ -20,11 +20,11 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from robots.bullet.serial_arm import RigidLink, quaternion
-from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, RoomBodies, World
+from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, LostError, RoomBodies, World
 from robots.ipr.chassis import Chassis, MobileReality
 from robots.ipr.robot import MobileRobot
 from vrs.checks import finite, validated, within
-from vrs.errors import InvalidValueError, VrsError
+from vrs.errors import InvalidValueError
 from vrs.model import Array
 
 DRIVES = (0, 1)
@@ -33,18 +33,6 @@ _FREE_SPEED = 1e6
 _BALL_FRICTION = 0.02
 _BODY_FRICTION = 0.3
 _FLAT = [0.0, 0.0, 0.0, 1.0]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Loaded:
-    """A chassis in a world."""
-
-    body: int
-    """PyBullet's body id."""
-    centre: Array
-    """Centre of mass of the base [m], (3,), in the robot's frame."""
-    R_CR: Array
-    """Turns vectors from the robot's frame into the frame that PyBullet tells, along the principal axes; (3, 3)."""
 
 
 @dataclass(slots=True)
@@ -116,7 +104,7 @@ def load_chassis(
     posture: tuple[float, float, float],
     radii: tuple[float, float],
     base: float,
-) -> Loaded:
+) -> tuple[int, Array, Array]:
     """Put a chassis into a world, standing on the floor.
 
     Args:
@@ -200,7 +188,7 @@ def load_chassis(
         forces=[links[j].resistance for j in turning],
         physicsClientId=client,
     )
-    return Loaded(int(body), rigid.centre, R_principal.T)
+    return int(body), rigid.centre, R_principal.T
 
 
 _GAP = 0.002
@@ -278,14 +266,6 @@ _UPRIGHT = 0.7
 """Cosine of the tilt beyond which a robot has fallen."""
 
 
-class LostError(VrsError):
-    """The robot's state left every sensible range, or it fell over; the robot is of no more use."""
-
-    def __init__(self, time: float, problem: str) -> None:
-        self.time, self.problem = time, problem
-        super().__init__(f"the simulated robot {problem} at {time:.3f} s")
-
-
 class Wheel(NamedTuple):
     """What a driven wheel does."""
 
@@ -312,10 +292,9 @@ class MobileBody(MobileRobot):
         self._cargo: list[CargoBody] = []
         train, dt = self._train, self.reality.dt
         start = self._truth
-        loaded = load_chassis(self.world, self.chassis, self.reality, start, train.radii, train.base)
-        self.body_id = loaded.body
-        """PyBullet's id of the robot."""
-        self._centre, self._R_CR = loaded.centre, loaded.R_CR
+        self.body_id, self._centre, self._R_CR = load_chassis(
+            self.world, self.chassis, self.reality, start, train.radii, train.base
+        )
         limited = self.reality.torque_limits
         self._torques = [self.chassis.torque if limited else _FREE_TORQUE] * len(DRIVES)
         self._gains = [-math.expm1(-dt / _HOLD_TIME)] * len(DRIVES)
@@ -434,9 +413,9 @@ class MobileBody(MobileRobot):
         """Read the truth; and, where the encoders are due, the shafts' angles at the slips that held."""
         (x, y, _), R = self._pose()
         if not math.isfinite(x + y):
-            raise LostError(self.time, "diverged")
+            raise LostError("robot", self.time, "diverged")
         if R[2, 2] < _UPRIGHT:
-            raise LostError(self.time, "fell over")
+            raise LostError("robot", self.time, "fell over")
         heading = math.atan2(R[1, 0], R[0, 0])
         turns = round((self._truth[2] - heading) / math.tau)
         self._truth = float(x), float(y), heading + turns * math.tau

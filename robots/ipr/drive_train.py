@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,19 +16,10 @@ _ROUNDING = 1e-9
 """By how much a command may pass a limit, as a share: limits are computed, too."""
 
 
-class Draws:
-    """Standard normal numbers one by one; drawn by the block, each costs a tenth."""
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        """Take where they come from, and draw nothing yet."""
-        self._rng = rng
-        self._left: list[float] = []
-
-    def take(self) -> float:
-        """Return the next one."""
-        if not self._left:
-            self._left = self._rng.standard_normal(256).tolist()[::-1]
-        return self._left.pop()
+def standard_normals(rng: np.random.Generator) -> Iterator[float]:
+    """Yield standard normal numbers one by one; drawn by the block, each costs a tenth."""
+    while True:
+        yield from rng.standard_normal(256).tolist()
 
 
 class DriveTrain:
@@ -38,7 +30,7 @@ class DriveTrain:
     ) -> None:
         """Start at rest; slips and noise are drawn from children of rng."""
         self.chassis, self.reality, self.limits = chassis, reality, limits
-        self._slip_draws, self._encoder_draws = (Draws(child) for child in rng.spawn(2))
+        self._slip_noise, self._encoder_noise = (standard_normals(child).__next__ for child in rng.spawn(2))
         dt = reality.dt
         self._dv = limits.a_max * dt if reality.ramps else math.inf
         self._dw = limits.alpha_max * dt if reality.ramps else math.inf
@@ -55,7 +47,7 @@ class DriveTrain:
         """Encoder counts a wheel turn; None if angles are read exactly."""
         self._wander = (0.0, 0.0)
         if reality.slip_spread > 0:
-            take = self._slip_draws.take
+            take = self._slip_noise
             self._wander = reality.slip_spread * take(), reality.slip_spread * take()
         self.slips = self._slips()
         """Slip of the right and of the left wheel now."""
@@ -89,7 +81,7 @@ class DriveTrain:
         spread = self.reality.slip_spread
         if spread > 0:
             keep = math.exp(-dt / self.reality.slip_time)
-            fresh, take = spread * math.sqrt(1 - keep * keep), self._slip_draws.take
+            fresh, take = spread * math.sqrt(1 - keep * keep), self._slip_noise
             right, left = self._wander
             self._wander = keep * right + fresh * take(), keep * left + fresh * take()
             self.slips = self._slips()
@@ -98,7 +90,7 @@ class DriveTrain:
         """Return the encoders' readings of two shaft angles [rad]: whole counts unless they read exactly."""
         if self.counts_a_turn is None:
             return angles
-        scale, noise, take = self.counts_a_turn / math.tau, self.reality.encoder_noise, self._encoder_draws.take
+        scale, noise, take = self.counts_a_turn / math.tau, self.reality.encoder_noise, self._encoder_noise
         right, left = (scale * angle + (noise * take() if noise > 0 else 0.0) for angle in angles)
         return float(round(right)), float(round(left))
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
-from typing import Annotated
 
 from robots.ipr.floor_plan import plan_map
 from robots.ipr.robot import MobileRobot
@@ -19,23 +17,12 @@ from robots.onboard.gsp_map import GspMap
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig
 from robots.onboard.localizer import Localizer, LocalizerConfig
-from vrs.checks import validated, within
+from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
 
 _KEPT = 2.0
 """How much odometry is kept [s]: older pictures don't count."""
-
-
-@dataclass(frozen=True, slots=True)
-@validated
-class FusionConfig:
-    """How much a picture counts."""
-
-    share: Annotated[float, within(0.0, 1.0)] = 0.1
-    """Share of a difference in position that one picture takes away, in [0, 1]."""
-    turn_share: Annotated[float, within(0.0, 1.0)] = 0.05
-    """The same of the heading, whose noise moves what is ahead, in [0, 1]."""
 
 
 class TruePosition:
@@ -98,10 +85,20 @@ class LaserPosition:
 class FusedPosition:
     """Follows a robot's odometry and camera; call it once a control period."""
 
-    def __init__(self, robot: MobileRobot, config: FusionConfig | None = None) -> None:
-        """Take the robot; its odometry starts where it really is."""
+    def __init__(self, robot: MobileRobot, *, share: float = 0.1, turn_share: float = 0.05) -> None:
+        """Take the robot; its odometry starts where it really is.
+
+        Args:
+            robot: With an overhead camera.
+            share: Share of a difference in position that one picture takes away, in [0, 1].
+            turn_share: The same of the heading, whose noise moves what is ahead, in [0, 1].
+
+        Raises:
+            InvalidValueError: If a share isn't in its range.
+        """
         self._robot = robot
-        self._config = FusionConfig() if config is None else config
+        self._share = number_in("share", share, 0.0, 1.0)
+        self._turn_share = number_in("turn_share", turn_share, 0.0, 1.0)
         self._x = self._y = self._turn = 0.0
         self._past: deque[tuple[float, float, float, float]] = deque()
         self._seen = -math.inf
@@ -130,7 +127,7 @@ class FusedPosition:
             return
         x, y, theta = then
         was = self._placed(x, y, theta)
-        share, turn_share = self._config.share, self._config.turn_share
+        share, turn_share = self._share, self._turn_share
         self._turn += turn_share * wrapped(seen[2] - was.theta)
         # About where the robot was: turning the map's frame doesn't move that.
         cos, sin = math.cos(self._turn), math.sin(self._turn)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots.ipr.chassis import CameraModel, Chassis, SonarModel
-from robots.ipr.drive_train import Draws
+from robots.ipr.drive_train import standard_normals
 from robots.onboard.laser import LaserModel, LaserScan
 from vrs.model import Array, frozen_array
 
@@ -157,13 +157,13 @@ class OverheadCamera:
 
     def __init__(self, model: CameraModel, rng: np.random.Generator) -> None:
         """Begin without a picture."""
-        self.model, self._draws = model, Draws(rng)
+        self.model, self._normal = model, standard_normals(rng).__next__
         self._waiting: deque[tuple[float, float, float, float]] = deque(maxlen=_MOST_WAITING)
         self._newest: Fix | None = None
 
     def look(self, posture: tuple[float, float, float], time: float) -> None:
         """Take a picture of the true posture."""
-        take, noise, turn = self._draws.take, self.model.noise, self.model.noise_angle
+        take, noise, turn = self._normal, self.model.noise, self.model.noise_angle
         x, y, theta = posture
         self._waiting.append((time, x + noise * take(), y + noise * take(), theta + turn * take()))
 

@@ -196,8 +196,8 @@ class SensorWatch:
         return next(lasting, "")
 
 
-class Tells(Protocol):
-    """Whatever tells a robot where it is."""
+class PositionSource(Protocol):
+    """Whatever says where a robot is."""
 
     def posture(self) -> Posture:
         """(x, y, θ) [m, m, rad], now."""
@@ -206,7 +206,7 @@ class Tells(Protocol):
 class SoundPosition:
     """Tells a robot where it is as something else does, as long as that is sound; else where it was last."""
 
-    def __init__(self, position: Tells, clock: Callable[[], float]) -> None:
+    def __init__(self, position: PositionSource, clock: Callable[[], float]) -> None:
         """Take what tells, and the time [s]; a robot that never knew its place is at the origin."""
         self._position, self._clock = position, clock
         self._watch, self._last = SensorWatch(), Posture(0.0, 0.0, 0.0)

@@ -18,26 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.bullet.drives import Drives
 from robots.bullet.serial_arm import Payload, Reality, RigidLink, load_arm
-from robots.bullet.world import World
+from robots.bullet.world import LostError, World
 from robots.onboard.servo import Servo, ServoGains
 from robots.puma560 import dynamics
-from robots.puma560.dynamics import NominalArm
+from robots.puma560.dynamics import nominal_torques
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, DOF, FLANGE, POSES
 from vrs.checks import finite_array
-from vrs.errors import InvalidValueError, VrsError
+from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
 
 _BOUNDS = (1e3, 1e3, 1e5)
 _JOINTS = tuple(range(DOF))
 _ZERO = (0.0,) * DOF
-
-
-class DivergedError(VrsError):
-    """The arm's state left every sensible range; the arm is of no more use."""
-
-    def __init__(self, time: float) -> None:
-        self.time = time
-        super().__init__(f"the simulated arm diverged at {time:.3f} s: references or torques beyond its drives")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +117,7 @@ class RealArm:
             coulomb=[(scale * high, scale * low) for high, low in dynamics.JOINT_COULOMB],
             dt=reality.dt,
         )
-        nominal = NominalArm(
+        nominal = nominal_torques(
             gravity=reality.gravity,
             rotor_inertia=reality.rotor_inertia,
             friction=gains.friction if scale > 0 else 0.0,
@@ -139,7 +131,7 @@ class RealArm:
         self._servo = Servo(
             gains,
             inertia=dynamics.SERVO_INERTIA,
-            feedforward=nominal.torques,
+            feedforward=nominal,
             q=self._q,
             dt=reality.dt,
         )
@@ -190,7 +182,7 @@ class RealArm:
             InvalidValueError: If a reference is of the wrong shape, not finite or out of range; the arm
                 hasn't moved then.
             WorldClosedError: If the arm is closed.
-            DivergedError: If the arm's state explodes.
+            LostError: If the arm's state explodes.
         """
         return self.follow(self.prepare(q_ref, qd_ref, qdd_ref))
 
@@ -247,7 +239,7 @@ class RealArm:
         Raises:
             InvalidValueError: If tau isn't six finite numbers.
             WorldClosedError: If the arm is closed.
-            DivergedError: If the arm's state explodes.
+            LostError: If the arm's state explodes.
         """
         torques = finite_array("tau", tau, (DOF,), "six finite joint torques [N m]").tolist()
         bullet, client, body = self.world.bullet, self.world.client, self._body
@@ -326,7 +318,7 @@ class RealArm:
         self._q, self._qd = q, qd
         self._steps += 1
         if not abs(sum(qd)) < 1e9:
-            raise DivergedError(self.time)
+            raise LostError("arm", self.time, "diverged", ": references or torques beyond its drives")
 
     def _read(self, q: list[float]) -> list[float]:
         if self._counts is None:

@@ -9,7 +9,7 @@ ICRA 1986; Corke, Armstrong-Hélouvry, ICRA 1994.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -100,16 +100,21 @@ def toolbox_arm(*, gravity: float = 9.81, rotor_inertia: bool = True) -> Any:
     return DHRobot(links, name="puma560", gravity=[0.0, 0.0, -gravity])
 
 
-class NominalArm:
-    """Inverse dynamics of the arm as its servo knows it: no payload, true rotors, a share of the friction."""
+def nominal_torques(
+    *, gravity: float = 9.81, rotor_inertia: bool = True, friction: float = 0.0
+) -> Callable[[Array, Array, Array], Array]:
+    """Return the inverse dynamics of the arm as its servo knows it: no payload, true rotors, some of the friction.
 
-    def __init__(self, *, gravity: float = 9.81, rotor_inertia: bool = True, friction: float = 0.0) -> None:
-        """Take gravity [m/s²], whether there are rotors, and how much friction to make good, 1 is nominal."""
-        self._arm = toolbox_arm(gravity=gravity, rotor_inertia=rotor_inertia)
-        self._viscous = friction * np.array(JOINT_VISCOUS)
-        self._forward, self._backward = friction * np.array(JOINT_COULOMB).T
+    Args:
+        gravity: Acceleration of free fall along -z of the base [m/s²].
+        rotor_inertia: Whether there are rotors.
+        friction: How much friction to make good, 1 is nominal.
+    """
+    arm = toolbox_arm(gravity=gravity, rotor_inertia=rotor_inertia)
+    viscous = friction * np.array(JOINT_VISCOUS)
+    forward, backward = friction * np.array(JOINT_COULOMB).T
 
-    def torques(self, q: Array, qd: Array, qdd: Array) -> Array:
+    def torques(q: Array, qd: Array, qdd: Array) -> Array:
         """Return the torques of motions, a row each, by the Toolbox's recursive Newton-Euler in C.
 
         Args:
@@ -123,7 +128,9 @@ class NominalArm:
         """
         # The Toolbox's C code refuses read-only arrays, and rne then falls back to Python, 1000 times slower.
         rows = (np.array(x, dtype=np.float64) for x in (q, qd, qdd))
-        rigid = np.asarray(self._arm.rne(*rows)).reshape(len(q), DOF)
+        rigid = np.asarray(arm.rne(*rows)).reshape(len(q), DOF)
         share = np.clip(qd / _CREEP, -1.0, 1.0)
-        coulomb = share * np.where(share > 0, self._forward, -self._backward)
-        return np.asarray(rigid + self._viscous * qd + coulomb, dtype=np.float64)
+        coulomb = share * np.where(share > 0, forward, -backward)
+        return np.asarray(rigid + viscous * qd + coulomb, dtype=np.float64)
+
+    return torques

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +29,13 @@ NODES: Final[Array] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(SAMPLES) + 0.5) / SA
 """Those times, as shares of the piece's duration: Chebyshev points, (15,)."""
 
 
-class _Maps(NamedTuple):
-    """What a degree makes of a piece's deviation from the parabola of its start."""
-
-    coefficients: Array
-    """From end deviation, speed, acceleration and samples, (18,), to the powers from 3 on, (degree - 2, 18)."""
-    residual: Array
-    """From the same to what's left at the samples, (15, 18)."""
-
-
 @cache
-def _maps(degree: int) -> _Maps:
+def _maps(degree: int) -> tuple[Array, Array]:
+    """What a degree makes of a piece's deviation from the parabola of its start, as two matrices.
+
+    The first leads from end deviation, speed, acceleration and samples, (18,), to the powers from 3 on,
+    (degree - 2, 18); the second from the same to what's left at the samples, (15, 18).
+    """
     from numpy.polynomial import chebyshev, polynomial
 
     # A quintic takes the three end conditions; (4 u (1 - u))³ times a series is what leaves all six alone.
@@ -62,7 +58,7 @@ def _maps(degree: int) -> _Maps:
             coefficients[: len(term)] += np.outer(term, solve[j])
     residual = powers @ coefficients
     residual[:, 3:] -= np.eye(SAMPLES)
-    return _Maps(coefficients, residual)
+    return coefficients, residual
 
 
 def pieces(
@@ -96,10 +92,10 @@ def pieces(
         open_ = np.flatnonzero(~(left <= tolerance))
         if len(open_) == 0:
             break
-        maps = _maps(degree)
+        coefficients, residual = _maps(degree)
         given = data[open_]
-        left[open_] = np.abs(maps.residual @ given).max((1, 2))
-        a[open_, 3 : degree + 1] = maps.coefficients @ given
+        left[open_] = np.abs(residual @ given).max((1, 2))
+        a[open_, 3 : degree + 1] = coefficients @ given
     _meet(a, data)
     scale = width[:, None] ** np.arange(a.shape[1])[None, :, None]
     a /= scale

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -223,18 +223,9 @@ _ROUNDING = 1e-12
 """Durations that differ by less [s] are the same."""
 
 
-class Overlap(NamedTuple):
-    """A move that begins before the one before it ends."""
-
-    delta: float
-    """How long they overlap [s]; 0 where they don't."""
-    plan: Plan
-    """From where the second begins."""
-
-
 def continuous(
     first: Plan, second: Plan, most: float, ramps: tuple[float, float], limits: Limits, *, jerk: bool
-) -> Overlap:
+) -> tuple[float, Plan]:
     """Let a move begin before the one before it ends, by the time that it starts or that one brakes, the shorter.
 
     Where that passes a limit, by the longest of some shorter times that doesn't.
@@ -246,6 +237,9 @@ def continuous(
         ramps: How long the first brakes, and how long the second takes to reach its speed [s].
         limits: Limits that hold at every instant.
         jerk: Whether jerk limits bind.
+
+    Returns:
+        How long they overlap [s], 0 where they don't, and the plan from where the second begins.
     """
     longest = min(most, *ramps, first.duration, second.duration)
     for k in range(_TRIALS, 0, -1) if longest > _ROUNDING else ():
@@ -255,8 +249,8 @@ def continuous(
         both = overlapped(end, beginning, delta)
         both = _divided(both, end.duration - delta)[1]
         if violation(both, limits, jerk=jerk) is None:
-            return Overlap(delta, both.then(rest))
-    return Overlap(0.0, second)
+            return delta, both.then(rest)
+    return 0.0, second
 
 
 def braking(plan: Plan, limits: Limits, model: RobotModel | None) -> float:

@@ -13,8 +13,8 @@ import trimesh
 from robots import ipr
 from robots.bullet.rooms import read_room
 from robots.bullet.serial_arm import Payload
-from robots.bullet.world import WorldClosedError
-from robots.ipr.body import LostError, MobileBody
+from robots.bullet.world import LostError, WorldClosedError
+from robots.ipr.body import MobileBody
 from robots.ipr.chassis import CHASSES, IPR, CameraModel, Chassis, MobileReality, Senses, SonarModel, chassis
 from robots.ipr.robot import BareBody
 from vrs.errors import InvalidValueError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robots.ipr.chassis import CameraModel, MobileReality, Senses
-from robots.ipr.position import FusedPosition, FusionConfig, LaserPosition, OdometryPosition, TruePosition
+from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
 from robots.ipr.robot import BareBody
 from vrs.errors import InvalidValueError
 
@@ -30,7 +30,7 @@ def test_late_pictures_of_an_exact_robot_change_nothing() -> None:
 @pytest.mark.parametrize(("share", "turn_share"), [(0.1, 0.05), (0.5, 0.0), (0.0, 0.3)])
 def test_each_picture_takes_away_its_share_of_the_difference(share: float, turn_share: float) -> None:
     body = BareBody("ipr", (1.0, 2.0, 0.5), reality=IDEAL, senses=EXACT)
-    fused = FusedPosition(body, FusionConfig(share=share, turn_share=turn_share))
+    fused = FusedPosition(body, share=share, turn_share=turn_share)
     fused.posture()
     # Somebody lifts it: its odometry doesn't know.
     body.carry((1.3, 1.6, 0.7 + math.tau))
