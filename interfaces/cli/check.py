@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +14,7 @@ from interfaces.cli.run import text_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from interfaces.val2.check import CheckFinding
+    from interfaces.val2.errors import CheckFinding
     from interfaces.val2.source import SourceFile
 
 SUFFERED = 2
@@ -48,13 +49,12 @@ def check(
 
 def _rehearsed(source: SourceFile) -> list[CheckFinding]:
     """What only planning shows: the first program on a virtual arm alone."""
-    from interfaces.val2.check import CheckFinding
     from interfaces.val2.playing import rehearse
     from robots import puma560
 
     return [
-        CheckFinding("error" if one.grave else "warning", one.error.at(place=one.place), one.place)
-        for one in rehearse(source, puma560.model()).findings
+        replace(found, error=found.error.at(place=found.place))
+        for found in rehearse(source, puma560.model()).findings
     ]
 
 

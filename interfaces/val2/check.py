@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 from interfaces.val2 import forms, kinds
 from interfaces.val2.compiler import compiled, refusal
 from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
-from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.forms import Kind, nearest
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.memory import mismatch
@@ -44,17 +43,6 @@ from robots import puma560
 from vrs.engine import Engine
 
 _WORD: Final = re.compile(r'"[^"]*"|[#$]?[A-Za-z][A-Za-z0-9_.]*')
-
-
-@dataclass(frozen=True, slots=True)
-class CheckFinding:
-    """Something that a check found."""
-
-    severity: Literal["error", "warning"]
-    error: ValError
-    """What is wrong, and in which program and step."""
-    place: TextPosition | None
-    """Where in the file."""
 
 
 def _error(error: ValError) -> CheckFinding:

@@ -132,15 +132,8 @@ class Leave:
 
 
 @dataclass(frozen=True, slots=True)
-class Finish:
-    """End the cycle (`STOP`, `END`), or for good (`HALT`), once the arm stands."""
-
-    word: str
-
-
-@dataclass(frozen=True, slots=True)
 class Finished:
-    """The cycle, or the program, has ended."""
+    """The cycle (`STOP`, `END`), or the program for good (`HALT`), has ended: the arm stands."""
 
     word: str
 
@@ -165,7 +158,7 @@ class Waiting:
 ARM: Final = -1.0
 """What a wait yields for the arm's own deadline."""
 Wait: TypeAlias = Generator[float, None, "int | Finished | Suspend"]
-Action: TypeAlias = "Invoke | Leave | Finish | Finished | Suspend | Waiting | int"
+Action: TypeAlias = "Invoke | Leave | Finished | Suspend | Waiting | int"
 """What a special step wants done; a number is the next step's index, after reactions have been looked at."""
 
 

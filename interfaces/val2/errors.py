@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from vrs.errors import VrsError
 
@@ -67,6 +67,17 @@ class ValError(VrsError):
             step=self.step if self.step is not None else step,
             place=self.place if self.place is not None else place,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class CheckFinding:
+    """Something that a check of a file, or its rehearsal, found."""
+
+    severity: Literal["error", "warning"]
+    error: ValError
+    """What is wrong, and in which program and step."""
+    place: TextPosition | None
+    """Where in the file."""
 
 
 def robot_halted(why: str, *, commanded: bool = True) -> ValError:

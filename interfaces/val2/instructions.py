@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator
 from typing import Any, Final, Protocol, TypeAlias
 
 from interfaces.val2.arithmetic import Real, Slots, whole
-from interfaces.val2.context import ARM, SLICE, SPECIAL, Action, Context, Finish, StepFunction, Suspend, Waiting
+from interfaces.val2.context import ARM, SLICE, SPECIAL, Action, Context, Finished, StepFunction, Suspend, Waiting
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
 from interfaces.val2.memory import where
@@ -559,6 +559,6 @@ def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) ->
         case "PAUSE":
             return lambda _: _special(c, Waiting(_standing(c, None, Suspend(following))))
         case "STOP" | "HALT":
-            return lambda _: _special(c, Finish(i.keyword))
+            return lambda _: _special(c, Waiting(_standing(c, None, Finished(i.keyword))))
         case _:
             raise ValError("Unknown instruction", i.keyword, place=where(i.at))

@@ -13,7 +13,6 @@ from interfaces.val2.context import (
     Action,
     Code,
     Context,
-    Finish,
     Finished,
     Invoke,
     Leave,
@@ -185,8 +184,6 @@ class Task:
                 frame.pc = following
             case Leave():
                 self._leave(frame)
-            case Finish(word):
-                frame.waiting = Waiting(_resting(self.context, word))
             case Finished(word):
                 self._finish(word)
             case Suspend(step):
@@ -201,7 +198,7 @@ class Task:
     def _leave(self, frame: CallFrame) -> None:
         frame.drop()
         if len(self.frames) == 1:
-            frame.waiting = Waiting(_resting(self.context, "END"))
+            frame.waiting = Waiting(_resting(self.context))
             return
         self._release(self.frames.pop())
 
@@ -291,6 +288,7 @@ class Task:
         self.state, self.word, self.single = ProgramState.RUNNING, "", single
 
 
-def _resting(context: Context, word: str) -> Generator[float, None, Finished]:
+def _resting(context: Context) -> Generator[float, None, Finished]:
+    """Wait for the arm to stand, and end."""
     yield from until(context, context.arm.settled)
-    return Finished(word)
+    return Finished("END")

@@ -9,11 +9,11 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Literal
 
 from interfaces.val2.context import Asked, Event, ProgramEnded, ProgramFailed, ProgramPaused, Typed, Warned
 from interfaces.val2.controller import STATEMENT, TURN, Controller
-from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.source import SourceFile
 from vrs.clock import ManualClock
@@ -157,22 +157,12 @@ MOST: Final = 20
 """Places out of reach that are looked for."""
 
 
-@dataclass(frozen=True, slots=True)
-class RehearsalFinding:
-    """Something that a rehearsal came upon."""
-
-    error: ValError
-    place: TextPosition | None
-    """Where in the file."""
-    grave: bool
-    """Whether the program is wrong; else the rehearsal could see no farther."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Rehearsal:
     """What a rehearsal came to."""
 
-    findings: tuple[RehearsalFinding, ...]
+    findings: tuple[CheckFinding, ...]
+    """Errors, and as warnings what the rehearsal couldn't see past."""
     timeline: Timeline
     """What the arm did."""
     end: float
@@ -220,10 +210,10 @@ def rehearse(
         now = max(now, deadline)
         clock.set(now)
     findings = tuple(
-        RehearsalFinding(error, player.place(error), _grave(error, given_up)) for error in player.errors
+        CheckFinding(_severity(error, given_up), error, player.place(error)) for error in player.errors
     )
     return Rehearsal(findings, engine.timeline, now)
 
 
-def _grave(error: ValError, given_up: ValError | None) -> bool:
-    return error is not given_up and error.what != "No answer"
+def _severity(error: ValError, given_up: ValError | None) -> Literal["error", "warning"]:
+    return "warning" if error is given_up or error.what == "No answer" else "error"

@@ -132,14 +132,14 @@ def test_a_rehearsal_finds_what_is_out_of_reach_with_line_and_column():
     assert [finding.error.what for finding in findings] == [
         "Location out of range", "Straight line not possible", "Location out of range",
     ]  # fmt: skip
-    assert all(finding.grave and finding.place.column >= 1 for finding in findings)
+    assert all(finding.severity == "error" and finding.place.column >= 1 for finding in findings)
     assert [finding.error.step for finding in findings] == [3, 4, 6]
 
 
 @pytest.mark.parametrize("line", ["WAIT SIG(1001)", 'PROMPT "x", x'])
 def test_where_a_rehearsal_sees_no_farther_isnt_an_error(line):
     rehearsal = rehearse(parse_file(program("READY", line, "MOVE nowhere"), "test.v2"), model)
-    assert [finding.grave for finding in rehearsal.findings] == [False]
+    assert [finding.severity for finding in rehearsal.findings] == ["warning"]
     assert [finding.place.line for finding in rehearsal.findings] == [3]
 
 
