@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, Protocol
+from enum import Enum
+from typing import TYPE_CHECKING, Final, Protocol, TypeAlias
 
 from typing_extensions import override
 
@@ -19,6 +20,19 @@ if TYPE_CHECKING:
 
 _AGAIN: Final = 0.02
 """Time between two looks whether control is there again [s]."""
+
+
+class ControlState(Enum):
+    """What came of a request for control that wasn't refused."""
+
+    PENDING = "pending"
+    """Nothing is known yet."""
+    HELD = "held"
+    """Control is there."""
+
+
+ControlAnswer: TypeAlias = ControlState | str
+"""The state of a request for control, or why it was refused."""
 
 
 class SharedOperator(Protocol):
@@ -39,8 +53,8 @@ class SharedOperator(Protocol):
 class Control(Protocol):
     """The right to command the robot, as its site gives it."""
 
-    def request(self, person: SharedOperator | None = None, *, now: float) -> str | None:
-        """Ask for it, if it isn't there: empty if it is, why not, or None while nothing is known yet.
+    def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
+        """Ask for it, if it isn't there.
 
         Args:
             person: Whose right it's to be; None for the controller's own.
@@ -75,8 +89,8 @@ class Free(Control):
     """It's there."""
 
     @override
-    def request(self, person: SharedOperator | None = None, *, now: float) -> str | None:
-        return ""
+    def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
+        return ControlState.HELD
 
     @override
     def pop_lapse(self) -> str:
@@ -127,8 +141,8 @@ class SharedController:
 
     def request(
         self, terminal: TerminalListener, person: SharedOperator | None = None, *, now: float
-    ) -> str | None:
-        """Ask for control for a terminal: empty if it's in control, why not, or None if that isn't known yet.
+    ) -> ControlAnswer:
+        """Ask for control for a terminal.
 
         Args:
             terminal: Who asks.
@@ -141,7 +155,7 @@ class SharedController:
                 return "another terminal is in control"
             self._dismiss(now)
         answer = self._control.request(person, now=now)
-        if answer == "":
+        if answer is ControlState.HELD:
             self.holder, self._person = terminal, person
         return answer
 
@@ -164,10 +178,11 @@ class SharedController:
     def _withdraw(self, now: float) -> bool:
         """Take out of the plan what was asked for ahead; whether it's to be tried again."""
         person = self._person
-        answer = "" if person is None or not person.holds else self._control.request(person, now=now)
-        if answer == "" and self._control.held:
+        shares = person is not None and person.holds
+        answer = self._control.request(person, now=now) if shares else ControlState.HELD
+        if answer is ControlState.HELD and self._control.held:
             self.controller.arm.withdraw(now=now)
-        return answer is None
+        return answer is ControlState.PENDING
 
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself."""
@@ -241,8 +256,8 @@ class LeaseControl(Control):
         self._resumed = self._resume_until = -math.inf
 
     @override
-    def request(self, person: SharedOperator | None = None, *, now: float) -> str | None:
-        """Ask for the lease: empty if it's there, why not, or None while nothing is known yet.
+    def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
+        """Ask for the lease.
 
         Args:
             person: Whose lease is to be shared; None for one of the connection's own.
@@ -262,21 +277,21 @@ class LeaseControl(Control):
             self._granted = now
         return lease
 
-    def _request_own(self, lease: Lease | None, now: float) -> str | None:
+    def _request_own(self, lease: Lease | None, now: float) -> ControlAnswer:
         if lease is not None and lease.state is LeaseState.HELD and not self._release_pending:
             if not lease.yours:
                 return self._answer(f"{lease.holder} has control")
-            return self._answer("") if self._follows(now) else None
+            return self._answer(ControlState.HELD) if self._follows(now) else ControlState.PENDING
         return self._poll(now, self._acquire, "the robot isn't at rest yet: try again")
 
     def _acquire(self) -> None:
         self._connection.acquire(wait=0.0)
 
-    def _request_share(self, person: SharedOperator, lease: Lease | None, now: float) -> str | None:
+    def _request_share(self, person: SharedOperator, lease: Lease | None, now: float) -> ControlAnswer:
         """A share of the lease of a person's session, which is to take one if it has none."""
         mine = lease is not None and lease.shared and lease.commands and not self._release_pending
         if mine and self._share[0] == person.session:
-            return self._answer("") if self._follows(now) else None
+            return self._answer(ControlState.HELD) if self._follows(now) else ControlState.PENDING
         if not person.holds:
             asked = self._requested_at is not None and self._requested_at <= now < self._requested_at + _TAKE_GRACE
             if lease is not None and lease.state is LeaseState.HELD and not (lease.yours or asked):
@@ -285,13 +300,13 @@ class LeaseControl(Control):
         session, number = self._share
         if session != person.session or not number:
             self._share = person.session, self._connection.ask_to_share(person.session)
-            return None
+            return ControlState.PENDING
         answer = self._connection.answer(number)
         if answer is not None:
             self._share = session, 0
-        return self._answer(answer.text) if isinstance(answer, Problem) else None
+        return self._answer(answer.text) if isinstance(answer, Problem) else ControlState.PENDING
 
-    def _poll(self, now: float, ask: Callable[[], None], timeout_reason: str) -> str | None:
+    def _poll(self, now: float, ask: Callable[[], None], timeout_reason: str) -> ControlAnswer:
         """Ask now and then, but not for ever."""
         if self._requested_at is None or now < self._requested_at:
             self._requested_at, self._polled_at = now, now - _ASK_AGAIN
@@ -300,7 +315,7 @@ class LeaseControl(Control):
         if now >= self._polled_at + _ASK_AGAIN:
             self._polled_at = now
             ask()
-        return None
+        return ControlState.PENDING
 
     def _follows(self, now: float) -> bool:
         """Whether the robot follows this lease; one that doesn't in time says why to those who command it."""
@@ -308,7 +323,7 @@ class LeaseControl(Control):
         state = self._connection.state
         return now >= self._granted + FOLLOW_TIMEOUT or (state is not None and state.connected and not state.halted)
 
-    def _answer(self, answer: str) -> str:
+    def _answer(self, answer: ControlAnswer) -> ControlAnswer:
         self._requested_at = None
         return answer
 

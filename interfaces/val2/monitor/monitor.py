@@ -10,7 +10,7 @@ from typing import Final
 from interfaces.val2 import context
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, settings
-from interfaces.val2.monitor.control import SharedController, SharedOperator
+from interfaces.val2.monitor.control import ControlState, SharedController, SharedOperator
 from interfaces.val2.monitor.editor import Editing
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.locations import Teach, WatchDialogue
@@ -224,11 +224,11 @@ class TerminalMonitor:
             return
         if not command.only_shows(rest):
             answer = self.read_only or self._shared.request(self, self._person, now=self.state.now)
-            if answer is None and command.name not in _URGENT:
+            if answer is ControlState.PENDING and command.name not in _URGENT:
                 self._waiting.appendleft(text)
                 self._control_due, self._pending_command = self.state.now + CONTROL_POLL, (command.name, text)
                 return
-            if answer:
+            if isinstance(answer, str):
                 raise ValError("No control", f"{command.name}: {answer}")
         running = self.state.controller.running
         if command.idle and running and command.name != "DO":
@@ -325,15 +325,15 @@ class TerminalMonitor:
     def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
         answer = self.read_only or self._shared.request(self, self._person, now=self.state.now)
-        if answer is None:
+        if answer is ControlState.PENDING:
             self._control_due = self.state.now + CONTROL_POLL
             return
         self._control_due = math.inf
         if self._greeting:
             self._greeting = False
-            if answer:
+            if isinstance(answer, str):
                 self.state.say(f"*No control* {answer}: looking only", style=Style.NOTE)
-        elif answer and self._waiting and self._waiting[0] is self._pending_command[1]:
+        elif isinstance(answer, str) and self._waiting and self._waiting[0] is self._pending_command[1]:
             self._waiting.popleft()
             self.state.fail(ValError("No control", f"{self._pending_command[0]}: {answer}"))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import main
 from interfaces.val2.check import check_text
 
 HERE = Path(__file__).parent
@@ -193,17 +193,24 @@ def test_old_programs_have_warnings_at_most():
         assert [f for f in check_text(text, stem)[1] if f.severity == "error"] == []
 
 
+def exit_code(*arguments):
+    """The exit code of `vrs` with arguments."""
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    return ended.value.code
+
+
 def test_vrs_check_says_what_is_wrong_and_exits_2(tmp_path, capsys):
     path = tmp_path / "bad.v2"
     path.write_text(".PROGRAM main\n  MOVE p\n ATTACH 3\n.END\n")
-    assert _status(["check", str(path)]) == 2
+    assert exit_code("check", str(path)) == 2
     said = capsys.readouterr().out.splitlines()
     assert said == [
         f"{path}:2:8: error: *Undefined location* p; nothing in the file sets it (program main, step 1)",
         f"{path}:3:2: warning: *No meaning here* ATTACH 3 is passed over (program main, step 2)",
         "1 error, 1 warning.",
     ]
-    assert _status(["check", str(path), "--json"]) == 2
+    assert exit_code("check", str(path), "--json") == 2
     report = json.loads(capsys.readouterr().out)
     assert report["findings"][0] == {
         "severity": "error",
@@ -219,17 +226,17 @@ def test_vrs_check_says_what_is_wrong_and_exits_2(tmp_path, capsys):
 def test_vrs_check_plans_the_first_program(tmp_path, capsys):
     path = tmp_path / "far.v2"
     path.write_text(".PROGRAM main\n  FOR i = 1 TO 3\n    MOVE TRANS(5000, 0, 0)\n  END\n.END\n")
-    assert _status(["check", str(path)]) == 2
+    assert exit_code("check", str(path)) == 2
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith(f"{path}:3:")
     assert "*Location out of range*" in said[0]
     assert said[-1] == "1 error, no warnings."
-    assert _status(["check", str(path), "--static"]) == 0
+    assert exit_code("check", str(path), "--static") == 0
     assert capsys.readouterr().out == "no errors, no warnings.\n"
 
 
 def test_vrs_check_of_what_isnt_there_is_one_line(tmp_path, capsys):
-    assert _status(["check", str(tmp_path / "no.v2")]) == 2
+    assert exit_code("check", str(tmp_path / "no.v2")) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "can't be read" in said

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from interfaces.stream.control import Lease, Problem, ProblemCode
-from interfaces.val2.monitor.control import FOLLOW_TIMEOUT, LEASE_TIMEOUT, LeaseControl
+from interfaces.val2.monitor.control import FOLLOW_TIMEOUT, LEASE_TIMEOUT, ControlState, LeaseControl
 from robots.onboard.lease import LeaseState
 
 FREE = Lease(LeaseState.FREE)
@@ -59,11 +59,11 @@ class Ann:
 def test_a_free_lease_is_asked_for_and_waited_for():
     server = Server(FREE)
     control = LeaseControl(server)
-    assert control.request(now=0.0) is None
-    assert control.request(now=0.05) is None
+    assert control.request(now=0.0) is ControlState.PENDING
+    assert control.request(now=0.05) is ControlState.PENDING
     assert server.asked == 1
     server.lease = MINE
-    assert control.request(now=0.1) == ""
+    assert control.request(now=0.1) is ControlState.HELD
     control.release(now=0.2)
     assert server.released == 1
 
@@ -73,7 +73,7 @@ def test_a_lease_that_somebody_has_is_said_at_once_and_asked_for_anew_later():
     control = LeaseControl(server)
     assert "Ann" in control.request(now=0.0)
     server.lease = FREE
-    assert control.request(now=5.0) is None
+    assert control.request(now=5.0) is ControlState.PENDING
     assert server.asked == 1
 
 
@@ -81,21 +81,21 @@ def test_a_robot_that_never_rests_ends_the_wait():
     server = Server(ENDING)
     control = LeaseControl(server)
     times = [k * 0.02 for k in range(int(LEASE_TIMEOUT / 0.02))]
-    assert all(control.request(now=t) is None for t in times)
+    assert all(control.request(now=t) is ControlState.PENDING for t in times)
     assert server.asked <= LEASE_TIMEOUT / 0.25 + 1
     assert "at rest" in control.request(now=LEASE_TIMEOUT)
-    assert control.request(now=LEASE_TIMEOUT + 1.0) is None
+    assert control.request(now=LEASE_TIMEOUT + 1.0) is ControlState.PENDING
 
 
 def test_a_robot_that_does_not_follow_yet_is_waited_for():
     server = Server(MINE, halted="not met")
     control = LeaseControl(server)
-    assert control.request(now=1.0) is None
-    assert control.request(now=FOLLOW_TIMEOUT) is None
+    assert control.request(now=1.0) is ControlState.PENDING
+    assert control.request(now=FOLLOW_TIMEOUT) is ControlState.PENDING
     server.state.halted = ""
-    assert control.request(now=FOLLOW_TIMEOUT) == ""
+    assert control.request(now=FOLLOW_TIMEOUT) is ControlState.HELD
     server.state.halted = "the link"
-    assert control.request(now=1.0 + FOLLOW_TIMEOUT) == ""
+    assert control.request(now=1.0 + FOLLOW_TIMEOUT) is ControlState.HELD
     control.resume(now=20.0)
     assert server.resumed == 1
 
@@ -150,34 +150,34 @@ def test_a_server_that_is_gone_is_told_of():
 def test_the_lease_of_a_person_is_shared_by_showing_her_session_once():
     server, ann = Server(THEIRS), Ann()
     control = LeaseControl(server)
-    assert [control.request(ann, now=0.1 * k) for k in range(20)] == [None] * 20
+    assert [control.request(ann, now=0.1 * k) for k in range(20)] == [ControlState.PENDING] * 20
     assert server.shown == ["ann's"]
     assert not control.held
     server.lease, server.answers = SHARED, {1: SHARED}
-    assert control.request(ann, now=2.0) == ""
+    assert control.request(ann, now=2.0) is ControlState.HELD
     assert control.held
     assert control.request(now=2.1) == "Ann has control"
     assert (server.asked, ann.taken) == (0, 0)
     control.release(now=3.0)
     assert (server.released, control.held) == (1, False)
-    assert control.request(ann, now=3.0) is None, "what was given back isn't there any more"
+    assert control.request(ann, now=3.0) is ControlState.PENDING, "what was given back isn't there any more"
 
 
 def test_a_person_without_control_takes_it_herself_or_is_told_who_has_it():
     server, ann = Server(FREE), Ann(holds=False)
     control = LeaseControl(server)
-    assert control.request(ann, now=0.0) is None
+    assert control.request(ann, now=0.0) is ControlState.PENDING
     assert (ann.taken, server.asked, server.shown) == (1, 0, [])
     server.lease = THEIRS
-    assert control.request(ann, now=0.05) is None, "she hasn't said yet that it's hers"
+    assert control.request(ann, now=0.05) is ControlState.PENDING, "she hasn't said yet that it's hers"
     ann.holds = True
-    assert control.request(ann, now=0.1) is None
+    assert control.request(ann, now=0.1) is ControlState.PENDING
     server.answers = {1: Problem(ProblemCode.LEASE, "that session doesn't have the lease")}
     assert control.request(ann, now=0.2) == "that session doesn't have the lease"
     ann.holds = False
     assert control.request(ann, now=0.3) == "Ann has control"
     server.lease = FREE
-    assert control.request(ann, now=1.0) is None
+    assert control.request(ann, now=1.0) is ControlState.PENDING
     assert "wasn't given" in control.request(ann, now=1.0 + LEASE_TIMEOUT)
     assert server.asked == 0
 
@@ -187,10 +187,10 @@ def test_the_share_of_one_person_is_none_of_another():
     bea.session = "bea's"
     control = LeaseControl(server)
     control.request(ann, now=0.0)
-    assert control.request(ann, now=0.1) == ""
+    assert control.request(ann, now=0.1) is ControlState.HELD
     assert control.request(bea, now=0.2) == "Ann has control"
     bea.holds = True
-    assert control.request(bea, now=0.3) is None
+    assert control.request(bea, now=0.3) is ControlState.PENDING
     assert server.shown == ["ann's", "bea's"]
 
 

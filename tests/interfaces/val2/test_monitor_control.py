@@ -6,6 +6,7 @@ import pytest
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands
+from interfaces.val2.monitor.control import ControlState
 
 from .sitting import ASK, HELLO, LOOP, Sitting
 
@@ -52,7 +53,16 @@ def test_without_control_it_only_looks(tmp_path):
 
 
 def test_a_command_waits_until_control_has_come(tmp_path):
-    sitting = Sitting(tmp_path, control=Held(None, None, None, None, ""))
+    sitting = Sitting(
+        tmp_path,
+        control=Held(
+            ControlState.PENDING,
+            ControlState.PENDING,
+            ControlState.PENDING,
+            ControlState.PENDING,
+            ControlState.HELD,
+        ),
+    )
     sitting.line("DO x = 1")
     assert sitting.monitor.prompt == ""
     sitting.until(lambda: sitting.monitor.prompt == ".")
@@ -60,7 +70,16 @@ def test_a_command_waits_until_control_has_come(tmp_path):
 
 
 def test_a_command_that_waits_in_vain_is_told_so_once(tmp_path):
-    control = Held("", None, None, "nobody gave it", None, None, "nobody gave it", None)
+    control = Held(
+        ControlState.HELD,
+        ControlState.PENDING,
+        ControlState.PENDING,
+        "nobody gave it",
+        ControlState.PENDING,
+        ControlState.PENDING,
+        "nobody gave it",
+        ControlState.PENDING,
+    )
     sitting = Sitting(tmp_path, control=control)
     sitting.line("DO x = 1")
     sitting.line("DO y = 1")
@@ -71,7 +90,7 @@ def test_a_command_that_waits_in_vain_is_told_so_once(tmp_path):
 
 @pytest.mark.parametrize("line", ["EXECUTE loop", "DO DELAY 5"])
 def test_a_lapse_of_control_interrupts_what_runs_even_if_it_is_there_again(tmp_path, line):
-    control = Held("")
+    control = Held(ControlState.HELD)
     sitting = Sitting(tmp_path, control=control)
     sitting.type(*LOOP)
     sitting.line(line)
@@ -88,7 +107,7 @@ def test_a_lapse_of_control_interrupts_what_runs_even_if_it_is_there_again(tmp_p
 
 
 def test_after_a_lapse_of_control_what_was_asked_for_ahead_is_taken_out_of_the_plan(tmp_path):
-    control = Held("")
+    control = Held(ControlState.HELD)
     sitting = Sitting(tmp_path, control=control)
     sitting.type("DO READY", "EDIT go", "DRIVE 1,20,100", "DRIVE 1,20,100", "DRIVE 1,20,100", "E")
     sitting.line("EXECUTE go")
@@ -99,7 +118,7 @@ def test_after_a_lapse_of_control_what_was_asked_for_ahead_is_taken_out_of_the_p
 
 
 def test_who_leaves_gives_control_back_and_nobody_else_does(tmp_path):
-    control = Held("")
+    control = Held(ControlState.HELD)
     sitting = Sitting(tmp_path, control=control)
     second = sitting.terminal()
     sitting.type("DO x = 1")
@@ -110,7 +129,7 @@ def test_who_leaves_gives_control_back_and_nobody_else_does(tmp_path):
 
 
 def test_a_terminal_that_has_lost_control_gives_way_to_another(tmp_path):
-    control = Held("")
+    control = Held(ControlState.HELD)
     sitting = Sitting(tmp_path, control=control)
     second = sitting.terminal()
     sitting.type(*LOOP, "EXECUTE loop")
@@ -123,7 +142,7 @@ def test_a_terminal_that_has_lost_control_gives_way_to_another(tmp_path):
 
 
 def test_a_robot_in_trouble_is_told_of_at_once_and_once(tmp_path):
-    control = Held("")
+    control = Held(ControlState.HELD)
     sitting = Sitting(tmp_path, control=control)
     second = sitting.terminal()
     sitting.pass_time(1.0)
@@ -143,7 +162,7 @@ def test_a_robot_in_trouble_is_told_of_at_once_and_once(tmp_path):
 
 
 def test_trouble_before_control_has_come_is_no_news(tmp_path):
-    control = Held(None, None, None, "")
+    control = Held(ControlState.PENDING, ControlState.PENDING, ControlState.PENDING, ControlState.HELD)
     control.wrong = ValError("Robot halted", "it hasn't been met yet")
     sitting = Sitting(tmp_path, control=control)
     sitting.pass_time(0.03)
