@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,8 +19,7 @@ from interfaces.val2.functions import expressions
 from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.ports import ArmPort
-from interfaces.val2.signals import Rule, Signals
-from interfaces.val2.source import SignalRule
+from interfaces.val2.signals import SignalRule, Signals
 from interfaces.val2.structure import runs_beside_program, standalone_error
 from interfaces.val2.syntax import (
     Expression,
@@ -168,15 +167,16 @@ class Controller:
         x = expressions(context)
         slots = [x.reference(a)([]) if isinstance(a, Variable) else VariableSlot(x.value(a)([])) for a in arguments]
         task = Task(context, code, slots, cycles=cycles, step=step, single=single)
-        rules = [self._rule(r) for r in self.cell]
+        values = [self._condition(rule) for rule in self.cell]
         self.arm.begin_program()
         context.reactions.clear()
         context.warned.clear()
         context.stop_first = False
         self._program, self._due = task, True
-        self.signals.begin(rules, now=context.now)
+        self.signals.begin(self.cell, values, now=context.now)
 
-    def _rule(self, rule: SignalRule) -> Rule:
+    def _condition(self, rule: SignalRule) -> Callable[[], bool]:
+        """What a rule follows; false where its expression has no value."""
         test = expressions(self.context).condition(rule.value)
 
         def holds() -> bool:
@@ -185,7 +185,8 @@ class Controller:
             except ValError:
                 return False
 
-        return Rule(rule.signal, holds, rule.after, rule.lasting, rule.at_time)
+        rule.require_valid()
+        return holds
 
     def do(self, step: Step, *, now: float) -> None:
         """DO: one step. While a program runs: those alone that take no time.

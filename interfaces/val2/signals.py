@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
-from interfaces.val2.errors import ValError
+from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.syntax import NOWHERE, Expression
 
 OUTPUTS: Final = range(1, 33)
 INPUTS: Final = range(1001, 1033)
@@ -27,21 +28,26 @@ MOST_RULES: Final = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
-    """One line of a cell."""
+class SignalRule:
+    """A line of `.SIGNALS`, ours: what a simulated cell does to an input or an internal signal."""
 
     signal: int
-    """An input, or an internal signal."""
-    value: Callable[[], bool]
+    value: Expression
     """What it follows."""
     after: float = 0.0
-    """Delay [s]."""
+    """So much later [s]."""
     lasting: float | None = None
-    """Each turning-on is a pulse so long [s]; None: the signal follows off, too."""
+    """Each turning-on is a pulse of so long [s]; None: it follows off, too."""
     at_time: float | None = None
-    """It's done once, so long after EXECUTE [s]; None: all the time."""
+    """Once, so long after EXECUTE [s]; None: all the time."""
+    at: TextPosition = field(default=NOWHERE, compare=False)
 
-    def __post_init__(self) -> None:
+    def require_valid(self) -> None:
+        """Check the signal and the times.
+
+        Raises:
+            ValError: If a cell can't set the signal, or a time is out of range.
+        """
         times = (self.after, self.lasting or 0.0, self.at_time or 0.0)
         if not all(math.isfinite(t) and 0.0 <= t <= 1e6 for t in times):
             raise ValError("Invalid signal rule", "times are 0 to 1000000 s")
@@ -80,7 +86,8 @@ class Signals:
     def __init__(self) -> None:
         self._on: set[int] = set()
         self._changes: list[tuple[int, bool]] = []
-        self._rules: tuple[Rule, ...] = ()
+        self._rules: tuple[SignalRule, ...] = ()
+        self._values: tuple[Callable[[], bool], ...] = ()
         self._seen: list[bool] = []
         self._due: list[float] = []
         self._over: list[float] = []
@@ -130,15 +137,20 @@ class Signals:
         """Whether `changes` has something."""
         return bool(self._changes)
 
-    def begin(self, rules: Sequence[Rule], *, now: float) -> None:
+    def begin(self, rules: Sequence[SignalRule], values: Sequence[Callable[[], bool]], *, now: float) -> None:
         """Run a cell from now on; it takes the place of the one before.
+
+        Args:
+            rules: The cell's; valid ones.
+            values: What each rule follows, as a function.
+            now: Session time [s].
 
         Raises:
             ValError: If there are too many rules.
         """
         if len(rules) > MOST_RULES:
             raise ValError("Too many signal rules", f"{MOST_RULES} at most")
-        self._rules = tuple(rules)
+        self._rules, self._values = tuple(rules), tuple(values)
         self._seen = [r.signal in self._on for r in rules]
         self._due = [math.inf if r.at_time is None else now + r.at_time + r.after for r in rules]
         self._over = [math.inf] * len(rules)
@@ -162,8 +174,8 @@ class Signals:
         """When the cell next does something [s]; infinity for never."""
         return min(min(self._due, default=math.inf), min(self._over, default=math.inf))
 
-    def _act(self, rule: Rule, i: int, t: float) -> None:
-        on = self._seen[i] if rule.at_time is None else rule.value()
+    def _act(self, rule: SignalRule, i: int, t: float) -> None:
+        on = self._seen[i] if rule.at_time is None else self._values[i]()
         if rule.lasting is None:
             self._turn(rule.signal, on)
         elif on:
@@ -173,7 +185,7 @@ class Signals:
     def _watch(self, now: float) -> None:
         """Notice what the rules' expressions have become."""
         for i, rule in enumerate(self._rules):
-            if rule.at_time is None and (value := rule.value()) != self._seen[i]:
+            if rule.at_time is None and (value := self._values[i]()) != self._seen[i]:
                 self._seen[i] = value
                 settled = rule.lasting is None and value == (rule.signal in self._on)
                 self._due[i] = math.inf if settled else now + max(rule.after, SOONEST)

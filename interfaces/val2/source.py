@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
@@ -28,7 +28,8 @@ from interfaces.val2.parser import (
     whole,
 )
 from interfaces.val2.printer import number, print_expression, print_program
-from interfaces.val2.syntax import NOWHERE, Apply, Binary, Expression, Number, Program, Text, Variable
+from interfaces.val2.signals import SignalRule
+from interfaces.val2.syntax import Apply, Binary, Expression, Number, Program, Text, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, from_oat, to_oat
 
 DECIMALS: Final = 9
@@ -45,22 +46,6 @@ class NamedValue:
 
     variable: Variable
     value: Value
-
-
-@dataclass(frozen=True, slots=True)
-class SignalRule:
-    """A line of `.SIGNALS`, ours: what a simulated cell does to an input or an internal signal."""
-
-    signal: int
-    value: Expression
-    """What it follows."""
-    after: float = 0.0
-    """So much later [s]."""
-    lasting: float | None = None
-    """Each turning-on is a pulse of so long [s]; None: it follows off, too."""
-    at_time: float | None = None
-    """Once, so long after EXECUTE [s]; None: all the time."""
-    at: TextPosition = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.parser import parse_expression
+from interfaces.val2.signals import SignalRule
 from interfaces.val2.source import (
     NamedValue,
-    SignalRule,
     SourceFile,
     numbers_of,
     parse_file,
