@@ -3,7 +3,7 @@
 Each fault is one change of the syntax tree of a module, in a copy of the project: a comparison or a condition the
 other way round, a sign, a constant, a statement left out. Places are drawn from the functions of the modules that
 git says were moved or changed since a commit. The tests that import the module run first, then those of its
-package, then all. A test that saw a fault must pass without it. A fault that nothing saw is printed with its place,
+package, then the contract suite, then all. A test that saw a fault must pass without it. A fault that nothing saw is printed with its place,
 to be judged by eye: it may mean the same as what was there.
 """
 
@@ -107,7 +107,7 @@ def _statement(tree: ast.Module, node: ast.AST) -> ast.AST:
 
 
 def rounds(path: Path) -> Iterator[list[str]]:
-    """Tests by how likely they see a fault of a module: those that import it, those of its package, all."""
+    """Tests by how likely they see a fault of a module: importing it, of its package, contract, all."""
     module = ".".join(path.with_suffix("").parts)
     direct = [
         str(test.relative_to(HOME))
@@ -121,6 +121,7 @@ def rounds(path: Path) -> Iterator[list[str]]:
         mirror = mirror.parent
     if mirror.parts[1:] and mirror != Path("tests/interfaces"):
         yield [str(mirror)]
+    yield ["tests/contract"]
     yield ["tests"]
 
 
