@@ -3,8 +3,8 @@
 Each fault is one change of the syntax tree of a module, in a copy of the project: a comparison or a condition the
 other way round, a sign, a constant, a statement left out. Places are drawn from the functions of the modules that
 git says were moved or changed since a commit. The tests that import the module run first, then those of its
-package, then the contract suite, then all. A test that saw a fault must pass without it. A fault that nothing saw is printed with its place,
-to be judged by eye: it may mean the same as what was there.
+package, then the contract suite, then all. A test that saw a fault must pass without it. A fault that nothing saw
+is printed with its place, to be judged by eye: it may mean the same as what was there.
 """
 
 from __future__ import annotations
