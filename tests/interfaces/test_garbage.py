@@ -7,7 +7,7 @@ import sys
 
 QUIET = """
 import asyncio, gc, weakref
-from interfaces.cli import doors
+from interfaces.cli import options
 
 class Cycle:
     def __init__(self):
@@ -15,16 +15,16 @@ class Cycle:
 
 long = []
 gc.callbacks.append(lambda phase, facts: long.append(phase) if facts["generation"] == 2 else None)
-doors.LEISURE = 0.01
+options.LEISURE = 0.01
 if {quiet}:
-    doors.keep_quiet()
+    options.keep_quiet()
     long.clear()
 old = [[{{}}] for _ in range(300_000)]
 print(len(long) == 0)
 
 async def main():
     held = True
-    tidying = asyncio.create_task(doors.collect_at_leisure(lambda: not held))
+    tidying = asyncio.create_task(options.collect_at_leisure(lambda: not held))
     one = Cycle()
     there = weakref.ref(one)
     del one

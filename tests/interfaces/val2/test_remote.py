@@ -264,8 +264,8 @@ def session(url):
                 assert time.monotonic() < given_up
                 time.sleep(0.02)
 
-        arm.go_ready(now=connection.now())
         with pytest.raises(ValError, match=r"\*Command refused\*"):
+            arm.go_ready(now=connection.now())
             until(arm.answered)
         assert isinstance(connection.acquire(), Lease)
         assert connection.wait(lambda r: r.state is not None and r.state.connected and not r.state.halted, 20.0)
