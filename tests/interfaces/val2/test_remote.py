@@ -264,9 +264,12 @@ def session(url):
                 assert time.monotonic() < given_up
                 time.sleep(0.02)
 
-        with pytest.raises(ValError, match=r"\*Command refused\*"):
+        def refused():
             arm.go_ready(now=connection.now())
             until(arm.answered)
+
+        with pytest.raises(ValError, match=r"\*Command refused\*"):
+            refused()
         assert isinstance(connection.acquire(), Lease)
         assert connection.wait(lambda r: r.state is not None and r.state.connected and not r.state.halted, 20.0)
         arm.drive(6, 20.0, 50.0, now=connection.now())
