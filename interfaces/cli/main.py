@@ -77,7 +77,7 @@ def main(arguments: list[str] | None = None) -> None:
     _ready_streams()
     # Whoever ends it so wants workers and robots ended as by Ctrl-C; what serves has its own way.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    sys.exit(_status(sys.argv[1:] if arguments is None else arguments))
+    sys.exit(exit_status(sys.argv[1:] if arguments is None else arguments))
 
 
 def _ready_streams() -> None:
@@ -92,7 +92,8 @@ def _ready_streams() -> None:
         logging.lastResort.setFormatter(logging.Formatter("vrs: %(message)s"))
 
 
-def _status(arguments: list[str]) -> int:
+def exit_status(arguments: list[str]) -> int:
+    """Run the command line, and return the status that `main` exits with; errors are said on standard error."""
     try:
         result = app(args=arguments or ["--help"], prog_name="vrs", standalone_mode=False)
         sys.stdout.flush()

@@ -118,7 +118,7 @@ class PaperPart:
         return cls(title, work, _only)
 
 
-def _only(study: Study, found: tuple[Findings, ...]) -> Findings:  # noqa: ARG001
+def _only(_study: Study, found: tuple[Findings, ...]) -> Findings:
     """The findings of the only case."""
     return found[0]
 

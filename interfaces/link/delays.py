@@ -15,6 +15,7 @@ from statistics import NormalDist
 from typing import Annotated, Protocol
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.system import read_within
 from vrs.checks import number_in, validated, within
@@ -60,7 +61,7 @@ def share_of(share: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class ConstantDelay:
+class ConstantDelay(DelaySource):
     """Every packet takes equally long."""
 
     name: str
@@ -70,15 +71,16 @@ class ConstantDelay:
     def __post_init__(self) -> None:
         number_in("delay", self.delay, 0.0, MAX_DELAY, "seconds")
 
-    def source(self, rng: np.random.Generator) -> DelaySource:  # noqa: ARG002
+    def source(self, _rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays; nothing about them is random."""
         return self
 
-    def quantile(self, share: float) -> float:  # noqa: ARG002
+    def quantile(self, _share: float) -> float:
         """The delay, for every share [s]."""
         return self.delay
 
-    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+    @override
+    def draw(self, now: float, size: int = 0) -> float | None:
         """The delay, at every time and for every size [s]."""
         return self.delay
 
@@ -170,14 +172,15 @@ class GammaDelay:
         return min(self.low + float(value) * (self.mean - self.low) / self.shape, MAX_DELAY)
 
 
-class _GammaState:
+class _GammaState(DelaySource):
     """State of one link with gamma delays."""
 
     def __init__(self, profile: GammaDelay, rng: np.random.Generator) -> None:
         self._profile = profile
         self._congestion = Congestion(rng, profile.correlation_time)
 
-    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+    @override
+    def draw(self, now: float, size: int = 0) -> float | None:
         z = self._congestion.at(now) / math.sqrt(2.0)
         return self._profile.delay_at(0.5 * math.erfc(-z), 0.5 * math.erfc(z))
 
@@ -223,14 +226,15 @@ class HeavyTailedDelay:
         return self.delay(NormalDist().inv_cdf(share_of(share)))
 
 
-class _HeavyTailState:
+class _HeavyTailState(DelaySource):
     """State of one heavy-tailed link."""
 
     def __init__(self, profile: HeavyTailedDelay, rng: np.random.Generator) -> None:
         self._profile = profile
         self._congestion = Congestion(rng, profile.correlation_time)
 
-    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+    @override
+    def draw(self, now: float, size: int = 0) -> float | None:
         return self._profile.delay(self._congestion.at(now))
 
 
@@ -376,7 +380,7 @@ def _sum_quantile(means: np.ndarray[tuple[int], np.dtype[np.float64]], share: fl
     return float(brentq(excess, 0.0, high, xtol=1e-12 * high, rtol=1e-12))
 
 
-class _LoadState:
+class _LoadState(DelaySource):
     """State of the load of one route."""
 
     def __init__(self, profile: RouteDelay, rng: np.random.Generator) -> None:
@@ -417,7 +421,7 @@ class TraceDelay:
             if delay is not None:
                 number_in("delay", delay, 0.0, MAX_DELAY, "seconds")
 
-    def source(self, rng: np.random.Generator) -> DelaySource:  # noqa: ARG002
+    def source(self, _rng: np.random.Generator) -> DelaySource:
         """Start at the first row."""
         return _TracePosition(self.delays)
 
@@ -427,13 +431,14 @@ class TraceDelay:
         return arriving[max(0, math.ceil(share_of(share) * len(arriving)) - 1)] if arriving else 0.0
 
 
-class _TracePosition:
+class _TracePosition(DelaySource):
     """Position in a trace."""
 
     def __init__(self, delays: tuple[float | None, ...]) -> None:
         self._delays, self._row = delays, 0
 
-    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+    @override
+    def draw(self, now: float, size: int = 0) -> float | None:
         delay = self._delays[self._row]
         self._row = (self._row + 1) % len(self._delays)
         return delay

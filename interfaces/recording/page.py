@@ -338,5 +338,5 @@ def _state(playback: Playback, moment: PlaybackMoment) -> dict[str, Any]:
     }
 
 
-async def _to_page(request: Request) -> Response:  # noqa: ARG001 - Starlette gives it
+async def _to_page(_request: Request) -> Response:
     return RedirectResponse("/replay", headers=HEADERS)

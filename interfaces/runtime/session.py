@@ -339,7 +339,7 @@ class _Puma:
 
 
 @contextmanager
-def exact_arm(q: Array) -> Iterator[ArmBody]:  # noqa: ARG001
+def exact_arm(_q: Array) -> Iterator[ArmBody]:
     """Make a body that follows exactly."""
     yield ExactArm()
 

@@ -267,7 +267,7 @@ class HubServer:
                     self.cut_off += 1
                     client.socket.abort()
 
-    async def _say_health(self, request: Request) -> JSONResponse:  # noqa: ARG002 - Starlette gives it
+    async def _say_health(self, _request: Request) -> JSONResponse:
         hub = self.hub
         facts = {
             "ok": True,

@@ -189,7 +189,7 @@ def _nothing() -> ArrayLike:
     return ()
 
 
-def _anywhere(posture: Posture, curvature: float, sense: int) -> float:  # noqa: ARG001
+def _anywhere(_posture: Posture, _curvature: float, _sense: int) -> float:
     return math.inf
 
 

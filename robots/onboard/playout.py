@@ -465,7 +465,7 @@ def _at_pace(limits: Limits, pace: float) -> Limits:
     )
 
 
-def _never(command_id: int) -> bool:  # noqa: ARG001
+def _never(_command_id: int) -> bool:
     """No command keeps jerk limits."""
     return False
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.lab import Claim, Findings, Paper, Reproduction, Study, Table
 from interfaces.lab.claims import Figure
 from interfaces.lab.output import write
@@ -95,7 +95,7 @@ def test_another_file_is_refused_in_one_line(tmp_path, text, capfd):
     path.write_text(text)
     with pytest.raises(FormatError, match=r"other\.json"):
         read_verdicts(path)
-    assert _status(["reproduce", "kim2006", "--out", str(tmp_path), "--beyond", str(path)]) == 2
+    assert exit_status(["reproduce", "kim2006", "--out", str(tmp_path), "--beyond", str(path)]) == 2
     assert capfd.readouterr().err.count("\n") == 1
 
 

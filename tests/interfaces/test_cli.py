@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 
 SHORT = '{"issue": 0, "move": [20, 50, -160, 0, 30, 0], "speed": 0.8}\n'
 
@@ -107,7 +107,7 @@ def test_bad_input_is_one_line_and_exit_2(plan, tmp_path, capsys, arguments, sai
         (tmp_path / "full" / name).mkdir(parents=True)
     (tmp_path / "file").mkdir()
     (tmp_path / "file" / "runs").touch()
-    assert _status([argument.format(tmp=tmp_path) for argument in arguments]) == 2
+    assert exit_status([argument.format(tmp=tmp_path) for argument in arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.count("\n") == 1
@@ -118,14 +118,14 @@ def test_bad_input_is_one_line_and_exit_2(plan, tmp_path, capsys, arguments, sai
 def test_a_list_of_commands_is_cut_nowhere(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     for arguments in ([], ["rsp", "--help"], ["rsp", "model", "--help"], ["middleware", "--help"]):
-        assert _status(arguments) == 0
+        assert exit_status(arguments) == 0
     assert not any(line.endswith("...") for line in capsys.readouterr().out.splitlines() if "Usage" not in line)
 
 
 def test_help_and_version(capsys):
     for arguments in ([], ["--help"], ["demo", "--help"], ["doctor", "--help"]):
-        assert _status(arguments) == 0
-    assert _status(["--version"]) == 0
+        assert exit_status(arguments) == 0
+    assert exit_status(["--version"]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith("vrs-teleop ")
 
 
@@ -188,7 +188,7 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path, how):
     ],
 )
 def test_doors_say_what_is_allowed(capsys, arguments, said):
-    assert _status(list(arguments)) == 2
+    assert exit_status(list(arguments)) == 2
     error = capsys.readouterr().err
     assert error.startswith("vrs: ")
     assert said in error
@@ -277,7 +277,7 @@ def test_a_server_answers_to_its_own_addresses_and_those_it_was_told_of(asked, s
 @pytest.mark.parametrize("text", ["http://lab.example", "lab.example/", "", "a b", "lab:port", "[::1"])
 def test_an_address_that_isnt_one_is_refused(capsys, text):
     for arguments in (["serve"], ["serve", "--robot", "ipr"], ["robot"], ["robot", "--robot", "ipr"]):
-        assert _status([*arguments, "--reached-as", "lab.example", "--reached-as", text]) == 2
+        assert exit_status([*arguments, "--reached-as", "lab.example", "--reached-as", text]) == 2
         assert "HOST or HOST:PORT" in capsys.readouterr().err
 
 

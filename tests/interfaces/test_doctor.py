@@ -9,11 +9,11 @@ import sys
 import pytest
 
 from interfaces.cli import doctor
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 
 
 def test_this_machine_is_fine(capsys):
-    assert _status(["doctor", "--json"]) == 0
+    assert exit_status(["doctor", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["ok"] is True
     assert {check["name"] for check in report["checks"]} >= {
@@ -22,13 +22,13 @@ def test_this_machine_is_fine(capsys):
 
 
 def test_text_says_fine(capsys):
-    assert _status(["doctor"]) == 0
+    assert exit_status(["doctor"]) == 0
     assert "This machine is fine." in capsys.readouterr().out
 
 
 def test_a_missing_browser_is_optional(monkeypatch, capsys):
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
-    assert _status(["doctor"]) == 0
+    assert exit_status(["doctor"]) == 0
     assert "to mend: install chromium" in capsys.readouterr().out
 
 
@@ -36,7 +36,7 @@ def test_a_missing_camera_and_voice_are_optional(monkeypatch, capsys):
     real = doctor.importlib.util.find_spec
     monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: None if name == "av" else real(name))
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
-    assert _status(["doctor"]) == 0
+    assert exit_status(["doctor"]) == 0
     said = capsys.readouterr().out
     assert "missing: av" in said
     assert "vrs-teleop[media]" in said
@@ -50,7 +50,7 @@ def test_a_package_of_the_same_name_is_found(monkeypatch, capsys):
         return real("json") if name == "robots" else real(name, package)
 
     monkeypatch.setattr(doctor.importlib.util, "find_spec", find_spec)
-    assert _status(["doctor"]) == 1
+    assert exit_status(["doctor"]) == 1
     assert "robots is" in capsys.readouterr().out
 
 

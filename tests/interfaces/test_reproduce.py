@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.lab import PAPERS, Claim, Findings, Paper, PaperPart, Study, Table, papers, reproduce
 from interfaces.lab.doulgeri import agreement, broadcasting, causality, delays, dragging, encoding, jitter, segments
 from interfaces.lab.output import rich_tables, write
@@ -269,7 +269,7 @@ class TestCommand:
             (["reproduce", "doulgeri", "--out", str(tmp_path / "file")], "can't hold the results"),
             (["reproduce", "doulgeri", "--out", str(tmp_path), "--runs", "1"], "--runs"),
         ):
-            assert _status(arguments) == 2
+            assert exit_status(arguments) == 2
             captured = capsys.readouterr()
             assert captured.out == ""
             assert captured.err.count("\n") == 1
@@ -302,7 +302,7 @@ class TestCommand:
         from interfaces.lab import papers as known
 
         monkeypatch.setitem(known.__globals__["PAPERS"], "toy", TOY)
-        assert _status(["reproduce", "toy", "--out", str(tmp_path), "--workers", "1", "--seed", "3"]) == 0
+        assert exit_status(["reproduce", "toy", "--out", str(tmp_path), "--workers", "1", "--seed", "3"]) == 0
         out = capsys.readouterr().out
         assert "2 of 3 claims hold." in out
         assert "Doesn't hold: it's nothing [odd] (eq. (2))" in out

@@ -45,7 +45,7 @@ class Arrivals:
             self.numbers.append(message.frame.number)
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
+def work(study: Study, _case: str) -> Findings:
     """All rates at once, on one engine that moves; then the time that a frame takes."""
     rng = np.random.default_rng((study.seed, 4))
     joined = ScriptedSite(0.0)

@@ -95,7 +95,7 @@ def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
     return first, postponed, len(theirs)
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
+def work(study: Study, _case: str) -> Findings:
     """Measure each restriction."""
     rejected, asked = refused_before_issue()
     postponed, end, past = late(Lateness.POSTPONE)

@@ -163,7 +163,7 @@ def scrub(rng: np.random.Generator) -> Scrubbed:
     )
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
+def work(study: Study, _case: str) -> Findings:
     """Measure what our interfaces do."""
     rng = np.random.default_rng((study.seed, 12))
     session = InteractiveSession()

@@ -114,7 +114,7 @@ def _of(timeline: Timeline, owner: int) -> list[PolynomialSegment]:
     return [segment for segment in timeline.segments if segment.command_id == owner]
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001 - there's one case
+def work(study: Study, _case: str) -> Findings:
     """Measure the figure, and many like it."""
     fig = example()
     s, new = moving(fig.before), moving(fig.after)

@@ -340,7 +340,7 @@ class RecordedOperator:
         self._rows = rows
         self._at = 0
 
-    def drive(self, t: float, posture: Posture, before: Drive) -> Drive:  # noqa: ARG002
+    def drive(self, t: float, _posture: Posture, _before: Drive) -> Drive:
         """See `Operator`; after the last row it stands."""
         rows = self._rows
         while self._at + 1 < len(rows) and rows[self._at + 1][0] <= t + 1e-9:

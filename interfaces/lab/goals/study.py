@@ -175,7 +175,7 @@ def conclude_asked(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     return Findings(claims, (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_shut(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  # noqa: ARG001
+def conclude_shut(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     """Where there's no way the robot says so."""
     clear = sum(one.trip.state is JourneyState.FAILED and "way" in one.trip.reason for one in found)
     total = len(found)
@@ -186,13 +186,13 @@ def conclude_shut(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  #
     return Findings((claim,), (_each(found),), tuple(maps(found)))
 
 
-def conclude_people(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  # noqa: ARG001
+def conclude_people(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     """Among people who stop for nobody nothing is asked of touches: they run into robots that stand."""
     table = Table("with people", TITLES[PEOPLE], COLUMNS, (_row(PEOPLE, found),))
     return Findings((), (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_physics(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:  # noqa: ARG001
+def conclude_physics(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     """The same with physics."""
     _, touched = _count(found)
     claims = (

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
 from interfaces.lab.output import REAL, VIRTUAL, draw, legend
@@ -37,20 +38,21 @@ class OneLate:
         """Take how late it is [s]."""
         self._delay = delay
 
-    def source(self, rng: np.random.Generator) -> DelaySource:  # noqa: ARG002
+    def source(self, _rng: np.random.Generator) -> DelaySource:
         """Begin with the late one."""
         return _OneLate(self._delay)
 
-    def quantile(self, share: float) -> float:  # noqa: ARG002
+    def quantile(self, _share: float) -> float:
         """Of all but the first."""
         return 0.0
 
 
-class _OneLate:
+class _OneLate(DelaySource):
     def __init__(self, delay: float) -> None:
         self._delay = delay
 
-    def draw(self, now: float, size: int = 0) -> float | None:  # noqa: ARG002
+    @override
+    def draw(self, now: float, size: int = 0) -> float | None:
         delay, self._delay = self._delay, 0.0
         return delay
 
@@ -82,7 +84,7 @@ def received(seed: int) -> tuple[Array, Array, Array]:
     return t, sent, there
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001
+def work(study: Study, _case: str) -> Findings:
     """Both figures."""
     counts = [(T_d, math.floor(T_d / T + 1e-9), commands_at_once(T_d)) for T_d in DELAYS]
     runs = [received(study.seed + k) for k in range(study.runs)]
@@ -137,7 +139,7 @@ def last_output(count: int, interval: float) -> float:
     return queue.advance(now=1e6)[-1].t
 
 
-def work_filter(study: Study, case: str) -> Findings:  # noqa: ARG001
+def work_filter(_study: Study, _case: str) -> Findings:
     """Δt = N(T − T_p), measured."""
     rows = []
     for count, T_p in FILTER_CASES:

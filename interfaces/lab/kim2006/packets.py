@@ -101,7 +101,7 @@ def saving(sizes: tuple[int, ...], fixed: int = LARGE) -> float:
     return 100.0 * (1.0 - sum(sizes) / (fixed * len(sizes)))
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001
+def work(_study: Study, _case: str) -> Findings:
     """The experiment, sealed ones beside it, and the curve."""
     found, sealed = perform(LENGTH, DUTY), perform(CURVE, 0.5, sealed=True)
     kinds = sorted(set(found.sizes))

@@ -233,7 +233,7 @@ def _with_all(study: Study, number: int, plan: GspMap, built: GspMap, scene: Dra
         return drive(body, study.length, wander(chosen), everybody, hook)
 
 
-def conclude_rooms(study: Study, found: tuple[RoomFound, ...]) -> Findings:  # noqa: ARG001
+def conclude_rooms(_study: Study, found: tuple[RoomFound, ...]) -> Findings:
     """The table of all rooms together, the one of each, and the claims."""
     claims = []
     for name in (PLAN, AS_BUILT, BUILT):

@@ -187,7 +187,7 @@ def _answer(localizer: Localizer, truth: tuple[float, float, float]) -> str:
     return "right" if near else "wrong"
 
 
-def conclude_starts(study: Study, found: tuple[tuple[Start, ...], ...]) -> Findings:  # noqa: ARG001
+def conclude_starts(_study: Study, found: tuple[tuple[Start, ...], ...]) -> Findings:
     """How many were found."""
     starts = [start for group in found for start in group]
     count = {
@@ -245,7 +245,7 @@ def measure_symmetric(study: Study, case: str) -> Twofold:
     return Twofold(room.name, localizer.status.value, len(offs), expected, min(offs, default=math.nan))
 
 
-def conclude_symmetric(study: Study, found: tuple[Twofold, ...]) -> Findings:  # noqa: ARG001
+def conclude_symmetric(_study: Study, found: tuple[Twofold, ...]) -> Findings:
     """Whether it said so."""
     good = sum(one.status == Status.AMBIGUOUS and one.named == one.expected and one.off <= NEAR for one in found)
     rows = tuple((one.room, one.status, one.expected, one.named, 100 * one.off) for one in found)
@@ -300,7 +300,7 @@ def measure_carried(study: Study, case: str) -> Carried:
     return Carried(room.name, carried[0], noticed, found[-1] if found else math.inf, off)
 
 
-def conclude_carried(study: Study, found: tuple[Carried, ...]) -> Findings:  # noqa: ARG001
+def conclude_carried(_study: Study, found: tuple[Carried, ...]) -> Findings:
     """Whether it noticed, and recovered."""
     noticed = sum(one.noticed <= NOTICED for one in found)
     recovered = sum(one.off <= NEAR for one in found)

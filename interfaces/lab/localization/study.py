@@ -97,7 +97,7 @@ def _swinging(t: float, posture: tuple[float, float, float]) -> Drive:
     return Drive(SPEED, clipped(2.0 * (0.3 * math.sin(0.8 * t) - 0.5 * (y - MIDDLE) - theta), 0.7))
 
 
-def conclude_axes(study: Study, found: tuple[Axis, ...]) -> Findings:  # noqa: ARG001
+def conclude_axes(_study: Study, found: tuple[Axis, ...]) -> Findings:
     """Whether the axis is named, and the doubt along it honest."""
     claims = []
     for one in found:

@@ -148,11 +148,11 @@ class Reckoning:
         self.posture: tuple[float, float, float] | None = None
         """What it says."""
 
-    def move(self, time: float, reading: tuple[float, float, float]) -> None:  # noqa: ARG002
+    def move(self, _time: float, reading: tuple[float, float, float]) -> None:
         """Hear the odometry."""
         self.posture = reading
 
-    def see(self, scan: LaserScan) -> bool:  # noqa: ARG002
+    def see(self, _scan: LaserScan) -> bool:
         """Take no notice of a scan."""
         return True
 

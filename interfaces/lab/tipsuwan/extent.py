@@ -93,7 +93,7 @@ def _outcome(number: int, tau: float, row: Varied) -> str:
     return "·" if succeeds(ideal, without, behind) else "e"
 
 
-def conclude(study: Study, results: tuple[Any, ...]) -> Findings:  # noqa: ARG001
+def conclude(_study: Study, results: tuple[Any, ...]) -> Findings:
     """Four maps, as tables and as a picture."""
     found: dict[str, dict[float, tuple[str, ...]]] = dict(zip(CASES, results, strict=True))
     return Findings(tables=tuple(_table(axis, found) for axis in AXES), figures=(_figure(found),))

@@ -36,7 +36,7 @@ RAW: Final = TrainingConfig(formulation=Formulation.RAW, goal=1e-6, epochs=300, 
 SOURCE: Final = "Section VI, 3)"
 
 
-def work(study: Study, case: str) -> Findings:  # noqa: ARG001
+def work(study: Study, _case: str) -> Findings:
     """Everything about the gain."""
     rng = np.random.default_rng([study.seed, 11])
     network = default_network()

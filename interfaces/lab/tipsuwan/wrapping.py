@@ -40,7 +40,7 @@ def _tracker(curve: Curve, setting: NetworkRunSetting) -> Controller:
     return QuadraticCurveTracker(curve, setting.tracker).control
 
 
-def _pursuit(curve: Curve, setting: NetworkRunSetting) -> Controller:  # noqa: ARG001
+def _pursuit(curve: Curve, _setting: NetworkRunSetting) -> Controller:
     return PurePursuit(curve, PurePursuitConfig(SPEED, most_turning=LIFTED.w_max)).control
 
 

@@ -353,5 +353,5 @@ class LiveMobileRobot:
             "timer_late": self._turning.lateness.worst,
         }
 
-    async def _say_health(self, request: Request) -> JSONResponse:  # noqa: ARG002 - Starlette gives it
+    async def _say_health(self, _request: Request) -> JSONResponse:
         return JSONResponse(self.health())

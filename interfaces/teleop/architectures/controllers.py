@@ -10,7 +10,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from interfaces.teleop.architectures.sites import ArcPacket
+from typing_extensions import override
+
+from interfaces.teleop.architectures.sites import ArcPacket, DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
@@ -25,7 +27,7 @@ _ROUNDING = 1e-9
 """Times nearer than this [s] are one."""
 
 
-class Immediate:
+class Immediate(DriveController):
     """Architecture I: what comes is driven at once. Of commands that come together all but the last are lost."""
 
     def __init__(self) -> None:
@@ -33,18 +35,20 @@ class Immediate:
         self._drive, self._until = STAND, -math.inf
         self.executed = 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:  # noqa: ARG002
+    @override
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
         """Take the newest command."""
         if arcs:
             self._drive, self._until = Drive(arcs[-1].v, arcs[-1].w), now + STARVED
             self.executed += len(arcs)
 
-    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:  # noqa: ARG002
+    @override
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Hold it until the next, for a while."""
         return self._drive if now < self._until - _ROUNDING else STAND
 
 
-class Filtered:
+class Filtered(DriveController):
     """Architecture II: the command filter gives late commands back their spacing T, eq. (11)–(13)."""
 
     def __init__(self, period: float) -> None:
@@ -53,12 +57,14 @@ class Filtered:
         self._drive, self._until = STAND, -math.inf
         self.executed = 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:  # noqa: ARG002
+    @override
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
         """Queue the commands."""
         for arc in arcs:
             self._filter.receive(arc, now=now)
 
-    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:  # noqa: ARG002
+    @override
+    def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Drive what the filter gave out last, for as long as the operator did."""
         for output in self._filter.advance(now=now + _ROUNDING):
             arc = output.command
@@ -67,7 +73,7 @@ class Filtered:
         return self._drive if now < self._until - _ROUNDING else STAND
 
 
-class FollowingController:
+class FollowingController(DriveController):
     """Architecture III: the filter at T_p feeds the path generator; the uni-vector field follows the path."""
 
     def __init__(
@@ -91,7 +97,8 @@ class FollowingController:
         """Where on the path each command ends [m], of those that aren't executed."""
         self.executed = 0
 
-    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:  # noqa: ARG002
+    @override
+    def receive(self, arcs: Sequence[ArcSegment], packet: ArcPacket, *, now: float) -> None:
         """Queue the commands."""
         for arc in arcs:
             self._filter.receive(arc, now=now)

@@ -155,9 +155,8 @@ class DriveController(Protocol):
             v_before: Linear speed that it was told to drive last [m/s].
         """
 
-    @property
-    def executed(self) -> int:
-        """Index j of eq. (9): how many of the operator's commands the robot has executed."""
+    executed: int
+    """Index j of eq. (9): how many of the operator's commands the robot has executed."""
 
 
 class PositionSource(Protocol):

@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.link.proxy import Address, parse_address
 from vrs.errors import InvalidValueError
 
@@ -105,7 +105,7 @@ def test_the_command_passes_both_transports_and_ends_cleanly(number, as_json):
 )  # fmt: skip
 def test_bad_input_is_one_line_and_exit_2(capsys, changes, said):
     options = {"--listen": "0", "--to": "9", "--delay": "none"} | changes
-    assert _status(["link", *(part for option in options.items() for part in option)]) == 2
+    assert exit_status(["link", *(part for option in options.items() for part in option)]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.count("\n") == 1
@@ -116,7 +116,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, changes, said):
 def test_a_taken_port_is_one_line_and_exit_2(capsys):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
-        assert _status(["link", "--listen", port, "--to", "9", "--delay", "none"]) == 2
+        assert exit_status(["link", "--listen", port, "--to", "9", "--delay", "none"]) == 2
     assert "--listen must be an address that this machine can listen on (Address already in use)" in (
         capsys.readouterr().err
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.recording import messages as m
 from interfaces.recording.export import tables, write_csv, write_parquet
 from interfaces.recording.recording import open_recording
@@ -190,14 +190,14 @@ def test_without_pyarrow_it_says_what_to_install(whole, tmp_path, monkeypatch, c
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(InvalidValueError, match=r"vrs-teleop\[parquet\]"):
         write_parquet((), tmp_path)
-    assert _status(["export", str(path), "--parquet", str(tmp_path / "p")]) == 2
+    assert exit_status(["export", str(path), "--parquet", str(tmp_path / "p")]) == 2
     said = capsys.readouterr()
     assert (said.out, said.err.count("\n")) == ("", 1)
 
 
 def test_the_report_is_the_runs_own(whole, tmp_path, capsys):
     run, path = whole
-    assert _status(["export", str(path), "--report", str(tmp_path / "report.html")]) == 0
+    assert exit_status(["export", str(path), "--report", str(tmp_path / "report.html")]) == 0
     assert (tmp_path / "report.html").read_text() == render(run, summarize(run))
     assert capsys.readouterr().out == f"Wrote {tmp_path / 'report.html'}\n"
 
@@ -228,7 +228,7 @@ def test_every_column_is_described(whole):
 )
 def test_bad_input_is_one_line_and_exit_2(whole, tmp_path, capsys, arguments, said):
     (tmp_path / "text").write_text("no recording\n")
-    assert _status([argument.format(tmp=tmp_path, run=whole[1]) for argument in arguments]) == 2
+    assert exit_status([argument.format(tmp=tmp_path, run=whole[1]) for argument in arguments]) == 2
     captured = capsys.readouterr()
     assert (captured.out, captured.err.count("\n")) == ("", 1)
     assert captured.err.startswith("vrs: ")
@@ -238,17 +238,17 @@ def test_bad_input_is_one_line_and_exit_2(whole, tmp_path, capsys, arguments, sa
 def test_compare_writes_the_runs_summary_and_sets_another_beside_it(whole, tmp_path, capsys):
     run, path = whole
     other = taken(tmp_path / "other.mcap", "none")
-    assert _status(["compare", str(path), "--json"]) == 0
+    assert exit_status(["compare", str(path), "--json"]) == 0
     said = capsys.readouterr()
     assert (said.out, said.err) == (to_json(summarize(run)), "")
-    assert _status(["compare", str(path), str(tmp_path / "other.mcap"), "--json"]) == 0
+    assert exit_status(["compare", str(path), str(tmp_path / "other.mcap"), "--json"]) == 0
     value = json.loads(capsys.readouterr().out)
     first, second = (json.loads(to_json(summarize(one))) for one in (run, other))
     assert (value["first"], value["second"]) == (first, second)
     change = second["errors"]["user_time"]["tool_rms_m"] - first["errors"]["user_time"]["tool_rms_m"]
     assert value["differences"]["errors.user_time.tool_rms_m"] == pytest.approx(change, abs=1e-9)
     assert value["differences"]["commands.corrections"] == -len(run.corrections)
-    assert _status(["compare", str(path), str(tmp_path / "other.mcap")]) == 0
+    assert exit_status(["compare", str(path), str(tmp_path / "other.mcap")]) == 0
     text = capsys.readouterr().out
     assert "Side by side" in text
     assert f"{1e3 * change:.3f}" in text
@@ -262,7 +262,7 @@ def test_compare_says_what_a_cut_file_lacks(whole, tmp_path, capsys):
     _, path = whole
     data = path.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
-    assert _status(["compare", str(tmp_path / "cut.mcap"), "--json"]) == 0
+    assert exit_status(["compare", str(tmp_path / "cut.mcap"), "--json"]) == 0
     said = capsys.readouterr()
     lines = said.err.splitlines()
     assert all(line.startswith("vrs: cut.mcap: missing: ") for line in lines)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from interfaces import connect
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, TraceDelay, delay_profile
 from interfaces.recording import Recorder
 from interfaces.recording.figures import figures, summary
@@ -261,7 +261,7 @@ def test_vrs_serve_records(tmp_path, capsys):
             robot.wait(lambda r: r.state.play > receipt.end, 20.0)
         health = server.health()["recording"]
         assert health["problem"] is None
-    assert _status(["compare", str(path), "--json"]) == 0
+    assert exit_status(["compare", str(path), "--json"]) == 0
     value = json.loads(capsys.readouterr().out)
     # How far behind the robot is to be isn't known yet: the first command may be late.
     assert value["commands"]["real"]["accepted"] + value["commands"]["real"]["postponed"] >= 1
@@ -275,7 +275,7 @@ def test_vrs_serve_records(tmp_path, capsys):
 
 
 def test_a_file_that_cannot_be_made_is_one_line(tmp_path, capsys):
-    assert _status(["serve", "--port", "0", "--record", str(tmp_path / "no" / "run.mcap")]) == 2
+    assert exit_status(["serve", "--port", "0", "--record", str(tmp_path / "no" / "run.mcap")]) == 2
     said = capsys.readouterr().err
     assert "recording failed" in said.splitlines()[-1]
     assert "Traceback" not in said
@@ -284,6 +284,6 @@ def test_a_file_that_cannot_be_made_is_one_line(tmp_path, capsys):
 def test_a_recording_is_not_written_over(tmp_path, capsys):
     path = tmp_path / "run.mcap"
     path.write_bytes(b"an earlier one")
-    assert _status(["serve", "--port", "0", "--record", str(path)]) == 2
+    assert exit_status(["serve", "--port", "0", "--record", str(path)]) == 2
     assert "none is written over" in capsys.readouterr().err
     assert path.read_bytes() == b"an earlier one"

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from tests.interfaces.recording.made import make
 
 VRS = [sys.executable, "-m", "interfaces.cli", "replay"]
@@ -41,7 +41,7 @@ class Done(NamedTuple):
 def vrs(*arguments):
     """The command in this process."""
     with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
-        code = _status(["replay", *map(str, arguments)])
+        code = exit_status(["replay", *map(str, arguments)])
     return Done(code, out.getvalue(), err.getvalue())
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.rsp.creator import write_package
 from interfaces.rsp.errors import DeadlineError, NoSessionError
 from interfaces.rsp.live import opened
@@ -124,7 +124,7 @@ def test_bad_input_is_one_line_and_exit_2(
 ) -> None:
     (tmp_path / "bad").write_text("bad")
     (tmp_path / "good.xmi").write_bytes(write_model(example()))
-    assert _status([word.format(tmp=tmp_path) for word in words]) == 2
+    assert exit_status([word.format(tmp=tmp_path) for word in words]) == 2
     error = capsys.readouterr().err
     assert error.startswith("vrs: ")
     assert error.count("\n") == 1
@@ -135,18 +135,18 @@ def test_models_are_made_shown_checked_and_generated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "tank.xmi"
-    assert _status(["rsp", "model", "new", str(path), "--name", "tank", "--id", "77"]) == 0
+    assert exit_status(["rsp", "model", "new", str(path), "--name", "tank", "--id", "77"]) == 0
     assert read_model(path) == example("tank", 77)
-    assert _status(["rsp", "model", "show", str(path)]) == 0
-    assert _status(["rsp", "model", "check", str(path)]) == 0
+    assert exit_status(["rsp", "model", "show", str(path)]) == 0
+    assert exit_status(["rsp", "model", "check", str(path)]) == 0
     assert "9 elements, fine" in capsys.readouterr().out
-    assert _status(["rsp", "model", "show", str(path), "--json"]) == 0
+    assert exit_status(["rsp", "model", "show", str(path), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert (facts["id"], facts["map_bytes"], facts["header_bytes"]) == (77, 2, 20)
     assert [row["kind"] for row in facts["elements"]][:3] == ["Effector", "Effector", "Sensor"]
-    assert _status(["rsp", "generate", str(path), "--out", str(tmp_path / "code"), "--json"]) == 0
+    assert exit_status(["rsp", "generate", str(path), "--out", str(tmp_path / "code"), "--json"]) == 0
     assert "local.py" in json.loads(capsys.readouterr().out)["files"]
     assert (tmp_path / "code" / "tank" / "py.typed").exists()
     monkeypatch.chdir(tmp_path)
-    assert _status(["rsp", "generate", "tank.xmi"]) == 0
+    assert exit_status(["rsp", "generate", "tank.xmi"]) == 0
     assert (tmp_path / "tank" / "robot.py").exists()

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from axe_core_python.sync_playwright import Axe
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.stream.access import make_tokens
@@ -138,7 +138,7 @@ def test_a_recording_begun_late_holds_all_that_compare_needs(recorded: tuple[Pat
             # The way to where it began is in it.
             assert np.ptp(recording.virtual(np.linspace(0.0, start, 500)), axis=0).max() > 0.3
             assert np.isfinite(recording.real(0.5 * (start + end))).all()
-    assert _status(["compare", str(recorded[1]), "--json"]) == 0
+    assert exit_status(["compare", str(recorded[1]), "--json"]) == 0
     value = json.loads(capsys.readouterr().out)
     assert value["commands"]["virtual"] == {"accepted": again.commands, "postponed": 0, "rejected": 0}
     assert not any("edits" in line for line in value.get("missing", []))

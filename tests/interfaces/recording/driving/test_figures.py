@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.lab.driving.run import measure_recorded, name_of
 from interfaces.recording import open_recording
 from interfaces.recording.figures import driven, summary
@@ -40,8 +40,8 @@ def test_the_laboratory_keeps_recordings_and_nothing_else_changes(tmp_path: Path
     arguments = ["lab", "--robot", "bare", "--architecture", "I", "--delay", "constant:0.3", "--runs", "2"]
     arguments += ["--length", "4", "--operator", "slalom", "--out"]
     plain, kept = tmp_path / "plain", tmp_path / "kept"
-    assert _status([*arguments, str(plain), "--workers", "1"]) == 0
-    assert _status([*arguments, str(kept), "--workers", "2", "--record"]) == 0
+    assert exit_status([*arguments, str(plain), "--workers", "1"]) == 0
+    assert exit_status([*arguments, str(kept), "--workers", "2", "--record"]) == 0
     for file in plain.iterdir():
         assert (kept / file.name).read_bytes() == file.read_bytes()
     rows = list(csv.DictReader((kept / "runs.csv").read_text(encoding="utf-8").splitlines()))
@@ -54,7 +54,7 @@ def test_the_laboratory_keeps_recordings_and_nothing_else_changes(tmp_path: Path
         assert (again.drive, again.problem) == (None, "")
         assert (tmp_path / "again.mcap").read_bytes() == file.read_bytes()
         capsys.readouterr()
-        assert _status(["compare", str(file), "--json"]) == 0
+        assert exit_status(["compare", str(file), "--json"]) == 0
         found = json.loads(capsys.readouterr().out)
         for name, cell in row.items():
             if name in METRICS or name in {"seed", "sent_bytes", "longest_delay", "collisions", "limits_passed"}:
@@ -65,19 +65,19 @@ def test_the_laboratory_keeps_recordings_and_nothing_else_changes(tmp_path: Path
 
 def test_two_are_set_side_by_side(capsys) -> None:
     first, second = recorded(SLALOM)[1], recorded(WANDER)[1]
-    assert _status(["compare", str(first), str(second), "--json"]) == 0
+    assert exit_status(["compare", str(first), str(second), "--json"]) == 0
     value = json.loads(capsys.readouterr().out)
     for name in METRICS:
         change = value["second"][name] - value["first"][name]
         assert value["differences"][name] == pytest.approx(change, abs=1e-9)
-    assert _status(["compare", str(first), str(second)]) == 0
+    assert exit_status(["compare", str(first), str(second)]) == 0
     assert "Side by side" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("command", [["compare"], ["replay", "--headless", "--at", "1"]])
 def test_robots_of_two_kinds_arent_compared(command: list[str], tmp_path: Path, capsys) -> None:
     make(tmp_path / "arm.mcap", 2.0)
-    assert _status([*command, str(recorded(SLALOM)[1]), str(tmp_path / "arm.mcap")]) == 2
+    assert exit_status([*command, str(recorded(SLALOM)[1]), str(tmp_path / "arm.mcap")]) == 2
     said = capsys.readouterr()
     assert (said.out, said.err.count("\n")) == ("", 1)
     assert "of one kind of robot" in said.err
@@ -89,7 +89,7 @@ def test_a_cut_file_gives_figures_until_there(share: float, tmp_path: Path, caps
     data = path.read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(data[: int(share * len(data))])
-    assert _status(["compare", str(cut), "--json"]) == 0
+    assert exit_status(["compare", str(cut), "--json"]) == 0
     said = capsys.readouterr()
     found = json.loads(said.out)
     assert all(line.startswith("vrs: cut.mcap: missing: ") for line in said.err.splitlines())

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording.messages import ArcEntry, ArcHistory, Begin, DriveFacts, End, RealPosture
 from interfaces.recording.playback import Playback
@@ -56,14 +56,14 @@ FAR = replace(HISTORY, version=9, total=1, segments=(ArcEntry(2000.0, [0.0, 0.0,
 )  # fmt: skip
 def test_figures_of_nonsense_are_one_line(start: Begin, messages: list[Any], tmp_path: Path, capsys) -> None:
     path = made(tmp_path / "made.mcap", start, *messages)
-    assert _status(["compare", str(path)]) == 2
+    assert exit_status(["compare", str(path)]) == 2
     said = capsys.readouterr().err.splitlines()
     assert said[-1].startswith("vrs: ")
 
 
 def test_figures_of_sense_are_given(tmp_path: Path) -> None:
     path = made(tmp_path / "made.mcap", BEGIN, HISTORY, *SAMPLES)
-    assert _status(["compare", str(path), "--json"]) == 0
+    assert exit_status(["compare", str(path), "--json"]) == 0
 
 
 def test_samples_far_off_the_world_are_none(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from interfaces.cli.main import _status
+from interfaces.cli.main import exit_status
 from interfaces.clients.appearance import parts_at
 from interfaces.recording import open_recording
 from interfaces.recording.marks import MarkKind
@@ -64,7 +64,7 @@ def test_marks_are_what_happened_and_not_each_command() -> None:
 
 def test_frames_come_as_lines(capsys) -> None:
     drive, path = recorded(SLALOM)
-    assert _status(["replay", str(path), "--headless", "--at", "4", "--json"]) == 0
+    assert exit_status(["replay", str(path), "--headless", "--at", "4", "--json"]) == 0
     (line,) = capsys.readouterr().out.splitlines()
     facts = json.loads(line)
     assert facts["t"] == 4.0
@@ -72,18 +72,18 @@ def test_frames_come_as_lines(capsys) -> None:
     assert facts["q_real"] == pytest.approx(drive.real[80].tolist(), abs=1e-12)
     assert facts["behind"] == pytest.approx(4.0 - facts["play"])
     assert facts["error"] < 0.05
-    assert _status(["replay", str(path), "--headless", "--at", "0.3", "--rate", "-8"]) == 0
+    assert exit_status(["replay", str(path), "--headless", "--at", "0.3", "--rate", "-8"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1].split()[0] == "0.000"
     assert all(line.endswith(" m") for line in lines)
-    assert _status(["replay", str(path), "--commands", "--json"]) == 0
+    assert exit_status(["replay", str(path), "--commands", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert (facts["identical"], facts["commands"]) == (True, 60)
 
 
 def test_tables_have_every_digit(tmp_path: Path) -> None:
     drive, path = recorded(WANDER)
-    assert _status(["export", str(path), "--csv", str(tmp_path)]) == 0
+    assert exit_status(["export", str(path), "--csv", str(tmp_path)]) == 0
     texts = {file.stem: file.read_text(encoding="utf-8") for file in tmp_path.iterdir()}
     found = {name: list(csv.DictReader(text.splitlines())) for name, text in texts.items()}
     for name, table in (
@@ -106,7 +106,7 @@ def test_tables_have_every_digit(tmp_path: Path) -> None:
 def test_a_report_has_the_figures_and_the_pictures(tmp_path: Path) -> None:
     drive, path = recorded(WANDER)
     for name in ("one.html", "other.html"):
-        assert _status(["export", str(path), "--report", str(tmp_path / name)]) == 0
+        assert exit_status(["export", str(path), "--report", str(tmp_path / name)]) == 0
     text = (tmp_path / "one.html").read_text(encoding="utf-8")
     assert text == (tmp_path / "other.html").read_text(encoding="utf-8")
     assert f"{100 * drive.compare().path_error_max:.3f}" in text
