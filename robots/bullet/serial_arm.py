@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.bullet.world import World
-from vrs.checks import finite, finite_array, number_in
+from vrs.checks import finite, finite_array, number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -137,6 +138,7 @@ def load_arm(world: World, links: Sequence[RigidLink]) -> int:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Reality:
     """What the simulated arm has of a real one. The default is all of it."""
 
@@ -148,30 +150,21 @@ class Reality:
     """Whether the drives' torques end at their limits."""
     encoder_counts: int | None = 1000
     """Encoder counts a motor turn, after quadrature, 1 to 10,000,000; None reads positions exactly."""
-    gravity: float = 9.81
+    gravity: Annotated[float, within(0.0, 100.0)] = 9.81
     """Acceleration of free fall [m/s²], along -z of the base, 0 to 100; the servo knows it."""
-    dt: float = 1e-3
+    dt: Annotated[float, within(1e-05, 0.01)] = 1e-3
     """Step of physics, servo and references [s], 1e-5 to 0.01."""
     ideal: bool = False
     """Kinematic following: positions and speeds are the references', without physics (counterfactuals)."""
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.type == "bool" and not isinstance(value, bool):
-                raise InvalidValueError(item.name, value, "True or False")
         if not isinstance(self.friction, bool):
-            self._range("friction", 0.0, 10.0)
-        self._range("gravity", 0.0, 100.0)
-        self._range("dt", 1e-5, 0.01)
+            object.__setattr__(self, "friction", number_in("friction", self.friction, 0.0, 10.0))
         counts = self.encoder_counts
         if counts is not None and (
             isinstance(counts, bool) or not isinstance(counts, int) or not 1 <= counts <= 10_000_000
         ):
             raise InvalidValueError("encoder_counts", counts, "None or an integer in [1, 10000000]")
-
-    def _range(self, name: str, low: float, high: float) -> None:
-        object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
 
     @property
     def friction_scale(self) -> float:

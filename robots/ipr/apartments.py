@@ -36,20 +36,14 @@ _TRIES = 60
 class ApartmentConfig:
     """What is made."""
 
-    rooms: int = 0
+    rooms: Annotated[int, within(0, 8)] = 0
     """How many, 1 to 8; 0 draws 1 to 5."""
-    people: int = 0
+    people: Annotated[int, within(0, 16)] = 0
     """Who walk about, 0 to 16."""
     furniture: Annotated[float, within(0.0, 3.0)] = 1.0
     """How much of it, in [0, 3]; 1 is some four pieces a room."""
     known: Annotated[float, within(0.0, 1.0)] = 0.4
     """Share of the furniture that the map has, in [0, 1]."""
-
-    def __post_init__(self) -> None:
-        for name, high in (("rooms", 8), ("people", 16)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= high:
-                raise InvalidValueError(name, value, f"an integer in [0, {high}]")
 
 
 @dataclass(frozen=True, slots=True)

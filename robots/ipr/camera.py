@@ -57,24 +57,20 @@ class Lens:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PanTiltConfig:
     """How the camera can be turned. Pan is positive to the left, tilt is positive upwards."""
 
-    pan: float = math.radians(100.0)
+    pan: Annotated[float, within(0.1, 3.1)] = math.radians(100.0)
     """Farthest to either side [rad], 0.1 to 3.1; an assumption: over both shoulders with the angle of view."""
-    down: float = math.radians(35.0)
+    down: Annotated[float, within(0.1, 1.5)] = math.radians(35.0)
     """Farthest down [rad], 0.1 to 1.5; an assumption: farther down its own display fills the picture."""
-    up: float = math.radians(45.0)
+    up: Annotated[float, within(0.1, 1.5)] = math.radians(45.0)
     """Farthest up [rad], 0.1 to 1.5; an assumption: the face of who stands before the robot is seen."""
-    speed: float = math.radians(60.0)
+    speed: Annotated[float, within(0.01, 20.0)] = math.radians(60.0)
     """Largest speed of each axis [rad/s], 0.01 to 20; an assumption: a look to the side takes two seconds."""
-    acceleration: float = math.radians(180.0)
+    acceleration: Annotated[float, within(0.01, 200.0)] = math.radians(180.0)
     """Largest acceleration of each axis [rad/s²], 0.01 to 200; an assumption: full speed in a third of a second."""
-
-    def __post_init__(self) -> None:
-        bounds = (("pan", 0.1, 3.1), ("down", 0.1, 1.5), ("up", 0.1, 1.5), ("speed", 0.01, 20.0))
-        for name, low, high in (*bounds, ("acceleration", 0.01, 200.0)):
-            number_in(name, getattr(self, name), low, high)
 
     @property
     def limits(self) -> Limits:

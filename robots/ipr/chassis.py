@@ -14,7 +14,7 @@ Source: Kim, Han, Kim, Kim 2002, section 2.2.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Annotated, Final
 
 import numpy as np
@@ -332,19 +332,9 @@ class Senses:
 Pair = tuple[float, float]
 """Of the right and of the left wheel."""
 
-_RANGES = {
-    "slip_spread": (0.0, 0.2),
-    "slip_time": (0.01, 1000.0),
-    "base_error": (-0.2, 0.2),
-    "friction": (0.02, 2.0),
-    "rolling": (0.0, 20.0),
-    "encoder_noise": (0.0, 1000.0),
-    "gravity": (0.1, 100.0),
-    "dt": (1e-4, 0.02),
-}
-
 
 @dataclass(frozen=True, slots=True)
+@validated
 class MobileReality:
     """What the simulated robot has of a real one. The default is all of it; `MobileReality.ideal()` none.
 
@@ -353,17 +343,17 @@ class MobileReality:
 
     slip: Pair = (0.004, 0.006)
     """Share of the way that each wheel loses against the floor, right and left, in [-0.5, 0.5]."""
-    slip_spread: float = 0.004
+    slip_spread: Annotated[float, within(0.0, 0.2)] = 0.004
     """Standard deviation of what each slip wanders by, in [0, 0.2]."""
-    slip_time: float = 1.0
+    slip_time: Annotated[float, within(0.01, 1000.0)] = 1.0
     """Correlation time of the wandering [s], in [0.01, 1000]."""
     radius_error: Pair = (0.002, -0.001)
     """By how much the wheels' radii, right and left, are greater than nominal, as shares, in [-0.2, 0.2]."""
-    base_error: float = 0.005
+    base_error: Annotated[float, within(-0.2, 0.2)] = 0.005
     """By how much the wheel base is greater than nominal, as a share, in [-0.2, 0.2]."""
-    friction: float = 0.7
+    friction: Annotated[float, within(0.02, 2.0)] = 0.7
     """Coulomb friction between tyres and floor, in [0.02, 2]."""
-    rolling: float = 1.0
+    rolling: Annotated[float, within(0.0, 20.0)] = 1.0
     """Resistance of the casters as a multiple of the nominal, in [0, 20]."""
     servo_lag: bool = True
     """Whether wheels follow with their servos' time constant."""
@@ -373,22 +363,16 @@ class MobileReality:
     """Whether the drives' torques end at their limits."""
     encoder_counts: int | None = -1
     """Counts a motor turn, 1 to 10,000,000; -1 takes the chassis's, None reads angles exactly."""
-    encoder_noise: float = 0.5
+    encoder_noise: Annotated[float, within(0.0, 1000.0)] = 0.5
     """Standard deviation of a reading [counts], in [0, 1000]."""
     payload: Payload | None = None
     """What the robot carries; its centre counts in the robot's frame, and nobody tells the servos."""
-    gravity: float = 9.81
+    gravity: Annotated[float, within(0.1, 100.0)] = 9.81
     """Acceleration of free fall [m/s²], in [0.1, 100]."""
-    dt: float = 1 / 240
+    dt: Annotated[float, within(0.0001, 0.02)] = 1 / 240
     """Step of physics and servos [s], in [1e-4, 0.02]."""
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.type == "bool" and not isinstance(value, bool):
-                raise InvalidValueError(item.name, value, "True or False")
-        for name, (low, high) in _RANGES.items():
-            object.__setattr__(self, name, number_in(name, getattr(self, name), low, high))
         for name, most in (("slip", 0.5), ("radius_error", 0.2)):
             object.__setattr__(self, name, _pair(name, getattr(self, name), most))
         counts = self.encoder_counts

@@ -30,12 +30,8 @@ class CommandFilterConfig:
 
     interval: Annotated[float, within(1e-6, 60.0, "s")] = 0.1
     """Time advance of the busy generator [s]: T, or T_p where it's modified, in [1e-6, 60]."""
-    capacity: int = 36_000
+    capacity: Annotated[int, within(1, 10000000)] = 36_000
     """Most commands in the filter, in [1, 10⁷]: queued, in the generator, or given out and not yet fetched."""
-
-    def __post_init__(self) -> None:
-        if isinstance(self.capacity, bool) or not isinstance(self.capacity, int) or not 1 <= self.capacity <= 10**7:
-            raise InvalidValueError("capacity", self.capacity, "an integer from 1 to 10⁷")
 
 
 class FilterOutput(NamedTuple, Generic[Command]):

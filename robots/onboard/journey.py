@@ -25,8 +25,7 @@ from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import Arc, MovingPath
 from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
 from robots.onboard.routes import NoRoute, Point, Route, RouteMap
-from vrs.checks import finite, number_in, validated, within
-from vrs.errors import InvalidValueError
+from vrs.checks import finite, validated, within
 from vrs.mobile import advanced, wrapped
 
 _CURVES = (0.0, 0.6, -0.6, 1.2, -1.2, 2.0, -2.0, 3.5, -3.5)
@@ -125,12 +124,8 @@ class Goal:
     """[m]."""
     y: Annotated[float, within(-1000.0, 1000.0, "m")]
     """[m]."""
-    heading: float | None = None
+    heading: Annotated[float, within(-1000.0, 1000.0, "rad")] | None = None
     """In which it's to end [rad]; None for any."""
-
-    def __post_init__(self) -> None:
-        if self.heading is not None:
-            object.__setattr__(self, "heading", number_in("heading", self.heading, -1000.0, 1000.0, unit=" rad"))
 
 
 class JourneyState(enum.StrEnum):
@@ -175,14 +170,10 @@ class JourneyConfig:
     """So near to the goal it has arrived [m], in [1e-3, 1]."""
     near_angle: Annotated[float, within(1e-3, 1.0)] = math.radians(1.2)
     """And turned so near to its heading [rad], in [1e-3, 1]."""
-    tries: int = 12
+    tries: Annotated[int, within(1, 1000)] = 12
     """So often in a row it may be stuck, or arrive beside the goal, before it gives up, 1 to 1000."""
     longest: Annotated[float, within(1.0, 86400.0)] = 900.0
     """After so long it gives up [s], in [1, 86400]."""
-
-    def __post_init__(self) -> None:
-        if isinstance(self.tries, bool) or not isinstance(self.tries, int) or not 1 <= self.tries <= 1000:
-            raise InvalidValueError("tries", self.tries, "1 to 1000")
 
 
 def _nothing() -> ArrayLike:

@@ -64,13 +64,12 @@ class MoversConfig:
     """It moves if its speed is so many deviations, in [0, 10]."""
     least: Annotated[float, within(0.0, 10.0)] = 0.3
     """Nothing is said of what was first seen a shorter time ago [s], in [0, 10]."""
-    most: int = 16
+    most: Annotated[int, within(1, 1000)] = 16
     """Most things that are followed, 1 to 1000."""
 
     def __post_init__(self) -> None:
-        for name, count, high in (("mounts", len(self.mounts), 64), ("most", self.most, 1000)):
-            if not 1 <= count <= high:
-                raise InvalidValueError(name, count, f"1 to {high}")
+        if not 1 <= len(self.mounts) <= 64:
+            raise InvalidValueError("mounts", len(self.mounts), "1 to 64")
 
 
 @dataclass(frozen=True, slots=True)

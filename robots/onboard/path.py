@@ -290,12 +290,8 @@ class PathGeneratorConfig:
 
     period: Annotated[float, within(1e-4, 60.0, "s")] = 0.1
     """T, how long each command was driven by the virtual robot [s], in [1e-4, 60]."""
-    pivot_radius: float = 1e-3
+    pivot_radius: Annotated[float, within(0.0, 0.1, "m")] = 1e-3
     """Arcs of a smaller radius [m] are driven as turns on the spot, in [0, 0.1]; their ends stay exact."""
-
-    def __post_init__(self) -> None:
-        radius = number_in("pivot_radius", self.pivot_radius, 0.0, 0.1, unit=" m")
-        object.__setattr__(self, "pivot_radius", radius)
 
 
 class PathGenerator:

@@ -18,13 +18,13 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from copy import copy
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vrs.checks import number_in
+from vrs.checks import validated, within
 from vrs.model import Array, Limits
 from vrs.pacing import TimeScaling, certified, change, rest_after, seems_kept
 from vrs.planning import violation
@@ -141,19 +141,16 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class PlayoutConfig:
     """How the play time follows its aim."""
 
-    slew: float = 0.05
+    slew: Annotated[float, within(0.0, 0.2)] = 0.05
     """Largest deviation of the pace from 1 while D is corrected, in [0, 0.2]."""
-    tolerance: float = 0.005
+    tolerance: Annotated[float, within(0.0, 1.0)] = 0.005
     """Deviation from the aim [s] that isn't corrected, in [0, 1]."""
-    buffer: float = 0.1
+    buffer: Annotated[float, within(0.0, 10.0)] = 0.1
     """How much timeline [s] must be known to be complete before play goes on in mid-motion, in [0, 10]."""
-
-    def __post_init__(self) -> None:
-        for item, high in zip(fields(self), (0.2, 1.0, 10.0), strict=True):
-            object.__setattr__(self, item.name, number_in(item.name, getattr(self, item.name), 0.0, high))
 
 
 class Stretch(NamedTuple):

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import finite, finite_array, number_in
+from vrs.checks import finite, finite_array, validated, within
 from vrs.commands import Profile
 from vrs.insertion import piece
 from vrs.model import Array, Limits, frozen_array
@@ -35,23 +35,18 @@ FeedForward: TypeAlias = Callable[[Array, Array, Array], Array]
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ServoGains:
     """How hard the servo pulls; the same for every payload."""
 
-    bandwidth_hz: float = 12.0
+    bandwidth_hz: Annotated[float, within(0.1, 30.0)] = 12.0
     """Undamped natural frequency of the position loop [Hz], 0.1 to 30."""
-    damping: float = 0.8
+    damping: Annotated[float, within(0.1, 3.0)] = 0.8
     """Damping ratio ζ of the position loop, 0.1 to 3."""
-    derivative_hz: float = 80.0
+    derivative_hz: Annotated[float, within(1.0, 500.0)] = 80.0
     """Corner of the low-pass on the error's rate [Hz], 1 to 500."""
-    friction: float = 0.5
+    friction: Annotated[float, within(0.0, 1.0)] = 0.5
     """Share of the nominal friction that the feed-forward makes good, 0 to 1; 1 knows it perfectly."""
-
-    def __post_init__(self) -> None:
-        ranges = {"bandwidth_hz": (0.1, 30.0), "damping": (0.1, 3.0), "derivative_hz": (1.0, 500.0)}
-        for item in fields(self):
-            low, high = ranges.get(item.name, (0.0, 1.0))
-            object.__setattr__(self, item.name, number_in(item.name, getattr(self, item.name), low, high))
 
 
 class Servo:

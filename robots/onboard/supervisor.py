@@ -66,26 +66,22 @@ class SupervisorConfig:
     at once by eq. (17)."""
     clear_cone: Annotated[float, within(0.0, 1.0)] = 0.8
     """Share of the cone that is looked through, in [0, 1]: its edges are its neighbours', too."""
-    silence: int = 3
+    silence: Annotated[int, within(1, 1000)] = 3
     """So many scans one after the other without an echo look clearly through as well, 1 to 1000."""
     refresh: Annotated[float, within(0.05, 60.0)] = 0.5
     """Least time between two tellings of one cell [s], in [0.05, 60]."""
-    repeats: int = 3
+    repeats: Annotated[int, within(1, 100)] = 3
     """How often it's told that a cell is free, 1 to 100."""
     memory: Annotated[float, within(0.0, 600.0)] = 16.0
     """For so long what was seen is kept [s], in [0, 600]: as long as a cell can live."""
-    most: int = 64
+    most: Annotated[int, within(1, 4096)] = 64
     """Most changes in a report, 1 to 4096."""
-    most_kept: int = 4096
+    most_kept: Annotated[int, within(1, 100000)] = 4096
     """Most cells that are kept, 1 to 100,000; there, those that were seen longest ago go first."""
 
     def __post_init__(self) -> None:
-        for name, count, high in (
-            ("mounts", len(self.mounts), 64), ("silence", self.silence, 1000), ("repeats", self.repeats, 100),
-            ("most", self.most, 4096), ("most_kept", self.most_kept, 100_000),
-        ):  # fmt: skip
-            if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= high:
-                raise InvalidValueError(name, count, f"1 to {high}")
+        if not 1 <= len(self.mounts) <= 64:
+            raise InvalidValueError("mounts", len(self.mounts), "1 to 64")
 
 
 @dataclass(slots=True)

@@ -239,7 +239,7 @@ class WatchdogConfig:
     """Oldest message that counts under `halt` [s], 0.01 to 2."""
     max_uncertainty: Annotated[float, within(0.0, 1.0, "s")] = 0.1
     """Largest uncertainty of the clocks that the age gate works with [s], 0 to 1."""
-    window: int = 4096
+    window: Annotated[int, within(1, 1000000)] = 4096
     """How far a message may be overtaken and still count [messages], 1 to 1,000,000."""
 
     def __post_init__(self) -> None:
@@ -248,8 +248,6 @@ class WatchdogConfig:
                 object.__setattr__(self, name, words(getattr(self, name)))
             except ValueError:
                 raise InvalidValueError(name, getattr(self, name), f"one of {', '.join(words)}") from None
-        if not whole(self.window, 1) or self.window > 1_000_000:
-            raise InvalidValueError("window", self.window, "an integer in [1, 1000000]")
 
 
 class Watchdog:
