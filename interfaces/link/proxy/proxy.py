@@ -102,12 +102,13 @@ class Proxy:
 
     def __init__(self, settings: ProxySettings, clock: Clock, rng: np.random.Generator) -> None:
         there, back, spare = rng.spawn(3)
-        self._settings, self._clock, self._spare = settings, clock, spare
+        self.settings, self._clock, self._spare = settings, clock, spare
         conditions = settings.conditions
         self._paths = (LinkPath(conditions.forward, there), LinkPath(conditions.backward, back))
         self._began = clock.now()
         self._lateness = TimerLateness()
-        self._tcp: TcpProxy | None = None
+        self.tcp: TcpProxy | None = None
+        """TCP's part, once it has been started and if the settings ask for it."""
         self._udp: UdpProxy | None = None
         self._ways: tuple[ProxyDirection, ProxyDirection] | None = None
         self._channels: tuple[Channel[Parcel], Channel[Parcel]] | None = None
@@ -120,7 +121,7 @@ class Proxy:
         Raises:
             InvalidValueError: If the server's name has no address, or this machine can't listen as asked.
         """
-        settings = self._settings
+        settings = self.settings
         family, target = await _resolve("--to", settings.to)
         tcp, udp = await self._bind()
         both = (settings.conditions.forward, settings.conditions.backward)
@@ -146,19 +147,19 @@ class Proxy:
                 for conditions, path in zip(both, self._paths, strict=True)
             )
             self._ways = (forward, backward)
-            self._tcp = TcpProxy(target[:2], self._ways, self._clock, self._lateness, settings.most_clients)
-            await self._tcp.start(tcp)
+            self.tcp = TcpProxy(target[:2], self._ways, self._clock, self._lateness, settings.most_clients)
+            await self.tcp.start(tcp)
 
     def close(self) -> None:
         """Stop listening, end every connection, drop what is on its way."""
-        if self._tcp is not None:
-            self._tcp.close()
+        if self.tcp is not None:
+            self.tcp.close()
         if self._udp is not None:
             self._udp.close()
 
     def statistics(self) -> dict[str, Any]:
         """What happened so far, ready for JSON; times in seconds."""
-        settings, conditions = self._settings, self._settings.conditions
+        settings, conditions = self.settings, self.settings.conditions
         value: dict[str, Any] = {
             "schema": "vrs-link/1",
             "listen": str(self.listening),
@@ -172,9 +173,9 @@ class Proxy:
                 "late_max_s": self._lateness.worst if self._lateness.count else None,
             },
         }
-        if self._tcp is not None and self._ways is not None:
+        if self.tcp is not None and self._ways is not None:
             logs = [_totals(way.log.totals()) for way in self._ways]
-            value["tcp"] = {**asdict(self._tcp.counts), "forward": logs[0], "backward": logs[1]}
+            value["tcp"] = {**asdict(self.tcp.counts), "forward": logs[0], "backward": logs[1]}
         if self._udp is not None and self._channels is not None:
             logs = [_totals(channel.log.totals()) for channel in self._channels]
             value["udp"] = {**asdict(self._udp.counts), "forward": logs[0], "backward": logs[1]}
@@ -182,7 +183,7 @@ class Proxy:
 
     async def _bind(self) -> tuple[socket.socket | None, socket.socket | None]:
         """Bind one port number for the transports asked for."""
-        settings = self._settings
+        settings = self.settings
         family, address = await _resolve("--listen", settings.listen)
         for last in (*(False,) * (BIND_TRIES - 1), True):
             with contextlib.ExitStack() as stack:

@@ -174,7 +174,8 @@ class _Flow:
     def __init__(self, stream: Stream[bytes | _Mark], source: _End, sink: _End, proxy: TcpProxy) -> None:
         self._stream, self._source, self._sink, self._clock = stream, source, sink, proxy.clock
         self._timer = Timer(proxy.clock, self.pump, proxy.lateness)
-        self._bytes = 0
+        self.bytes_in_flight = 0
+        """Sent and not yet handed to the sink."""
         self._stopped = False
 
     def feed(self, data: bytes) -> None:
@@ -190,7 +191,7 @@ class _Flow:
 
     def _send(self, payload: bytes | _Mark) -> None:
         size = len(payload) if isinstance(payload, bytes) else 0
-        self._bytes += size
+        self.bytes_in_flight += size
         self._stream.send(payload, self._clock.now(), size)
 
     def pump(self) -> None:
@@ -199,7 +200,7 @@ class _Flow:
             return
         for delivery in self._stream.receive(self._clock.now()):
             if isinstance(delivery.payload, bytes):
-                self._bytes -= len(delivery.payload)
+                self.bytes_in_flight -= len(delivery.payload)
             self._sink.take(delivery.payload)
         if self._stream.lost and not self._stopped:
             self._sink.connection.broken()
@@ -209,7 +210,7 @@ class _Flow:
 
     def throttle(self) -> None:
         """Let the source wait while too much is on its way, or the sink doesn't read."""
-        full = self._bytes >= WINDOW_BYTES or self._stream.in_flight() >= WINDOW_PACKETS
+        full = self.bytes_in_flight >= WINDOW_BYTES or self._stream.in_flight() >= WINDOW_PACKETS
         if full or self._sink.blocked or not self._sink.open:
             self._source.hold()
         else:
@@ -233,12 +234,12 @@ class _End(asyncio.Protocol):
         self.connection = connection
         self.unwanted = self.open = self.gone = self.blocked = False
         self._heard_end = self._said_end = False
-        self._transport: asyncio.Transport | None = None
+        self.transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin; a connection beyond the limit is reset."""
         assert isinstance(transport, asyncio.Transport)
-        self._transport, self.open = transport, True
+        self.transport, self.open = transport, True
         if self.unwanted:
             self.reset()
         else:
@@ -277,36 +278,36 @@ class _End(asyncio.Protocol):
         """Write bytes, or do what a mark says; a closed socket ignores bytes."""
         if payload is _Mark.ABORT:
             self.connection.broken()
-        elif self.open and self._transport is not None:
+        elif self.open and self.transport is not None:
             if isinstance(payload, bytes):
-                self._transport.write(payload)
+                self.transport.write(payload)
             else:
                 self._said_end = True
-                if self._transport.can_write_eof():
-                    self._transport.write_eof()
+                if self.transport.can_write_eof():
+                    self.transport.write_eof()
                 self._close_when_done()
 
     def hold(self) -> None:
         """Read no more for now."""
-        if self.open and not self._heard_end and self._transport is not None:
-            self._transport.pause_reading()
+        if self.open and not self._heard_end and self.transport is not None:
+            self.transport.pause_reading()
 
     def go_on(self) -> None:
         """Read again; at the end there is nothing more to read."""
-        if self.open and not self._heard_end and self._transport is not None:
-            self._transport.resume_reading()
+        if self.open and not self._heard_end and self.transport is not None:
+            self.transport.resume_reading()
 
     def reset(self) -> None:
         """Close so that the peer sees a reset."""
-        if self._transport is not None and not self.gone:
+        if self.transport is not None and not self.gone:
             self.open = False
-            sock = self._transport.get_extra_info("socket")
+            sock = self.transport.get_extra_info("socket")
             if sock is not None and sock.fileno() >= 0:
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-            self._transport.abort()
+            self.transport.abort()
         self.unwanted = True
 
     def _close_when_done(self) -> None:
-        if self._heard_end and self._said_end and self._transport is not None:
+        if self._heard_end and self._said_end and self.transport is not None:
             self.open = False
-            self._transport.close()
+            self.transport.close()

@@ -33,7 +33,7 @@ def test_tcp_arrives_whole_and_not_before_the_delay():
         writer.write(data)
         writer.write_eof()
         assert await reader.read() == data
-        await until(lambda: not proxy._tcp.connections)
+        await until(lambda: not proxy.tcp.connections)
         writer.close()
         tcp = proxy.statistics()["tcp"]
         assert (tcp["accepted"], tcp["aborted"], tcp["unreachable"]) == (1, 0, 0)
@@ -108,7 +108,7 @@ def test_a_reset_by_the_client_reaches_the_server_behind_its_data():
         assert clock.now() - began >= 0.05
         assert seen == [b"last words", "reset"]
         assert proxy.statistics()["tcp"]["aborted"] == 1
-        await until(lambda: not proxy._tcp.connections)
+        await until(lambda: not proxy.tcp.connections)
 
     run(scenario, both_ways(Conditions(delay=ConstantDelay("c", 0.05))), tcp=listens)
 
@@ -143,7 +143,7 @@ def test_a_packet_lost_for_good_resets_both_sides():
 
 def test_a_server_that_is_not_there_resets_the_client():
     async def scenario(proxy, clock):
-        server = proxy._settings.to
+        server = proxy.settings.to
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             settings = ProxySettings(ANY, Address(server.host, free.getsockname()[1]), udp=False)
@@ -172,8 +172,8 @@ def test_a_server_that_does_not_read_holds_back_the_client_not_our_memory():
         writer.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)
         data = bytes(24_000_000)
         writer.write(data)
-        await until(lambda: proxy._tcp.connections)
-        (connection,) = proxy._tcp.connections
+        await until(lambda: proxy.tcp.connections)
+        (connection,) = proxy.tcp.connections
         await until(lambda: connection.server.blocked)
         counts, still = [-1], 0
         while still < 50:
@@ -181,7 +181,7 @@ def test_a_server_that_does_not_read_holds_back_the_client_not_our_memory():
             counts.append(proxy.statistics()["tcp"]["forward"]["bytes_sent"])
             still = still + 1 if counts[-1] == counts[-2] else 0
         assert counts[-1] < len(data)
-        held = connection._flows[0]._bytes + connection.server._transport.get_write_buffer_size()
+        held = connection.client.out.bytes_in_flight + connection.server.transport.get_write_buffer_size()
         assert held <= 2 * WINDOW_BYTES + 262_144
         release.set()
         writer.write_eof()
@@ -196,11 +196,11 @@ def test_a_long_delay_fills_the_window_and_no_more():
     async def scenario(proxy, clock):
         _, writer = await client_of(proxy)
         writer.write(bytes(8 * WINDOW_BYTES))
-        await until(lambda: proxy._tcp.connections)
-        (connection,) = proxy._tcp.connections
-        await until(lambda: connection._flows[0]._bytes >= WINDOW_BYTES)
-        assert not connection.client._transport.is_reading()
-        assert connection._flows[0]._bytes <= WINDOW_BYTES + 262_144
+        await until(lambda: proxy.tcp.connections)
+        (connection,) = proxy.tcp.connections
+        await until(lambda: connection.client.out.bytes_in_flight >= WINDOW_BYTES)
+        assert not connection.client.transport.is_reading()
+        assert connection.client.out.bytes_in_flight <= WINDOW_BYTES + 262_144
         writer.transport.abort()
 
     run(scenario, both_ways(Conditions(delay=ConstantDelay("c", 1000.0))), tcp=echo)
@@ -211,14 +211,14 @@ def test_many_small_packets_fill_the_window_too(monkeypatch):
 
     async def scenario(proxy, clock):
         _, writer = await client_of(proxy)
-        await until(lambda: proxy._tcp.connections)
-        (connection,) = proxy._tcp.connections
+        await until(lambda: proxy.tcp.connections)
+        (connection,) = proxy.tcp.connections
         await until(lambda: connection.server.open)
         for sent in range(1, 21):
-            assert connection.client._transport.is_reading()
+            assert connection.client.transport.is_reading()
             writer.write(b"x")
             await until(lambda sent=sent: proxy.statistics()["tcp"]["forward"]["sent"] == sent)
-        assert not connection.client._transport.is_reading()
+        assert not connection.client.transport.is_reading()
         writer.transport.abort()
 
     run(scenario, both_ways(Conditions(delay=ConstantDelay("c", 1000.0))), tcp=echo)
@@ -234,9 +234,9 @@ def test_a_proxy_may_begin_again_at_once_on_the_same_port():
         reader, writer = await client_of(proxy)
         assert await reader.read() == b"bye"
         writer.close()
-        await until(lambda: not proxy._tcp.connections)
+        await until(lambda: not proxy.tcp.connections)
         proxy.close()
-        again = Proxy(replace(proxy._settings, listen=proxy.listening), clock, np.random.default_rng(0))
+        again = Proxy(replace(proxy.settings, listen=proxy.listening), clock, np.random.default_rng(0))
         await again.start()
         assert again.listening == proxy.listening
         again.close()
@@ -256,7 +256,7 @@ def test_connections_beyond_the_limit_are_reset():
         first[1].write(b"b")
         assert await first[0].readexactly(1) == b"b"
         first[1].close()
-        await until(lambda: not proxy._tcp.connections)
+        await until(lambda: not proxy.tcp.connections)
         third = await client_of(proxy)
         third[1].write(b"c")
         assert await third[0].readexactly(1) == b"c"

@@ -28,7 +28,7 @@ def test_statistics_tell_the_ways_apart():
         client.transport.close()
         told = proxy.statistics()
         assert (told["delay_forward"], told["delay_backward"]) == ("there", "back")
-        assert (told["listen"], told["to"]) == (str(proxy.listening), str(proxy._settings.to))
+        assert (told["listen"], told["to"]) == (str(proxy.listening), str(proxy.settings.to))
         assert 0.03 <= told["duration_s"] <= clock.now() - began
         assert told["timers"]["count"] == 2
         assert 0.0 <= told["timers"]["late_mean_s"] <= told["timers"]["late_max_s"]
