@@ -46,7 +46,7 @@ class ReplayError(Exception):
     """An authentic packet that came before; it never leaves a core."""
 
 
-def _derived(secret: bytes, salt: bytes, info: bytes, length: int) -> bytes:
+def hkdf(secret: bytes, salt: bytes, info: bytes, length: int) -> bytes:
     """HKDF-SHA256. Source: RFC 5869."""
     key = hmac.digest(salt or bytes(32), secret, "sha256")
     out, block = b"", b""
@@ -71,7 +71,7 @@ class Keyring:
             if len(secret) < _LEAST:
                 raise InvalidValueError("secret", f"{len(secret)} bytes", f"{_LEAST} bytes or more")
         self._secrets = {Rank(rank): bytes(secret) for rank, secret in secrets.items()}
-        self._macs = {r: _derived(s, b"", b"vrs rsp 1 handshake", 32) for r, s in self._secrets.items()}
+        self._macs = {r: hkdf(s, b"", b"vrs rsp 1 handshake", 32) for r, s in self._secrets.items()}
 
     def __repr__(self) -> str:
         return f"Keyring({', '.join(rank.name.lower() for rank in self._secrets)})"
@@ -86,7 +86,7 @@ class Keyring:
     def session(self, rank: Rank, nonces: bytes, session: int) -> tuple[bytes, bytes]:
         """Keys of a session, down and up: fresh nonces of both sides make them fresh."""
         info = b"vrs rsp 1 session" + session.to_bytes(6, "big")
-        keys = _derived(self._secrets[rank], hashlib.sha256(nonces).digest(), info, 64)
+        keys = hkdf(self._secrets[rank], hashlib.sha256(nonces).digest(), info, 64)
         return keys[:32], keys[32:]
 
 

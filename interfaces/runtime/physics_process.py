@@ -102,12 +102,12 @@ def tick_body(setup: PhysicsSetup) -> Iterator[TickBody]:
         yield PumaTicks(arm)
 
 
-class _Parent:
+class ParentSocket:
     """The socket to the parent; nothing waits for it."""
 
     def __init__(self, connection: socket.socket, process: int) -> None:
         self._socket, self._process = connection, process
-        self._unsent: deque[News] = deque(maxlen=_UNSENT_MOST)
+        self.unsent: deque[News] = deque(maxlen=_UNSENT_MOST)
         self.gone = False
 
     def wait(self, seconds: float) -> bytes | None:
@@ -128,14 +128,14 @@ class _Parent:
 
     def tell(self, news: list[News]) -> None:
         """Send what there is; of what doesn't fit only the measurements are lost."""
-        self._unsent.extend(news)
-        while self._unsent and not self.gone:
-            message = self._unsent.popleft()
+        self.unsent.extend(news)
+        while self.unsent and not self.gone:
+            message = self.unsent.popleft()
             try:
                 self._socket.send(encode(message))
             except BlockingIOError:
-                kept = [m for m in (message, *self._unsent) if not isinstance(m, Measurement)]
-                self._unsent = deque(kept, maxlen=_UNSENT_MOST)
+                kept = [m for m in (message, *self.unsent) if not isinstance(m, Measurement)]
+                self.unsent = deque(kept, maxlen=_UNSENT_MOST)
                 return
             except OSError:
                 self.gone = True
@@ -162,7 +162,7 @@ def run(connection: socket.socket) -> int:
     if not isinstance(setup, PhysicsSetup):
         return 2
     connection.setblocking(False)
-    clock, parent = WallClock.since(setup.origin), _Parent(connection, setup.parent)
+    clock, parent = WallClock.since(setup.origin), ParentSocket(connection, setup.parent)
     with tick_body(setup) as body:
         realtime = hasten(2)
         # What is there now stays: the collector needn't look through it again and again between two ticks.
@@ -183,7 +183,7 @@ def run(connection: socket.socket) -> int:
     return 1 if loop.failed else 0
 
 
-def _tick(loop: TickLoop, parent: _Parent, clock: WallClock) -> None:
+def _tick(loop: TickLoop, parent: ParentSocket, clock: WallClock) -> None:
     look = clock.now()
     while not loop.finished:
         data = parent.wait(loop.next_deadline() - clock.now())

@@ -29,11 +29,11 @@ IDLE: Final = 20.0
 """A play-back at which nobody looks is closed after so long [s]."""
 SHOW: Final = 1.0 / 30.0
 """Time between two frames [s]: the robot comes first."""
-_LOOK: Final = 0.5
+LOOK: Final = 0.5
 """Time between two looks at who looks [s]."""
 _GROWS: Final = 0.8
 """A file that is being written grows within so long [s]."""
-_WAITING: Final = 64
+WAITING: Final = 64
 """Play-backs that are asked for at once, opened or not."""
 
 
@@ -53,10 +53,10 @@ class _SharedReplay:
         self.page: ReplayPage | None = None
         self.task: asyncio.Task[None] | None = None
         self._allowed, self._open = allowed, open_
-        self.viewers = Viewers(self.board, None, self._let_in, hear=self._hear, most_heard=MOST_HEARD)
+        self.viewers = Viewers(self.board, None, self.let_in, hear=self._hear, most_heard=MOST_HEARD)
         self.say("opening", "Opening…")
 
-    def _let_in(self, token: str | None) -> bool:
+    def let_in(self, token: str | None) -> bool:
         """Whether one may look; the first who may has it opened."""
         allowed = self._allowed(token)
         if allowed and self.task is None:
@@ -84,7 +84,7 @@ class Replays:
             allowed: Whether a token lets one look.
         """
         self._shelf, self._clock, self._allowed = shelf, clock, allowed
-        self._replays: dict[_Key, _SharedReplay] = {}
+        self.replays: dict[_Key, _SharedReplay] = {}
         self._running = False
 
     @property
@@ -99,7 +99,7 @@ class Replays:
     @property
     def open(self) -> int:
         """Play-backs that are open, or being opened."""
-        return sum(replay.task is not None for replay in self._replays.values())
+        return sum(replay.task is not None for replay in self.replays.values())
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[Replays]:
@@ -109,14 +109,14 @@ class Replays:
             yield self
         finally:
             self._running = False
-            tasks = [replay.task for replay in self._replays.values() if replay.task is not None]
+            tasks = [replay.task for replay in self.replays.values() if replay.task is not None]
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _serve_board(self, websocket: WebSocket) -> None:
         try:
-            replay = self._asked(websocket.query_params)
+            replay = self.replay_for(websocket.query_params)
         except InvalidValueError as error:
             board = Newest(BEGIN)
             board.put("standing", json.dumps({"kind": "failed", "text": str(error)}).encode())
@@ -131,30 +131,35 @@ class Replays:
     async def _serve_scene(self, websocket: WebSocket) -> None:
         index = websocket.path_params["index"]
         with contextlib.suppress(InvalidValueError):
-            replay = self._replays.get(_key(websocket.query_params))
+            replay = self.replays.get(_key(websocket.query_params))
             if replay is not None and replay.page is not None and index < len(replay.page.viewers):
                 await replay.page.viewers[index].serve(websocket)
                 return
         await websocket.close()
 
-    def _asked(self, query: Mapping[str, str]) -> _SharedReplay:
+    def replay_for(self, query: Mapping[str, str]) -> _SharedReplay:
+        """The play-back that a page's address asks for, made if nobody has asked for it.
+
+        Raises:
+            InvalidValueError: If a recording isn't there, or too many are asked for.
+        """
         key = _key(query)
         for name in key.names:
             self._shelf.path(name)
-        replay = self._replays.get(key)
+        replay = self.replays.get(key)
         if replay is None:
-            if len(self._replays) >= _WAITING:
-                raise InvalidValueError("replays", len(self._replays) + 1, f"at most {_WAITING}")
-            replay = self._replays[key] = _SharedReplay(key, self._allowed, self._start)
+            if len(self.replays) >= WAITING:
+                raise InvalidValueError("replays", len(self.replays) + 1, f"at most {WAITING}")
+            replay = self.replays[key] = _SharedReplay(key, self._allowed, self._start)
         return replay
 
     def _forget(self, replay: _SharedReplay) -> None:
-        if self._replays.get(replay.key) is replay:
-            del self._replays[replay.key]
+        if self.replays.get(replay.key) is replay:
+            del self.replays[replay.key]
 
     def _start(self, replay: _SharedReplay) -> None:
         if self.open >= MOST:
-            idle = [one for one in self._replays.values() if one.task is not None and not one.board.readers]
+            idle = [one for one in self.replays.values() if one.task is not None and not one.board.readers]
             if not idle:
                 replay.say("failed", f"{MOST} play-backs are open already: close one, then load this page anew")
                 return
@@ -196,8 +201,8 @@ class Replays:
             replay.say("open", "")
             left = 0.0
             while left < IDLE:
-                await asyncio.sleep(_LOOK)
-                left = 0.0 if replay.board.readers else left + _LOOK
+                await asyncio.sleep(LOOK)
+                left = 0.0 if replay.board.readers else left + LOOK
 
 
 def _key(query: Mapping[str, str]) -> _Key:

@@ -120,14 +120,15 @@ class Shelf:
                 known = ShelfEntry(name, state.st_size, state.st_mtime)
                 if left > 0 and name != growing:
                     left -= 1
-                    known = self._known[key] = _looked_into(self.directory / name, known)
+                    known = self._known[key] = look_into(self.directory / name, known)
                     while len(self._known) > 2 * LISTED:
                         self._known.popitem(last=False)
             entries.append(known)
         return entries, max(len(found) - LISTED, 0)
 
 
-def _looked_into(path: Path, entry: ShelfEntry) -> ShelfEntry:
+def look_into(path: Path, entry: ShelfEntry) -> ShelfEntry:
+    """What is in a recording, or why it can't be played."""
     facts = entry.name, entry.size, entry.changed
     if entry.size > LOOKED_INTO:
         return ShelfEntry(*facts, problem="too large for this page: vrs replay opens it", playable=False)

@@ -234,7 +234,8 @@ class OperatorSite:
         """The newest one."""
         self.receipts: dict[int, Receipt] = {}
         """What the robot's engine answered, by command id."""
-        self._entries = 0
+        self.entries_sent = 0
+        """Journal entries sent since the robot began anew."""
         self._under_way: OrderedDict[int, tuple[LogEntry, float]] = OrderedDict()
         """Entries that aren't acknowledged, and when they were sent last [s], in that order."""
         self._acknowledged = 0
@@ -292,7 +293,7 @@ class OperatorSite:
         Raises:
             InvalidValueError: If it can't be sent, or the plan goes on for too long; nothing is written then.
         """
-        number, (now, command, answer, _) = self._entries + 1, deed
+        number, (now, command, answer, _) = self.entries_sent + 1, deed
         if answer is None or answer.status is not Status.REJECTED:
             number_in("end of the plan", self.engine.timeline.end, -LATEST, LATEST, "a session time", " s")
             if command is not None and answer is not None:
@@ -305,7 +306,7 @@ class OperatorSite:
                 self._ids[number] = answer.command_id
             self._under_way[number] = entry, now
             self._new.append(number)
-            self._entries = number
+            self.entries_sent = number
         self._inform(lambda listener: listener.commanded(deed))
 
     def _inform(self, tell: Callable[[SiteObserver], None]) -> None:
@@ -343,7 +344,7 @@ class OperatorSite:
         wanted = self.gathering.wanted(now=now, patience=patience)
         # A robot that knows that it has halted isn't told.
         halted = "" if self.report is None or self.report.halted else self.halted
-        facts = self._entries, now, self._began, heard, entries, wanted, halted
+        facts = self.entries_sent, now, self._began, heard, entries, wanted, halted
         return (Orders(self.epoch, self._packets, now, *facts),)
 
     def next_deadline(self) -> float:
@@ -401,10 +402,10 @@ class OperatorSite:
     def _watch_progress(self, report: Report, now: float) -> None:
         """Count a robot as halted that hears what is sent and yet carries nothing out."""
         progressed = report.executed > self._acknowledged
-        for number in range(self._acknowledged + 1, min(report.executed, self._entries) + 1):
+        for number in range(self._acknowledged + 1, min(report.executed, self.entries_sent) + 1):
             self._under_way.pop(number, None)
         self._acknowledged = max(self._acknowledged, report.executed)
-        if self.halted or self._acknowledged >= self._entries:
+        if self.halted or self._acknowledged >= self.entries_sent:
             self._waits = None
         elif progressed or self._waits is None:
             self._waits = now, now, 0.0
@@ -455,7 +456,7 @@ class OperatorSite:
     def _follow(self, part: PlanPart, reason: str) -> None:
         """Let the virtual robot follow the real one's plan, and what is still under way to it."""
         now = self._clock.now()
-        compared = part.version, self._entries, len(self._under_way), self.engine.timeline.version
+        compared = part.version, self.entries_sent, len(self._under_way), self.engine.timeline.version
         if compared == self._compared:
             return
         plan = Timeline(part.initial, part.since, part.segments, part.version)
@@ -499,7 +500,7 @@ class OperatorSite:
             left = self.engine.timeline.end - now
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"
         self.epoch, self._began, self.halted, self.stuck = self.epoch + 1, now, "", False
-        self._entries, self._acknowledged, self._due = 0, 0, now
+        self.entries_sent, self._acknowledged, self._due = 0, 0, now
         self._new = []
         self._recent.clear()
         self._under_way.clear()

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from robots.bullet.serial_arm import RigidLink, quaternion
 from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, LostError, RoomBodies, World
@@ -471,7 +472,8 @@ class MobileBody(MobileRobot):
         _, turned = bullet.multiplyTransforms([0.0] * 3, upright, [0.0] * 3, turn)
         bullet.resetBasePositionAndOrientation(self.body_id, place, turned, physicsClientId=client)
 
-    def _shafts(self) -> tuple[float, float]:
+    @override
+    def shafts(self) -> tuple[float, float]:
         return self._angles
 
     def _put(self, posture: tuple[float, float, float]) -> None:
@@ -479,5 +481,6 @@ class MobileBody(MobileRobot):
         self._move(posture)
         self._truth = posture
 
-    def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
+    @override
+    def distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
         return self._room_bodies.cast(origins, directions, height, reach)

@@ -11,6 +11,7 @@ from typing import ClassVar, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from typing_extensions import override
 
 from robots.bullet.rooms import EMPTY, Room, load_room
 from robots.ipr.chassis import Chassis, MobileReality, Senses, chassis
@@ -283,11 +284,11 @@ class MobileRobot(ABC):
         """Be somewhere else, at rest."""
 
     @abstractmethod
-    def _shafts(self) -> tuple[float, float]:
+    def shafts(self) -> tuple[float, float]:
         """Angles that the motors' shafts have turned by, at the wheel's side of the gear [rad]."""
 
     @abstractmethod
-    def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
+    def distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
         """How far level rays go now at a height [m], inf where nothing is within reach."""
 
     def _ready(self) -> None:
@@ -307,7 +308,7 @@ class MobileRobot(ABC):
             self._camera.look(self._truth, self.time)
         if self._sonar is not None and self._steps % self._every_sonar == 0:
             origins, directions = self._sonar.rays(self._truth)
-            found = self._distances(origins, directions, self._sonar.reach, self.chassis.sonar_height)
+            found = self.distances(origins, directions, self._sonar.reach, self.chassis.sonar_height)
             if self._sees("sonar ring", found, len(origins)):
                 self._scan = self._sonar.scan(found, self.time)
         if self._laser is not None and self._steps % self._every_sweep == 0:
@@ -331,7 +332,7 @@ class MobileRobot(ABC):
 
     def _read_shafts(self) -> None:
         """Read the encoders; what can't be is left out."""
-        shafts, sound = self._shafts(), True
+        shafts, sound = self.shafts(), True
         for side, angle, before in zip(("right", "left"), shafts, self._shafts_read, strict=True):
             leap = before - _LEAP, before + _LEAP
             sound &= self.watch.see(f"{side} wheel's encoder", angle, *leap, now=self.time)
@@ -349,7 +350,7 @@ class MobileRobot(ABC):
     def _cast_laser(self, origins: Array, directions: Array) -> Array:
         model = self.senses.laser
         assert model is not None
-        found = self._distances(origins, directions, model.reach, model.height)
+        found = self.distances(origins, directions, model.reach, model.height)
         if self._beams_sound and self._sees("laser scanner", found, len(origins)):
             return found
         self._beams_sound = False
@@ -452,14 +453,16 @@ class BareBody(MobileRobot):
             self._truth = self._free
             self._speed = 0.0, 0.0
 
-    def _shafts(self) -> tuple[float, float]:
+    @override
+    def shafts(self) -> tuple[float, float]:
         return self._angle_right, self._angle_left
 
     def _put(self, posture: tuple[float, float, float]) -> None:
         self._truth = self._free = posture
         self._speed, self._free_until = (0.0, 0.0), 0
 
-    def _distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
+    @override
+    def distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:
         if height not in self._seen:
             self._seen[height] = FloorPlan(self.room, height)
         return self._seen[height].cast(origins, directions, self.time, reach)

@@ -33,7 +33,7 @@ class DocumentReader:
     scene: Message | None = None
     outbox: list[Message] = field(default_factory=list)
     _fetched: list[Row] = field(default_factory=list)
-    _held: dict[int, Message] = field(default_factory=dict)
+    held: dict[int, Message] = field(default_factory=dict)
 
     def begin(self, number: int = 1) -> None:
         """Follow."""
@@ -51,9 +51,9 @@ class DocumentReader:
                 if len(self._fetched) % 256 == 0 or len(self._fetched) == self.scene["segments"]:
                     self._next()
             case "change":
-                self._held[message.get("base", message["edit"] - 1)] = message
-                while self.rows is not None and self.edit in self._held:
-                    self._apply(self._held.pop(self.edit))
+                self.held[message.get("base", message["edit"] - 1)] = message
+                while self.rows is not None and self.edit in self.held:
+                    self._apply(self.held.pop(self.edit))
             case "pulse":
                 if message["edit"] == self.edit:
                     past = message.get("past", message["now"])

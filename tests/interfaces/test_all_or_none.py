@@ -126,8 +126,8 @@ class Sites:
             [entry for i, entry in plan.ledger._entries.items() if i not in rejected],
             plan.ledger._changes, plan.ledger._versions, plan.ledger._stills, plan.ledger._undo,
             plan.ledger.settled,
-            operator._entries, operator._under_way, operator._new, operator._ids, operator.halted, operator.epoch,
-            self.site.journal.number, list(self.site.journal._edits),
+            operator.entries_sent, operator._under_way, operator._new, operator._ids,
+            operator.halted, operator.epoch, self.site.journal.number, list(self.site.journal._edits),
             [deed for deed in self.notes.deeds if deed.receipt is None or deed.receipt.status != "rejected"],
         ))  # fmt: skip
 
@@ -139,7 +139,7 @@ class Sites:
         assert self.robot.engine.timeline == self.operator.engine.timeline
         assert self.robot.engine.timeline.end == outcome.receipt.end
         assert self.operator.report is not None
-        assert self.operator.report.executed == self.operator._entries
+        assert self.operator.report.executed == self.operator.entries_sent
         assert not self.operator.halted
 
 
@@ -316,7 +316,7 @@ def test_a_command_that_no_robot_would_read_isnt_taken() -> None:
         with pytest.raises(InvalidValueError, match=r"at least 2\.23e-308"):
             operator.engine.execute(ParameterChange("qd_max", value))
     assert operator.engine.limits is limits
-    assert operator._entries == 0
+    assert operator.entries_sent == 0
 
 
 @pytest.mark.parametrize("told", ["commanded", "answered", "reported", "measured"])

@@ -29,7 +29,7 @@ from interfaces.runtime.physics_messages import (
     TickCounts,
     decode_news,
 )
-from interfaces.runtime.physics_process import _Parent, tick_body
+from interfaces.runtime.physics_process import ParentSocket, tick_body
 from interfaces.runtime.session import simulated_puma
 from interfaces.teleop import JointReference, RobotSite
 from tests.interfaces.test_teleop import laboratory
@@ -258,9 +258,9 @@ def test_a_fault_waits_until_the_parent_reads_and_measurements_do_not() -> None:
         theirs.setblocking(False)
         ours.setblocking(False)
         counts = TickCounts(1, 0, 0.0, 0, 0, (1,))
-        told, fault = _Parent(theirs, os.getppid()), Fault(1, FaultKind.STARVED, "", 5, (0.0,), 6)
+        told, fault = ParentSocket(theirs, os.getppid()), Fault(1, FaultKind.STARVED, "", 5, (0.0,), 6)
         number = 0
-        while not told._unsent and number < 100_000:
+        while not told.unsent and number < 100_000:
             told.tell([PhysicsReady(number, False)])
             number += 1
         told.tell([fault, Measurement(7, PhysicsActivity.HOLDING, (0.0,), (0.0,), (), (0.0,), 7, counts)])

@@ -185,7 +185,7 @@ class TestDoulgeri:
         assert all(claim.holds for claim in lateness)
         wrong = delays.SETTINGS["0"]._replace(D=0.01)
         seen, _ = delays.run(delays.SETTINGS["0"], 5, 4.0)
-        assert not any(claim.holds for claim in delays._claims(SMALL, wrong, [seen])[:2])
+        assert not any(claim.holds for claim in delays.delay_claims(SMALL, wrong, [seen])[:2])
 
     def test_causality_is_told_rightly_by_each_clock(self):
         for D in (0.0, -causality.D_F, causality.D_B):
@@ -194,9 +194,9 @@ class TestDoulgeri:
             assert in_time > 0
 
     def test_a_frame_that_lacks_is_seen(self):
-        assert broadcasting._missing([3, 4, 5]) == 0
-        assert broadcasting._missing([3, 5, 6]) == 1
-        assert broadcasting._missing([]) == 1
+        assert broadcasting.count_missing([3, 4, 5]) == 0
+        assert broadcasting.count_missing([3, 5, 6]) == 1
+        assert broadcasting.count_missing([]) == 1
 
     def test_jitter_adaptive_and_fixed(self):
         adaptive, trace = jitter.run("mon@2", 1, 5.0, None)

@@ -11,7 +11,7 @@ from vrs.errors import InvalidValueError, PlanningError
 from vrs.planning import jerk_limited, move, overlapped, parabolic, run_up, violation
 from vrs.planning.certificate import bounds
 from vrs.planning.online import online
-from vrs.planning.parabolic import _certified, _Move, _quickest, _slowest_joint, _Times, blend
+from vrs.planning.parabolic import ParabolicMove, ParabolicTimes, blend, certified, quickest, slowest_joint
 from vrs.planning.plan import Plan, empty, end_state, integrate
 from vrs.segment import State
 
@@ -263,16 +263,18 @@ def test_a_blend_is_certified_apart_from_the_search():
     """One joint at 1 rad/s turns round at 4 rad/s² and goes back at 1 rad/s."""
     one = np.ones(1)
     bound = bounds(Limits(-3 * one, 3 * one, one, 4 * one))
-    back = _Move([0.0], [1.0], [-2.0], [1.0], bound)
-    assert _quickest(back, _slowest_joint(back)) == pytest.approx((2.625, 0.5, 2.25))
-    assert len(_certified(back, _Times(2.625, 0.5, 2.25))) == 3
+    back = ParabolicMove([0.0], [1.0], [-2.0], [1.0], bound)
+    assert quickest(back, slowest_joint(back)) == pytest.approx((2.625, 0.5, 2.25))
+    assert len(certified(back, ParabolicTimes(2.625, 0.5, 2.25))) == 3
     for b, last, L in ((0.4, 0.25, 2.2), (0.5, 0.2, 2.25), (0.5, 0.25, 2.0)):
-        assert _certified(back, _Times(L + 0.5 * (b + last), b, L)) is None
+        assert certified(back, ParabolicTimes(L + 0.5 * (b + last), b, L)) is None
     # It would turn at 0.125 rad.
-    near = _Move([2.9], [1.0], [1.0], [1.0], bound)
-    assert _certified(near, _Times(2.525, 0.5, 2.15)) is None
+    near = ParabolicMove([2.9], [1.0], [1.0], [1.0], bound)
+    assert certified(near, ParabolicTimes(2.525, 0.5, 2.15)) is None
     # A line of 1e-10 s is left out, and nothing jumps.
-    short = _certified(_Move([0.0], [1.0], [0.075], [1.0], bound), _Times(0.35 + 0.35 - 1e-10, 0.5, 0.35))
+    short = certified(
+        ParabolicMove([0.0], [1.0], [0.075], [1.0], bound), ParabolicTimes(0.35 + 0.35 - 1e-10, 0.5, 0.35)
+    )
     assert len(short) == 2
     assert jumps(short, 0).max() < 1e-15
 

@@ -133,20 +133,20 @@ def blend(
     if back:
         qd = [-value for value in qd]
         fastest = [abs(v) if abs(v) > top else top for v, top in zip(qd, fastest, strict=True)]
-    move = _Move(state.q.tolist(), qd, q.tolist(), fastest, bound)
-    slowest = _slowest_joint(move)
-    times = _quickest(move, slowest)
-    plan = None if times is None else _certified(move, times, back=back)
+    move = ParabolicMove(state.q.tolist(), qd, q.tolist(), fastest, bound)
+    slowest = slowest_joint(move)
+    times = quickest(move, slowest)
+    plan = None if times is None else certified(move, times, back=back)
     if plan is None:
         times = _searched(move, limits)
-        plan = None if times is None else _certified(move, times, back=back)
+        plan = None if times is None else certified(move, times, back=back)
     # Through rest nothing is quicker than its slowest joint alone would be, and that's known.
     if plan is None or plan.duration <= patience * slowest.total:
         return plan
     return plan if plan.duration <= patience * _through_rest(move, speed) else None
 
 
-class _Times(NamedTuple):
+class ParabolicTimes(NamedTuple):
     """Of a redirection [s]."""
 
     total: float
@@ -176,7 +176,7 @@ class _Value(NamedTuple):
     """dT/db; negative where a longer blend might do."""
 
 
-class _Move:
+class ParabolicMove:
     """What a redirection starts from and goes to, as plain floats."""
 
     __slots__ = ("bound", "joints", "q", "q0", "qd", "way")
@@ -190,7 +190,7 @@ class _Move:
         """Way, speed, fastest cruise and acceleration of each joint."""
 
 
-def _quickest(move: _Move, slowest: _Slowest) -> _Times | None:
+def quickest(move: ParabolicMove, slowest: _Slowest) -> ParabolicTimes | None:
     """The fastest redirection, its turning points not looked at; None where the search doesn't end.
 
     Where the other joints can follow the slowest, nothing is faster.
@@ -211,11 +211,11 @@ def _quickest(move: _Move, slowest: _Slowest) -> _Times | None:
         b = longer * (1.0 + _OVER)
     else:
         return None
-    found = _Times(L + 0.5 * (b + A / L), b, L)
+    found = ParabolicTimes(L + 0.5 * (b + A / L), b, L)
     return _slowing(move, found) if slowest.too_fast else found
 
 
-def _slowest_joint(move: _Move) -> _Slowest:
+def slowest_joint(move: ParabolicMove) -> _Slowest:
     """The joint that needs longest when it's alone."""
     longest, b = 0.0, 0.0
     too_fast = False
@@ -243,7 +243,7 @@ def _slowest_joint(move: _Move) -> _Slowest:
     return _Slowest(longest, b if b > 1e-6 * longest else 1e-6 * longest, too_fast)
 
 
-def _needed(move: _Move, b: float) -> tuple[float, float, float]:
+def _needed(move: ParabolicMove, b: float) -> tuple[float, float, float]:
     """Smallest L of a blend time that cruises and stops within the limits, A, and the time that its blend needs."""
     L = A = needed = 0.0
     half = 0.5 * b
@@ -262,7 +262,7 @@ def _needed(move: _Move, b: float) -> tuple[float, float, float]:
     return L, A, needed
 
 
-def _through_rest(move: _Move, speed: float) -> float:
+def _through_rest(move: ParabolicMove, speed: float) -> float:
     """Duration of braking and of the move from there [s], whether or not it keeps the position limits."""
     longest = slowest = weakest = 0.0
     for (way, qd, _, g), v in zip(move.joints, move.bound.qd_max, strict=True):
@@ -277,7 +277,7 @@ def _through_rest(move: _Move, speed: float) -> float:
     return longest + 1.0 / rate + rate * weakest
 
 
-def _slowing(move: _Move, found: _Times) -> _Times:
+def _slowing(move: ParabolicMove, found: ParabolicTimes) -> ParabolicTimes:
     """A longer blend, where a joint that is faster than it may cruise had better slow down gradually.
 
     T(b) is convex but for details: tangents at both ends of a bracket meet near its minimum.
@@ -290,7 +290,7 @@ def _slowing(move: _Move, found: _Times) -> _Times:
         high = max(3.0 * high, 0.25 * at_low.total)
         at_high = _value(move, high)
         if at_high.total < found.total:
-            found = _Times(at_high.total, high, at_high.L)
+            found = ParabolicTimes(at_high.total, high, at_high.L)
         if at_high.slope >= 0.0:
             break
         if at_high.total < math.inf:
@@ -306,7 +306,7 @@ def _slowing(move: _Move, found: _Times) -> _Times:
         b = min(max(meet, low + edge), high - edge)
         value = _value(move, b)
         if value.total < found.total:
-            found = _Times(value.total, b, value.L)
+            found = ParabolicTimes(value.total, b, value.L)
         if value.slope >= 0.0:
             high, at_high = b, value
         elif value.total < math.inf:
@@ -316,7 +316,7 @@ def _slowing(move: _Move, found: _Times) -> _Times:
     return found
 
 
-def _value(move: _Move, b: float) -> _Value:
+def _value(move: ParabolicMove, b: float) -> _Value:
     """The best redirection of a blend time, all limits but the positions kept."""
     L = A = L_slope = A_slope = 0.0
     longest = math.inf
@@ -347,7 +347,7 @@ def _value(move: _Move, b: float) -> _Value:
     return _Value(L + 0.5 * b + half, L, L_slope * (1.0 - half / L) + 0.5 + 0.5 * A_slope / L)
 
 
-def _certified(move: _Move, times: _Times, *, back: bool = False) -> Plan | None:
+def certified(move: ParabolicMove, times: ParabolicTimes, *, back: bool = False) -> Plan | None:
     """The plan, or its mirror image in time, or None if it passes a limit.
 
     The certificate is exact: speeds are linear between q0', V, V and 0, accelerations constant, and a joint turns
@@ -403,7 +403,7 @@ def _certified(move: _Move, times: _Times, *, back: bool = False) -> Plan | None
     return parabolas([b, line, last], [*opening, corner, V, zero, *closing])
 
 
-def _searched(move: _Move, limits: Limits) -> _Times | None:
+def _searched(move: ParabolicMove, limits: Limits) -> ParabolicTimes | None:
     """The fastest redirection on a grid of blend times whose turning points lie within the limits."""
     stopping = float(np.max(np.abs(move.qd) / limits.qdd_max))
     reversing = float(np.max(limits.qd_max / limits.qdd_max))
@@ -415,7 +415,7 @@ def _searched(move: _Move, limits: Limits) -> _Times | None:
     return finer if finer is not None and finer.total < best.total else best
 
 
-def _least_time(move: _Move, limits: Limits, b: Array) -> _Times | None:
+def _least_time(move: ParabolicMove, limits: Limits, b: Array) -> ParabolicTimes | None:
     """The fastest feasible redirection among blend times b, or None."""
     q0, qd = np.array(move.q0), np.array(move.qd)
     fastest = np.array([fastest for _, _, fastest, _ in move.joints])
@@ -444,7 +444,7 @@ def _least_time(move: _Move, limits: Limits, b: Array) -> _Times | None:
     if not possible.any():
         return None
     i = int(np.argmin(np.where(possible, T, np.inf)))
-    return _Times(float(T[i]), float(b[i]), float(L[i]))
+    return ParabolicTimes(float(T[i]), float(b[i]), float(L[i]))
 
 
 __all__ = ["NEGLIGIBLE", "blend", "brake", "from_rest", "rest_to_rest", "to_rest"]

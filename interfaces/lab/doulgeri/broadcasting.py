@@ -67,7 +67,7 @@ def work(study: Study, _case: str) -> Findings:
     claims, rows, gaps = [], [], {}
     for rate, broadcaster in zip(RATES, broadcasters, strict=True):
         made = broadcaster.number
-        missing = [_missing(tap.numbers) for tap in taps[rate]]
+        missing = [count_missing(tap.numbers) for tap in taps[rate]]
         gaps[rate] = np.concatenate([np.diff(tap.times) for tap in taps[rate]])
         delivered = min(len(tap.times) for tap in taps[rate])
         counted = sum(missing) == 0 and broadcaster.skipped == 0 and delivered >= rate * length
@@ -111,7 +111,7 @@ def work(study: Study, _case: str) -> Findings:
     return Findings(tuple(claims), (table,), (picture,), load())
 
 
-def _missing(numbers: list[int]) -> int:
+def count_missing(numbers: list[int]) -> int:
     """Frames between the first and the last that didn't come."""
     return numbers[-1] - numbers[0] + 1 - len(numbers) if numbers else 1
 

@@ -186,11 +186,11 @@ def conclude(study: Study, found: tuple[object, ...]) -> Findings:
     for case, result in zip(SETTINGS, found, strict=False):
         setting = SETTINGS[case]
         seen, sent = cast("tuple[list[DelayResult], LinkTraffic]", result)
-        claims += _claims(study, setting, seen)
+        claims += delay_claims(study, setting, seen)
         rows.append(_row(study, setting, seen))
         diagrams.append((setting, sent))
     shares = np.array(found[-1])
-    claims += _lead_claims(study, shares)
+    claims += lead_claims(study, shares)
     columns = (
         "clock",
         "lateness, paper s",
@@ -222,7 +222,8 @@ def conclude(study: Study, found: tuple[object, ...]) -> Findings:
     return Findings(tuple(claims), (table,), pictures)
 
 
-def _claims(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> list[Claim]:
+def delay_claims(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> list[Claim]:
+    """What must hold of the runs at one setting of the offset."""
     late = np.concatenate([s.lateness for s in seen])
     off = float(np.abs(late - setting.lateness).max())
     low, high = min(s.ages[0] for s in seen), max(s.ages[2] for s in seen)
@@ -305,7 +306,8 @@ def _row(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> tuple
     )
 
 
-def _lead_claims(study: Study, shares: np.ndarray) -> list[Claim]:
+def lead_claims(study: Study, shares: np.ndarray) -> list[Claim]:
+    """What must hold of the shares of predicted frames that were falsified; shares: (runs, leads)."""
     claims = []
     for k in (1, 4, 6):
         lead = LEADS[k]

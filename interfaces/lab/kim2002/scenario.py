@@ -148,10 +148,10 @@ def play(scenario: Scenario) -> ScenarioResult:
     room = home(rng)
     senses = Senses(camera=None, laser=LaserModel())
     with MobileBody("ipr", room=room, rng=np.random.default_rng([scenario.seed, 2]), senses=senses) as body:
-        return _ScenarioRun(scenario, room, body).whole()
+        return ScenarioRun(scenario, room, body).whole()
 
 
-class _ScenarioRun:
+class ScenarioRun:
     """A run while it goes on."""
 
     def __init__(self, scenario: Scenario, room: Room, body: MobileBody) -> None:
@@ -170,6 +170,7 @@ class _ScenarioRun:
         self._passed = math.inf
 
     def whole(self) -> ScenarioResult:
+        """Drive until it's done, or has taken too long."""
         body, pilot, runner = self._body, self._pilot, self._runner
         begun = brought = pressed = False
         while body.time < LONGEST:
@@ -189,7 +190,7 @@ class _ScenarioRun:
                 break
             pilot.step()
             if pressed:
-                self._passed = min(self._passed, self._gap())
+                self._passed = min(self._passed, self.gap())
         return self._made()
 
     def _answer(self, now: float) -> None:
@@ -234,7 +235,7 @@ class _ScenarioRun:
             math.hypot(told.x - x, told.y - y),
         )  # fmt: skip
 
-    def _gap(self) -> float:
+    def gap(self) -> float:
         """From the robot's outline to who walks by, now [m]."""
         x, y, theta = self._body.truth
         walker = self._room.people[1]
@@ -290,7 +291,7 @@ def conclude(study: Study, measured: tuple[tuple[ScenarioResult, ...], ...]) -> 
         *(_turn(study, name, k, found) for k, name in enumerate("BA")),
         *(_known(study, name, k, found) for k, name in enumerate("BA")),
     )
-    return Findings(claims, (_table(found),), (_picture(found[0]),))
+    return Findings(claims, (_table(found),), (picture(found[0]),))
 
 
 def _count(total: int, what: str, good: Sequence[bool]) -> Claim:
@@ -346,7 +347,8 @@ def _table(found: Sequence[ScenarioResult]) -> Table:
     return Table("scenario", "the scenario, run by run", COLUMNS, tuple(rows))
 
 
-def _picture(one: ScenarioResult) -> Figure:
+def picture(one: ScenarioResult) -> Figure:
+    """The room and the ways that were driven in it."""
     room = home(np.random.default_rng(0))
 
     def paint(canvas: Canvas) -> None:

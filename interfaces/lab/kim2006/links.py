@@ -91,7 +91,7 @@ def work(study: Study, case: str) -> list[LinkResult]:
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """A claim a network and loss, and the table of all schemes."""
     found: list[LinkResult] = [one for result in results for one in result]
-    claims = tuple(_claim(one) for one in found)
+    claims = tuple(wins_claim(one) for one in found)
     columns = (
         "delay", "loss", "scheme", "path error [cm]", "largest [cm]", "progress", "age of commands [s]",
         "age of a single command [s]", "single commands missing", "to the robot [byte/s]", "from it [byte/s]",
@@ -101,10 +101,11 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     table = Table(
         "schemes", f"Four schemes on the same links, {study.runs} seeds of {study.length:g} s", columns, rows
     )
-    return Findings(claims, (table, _wins(found)), (_drawn(study), _errors(found)))
+    return Findings(claims, (table, wins_table(found)), (_drawn(study), _errors(found)))
 
 
-def _claim(one: LinkResult) -> Claim:
+def wins_claim(one: LinkResult) -> Claim:
+    """RSP's path error beside that of TCP with fixed packets, over one link."""
     beside = one.pairs["tcp"]
     found = beside.difference
     text = f"{one.delay}, loss {one.loss:g}: path error of RSP − TCP with fixed packets, way that both reached [cm]"
@@ -127,7 +128,7 @@ def _finite(value: float) -> Cell:
     return value if math.isfinite(value) else "never"
 
 
-def _wins(found: list[LinkResult]) -> Table:
+def wins_table(found: list[LinkResult]) -> Table:
     """Where each scheme is better than RSP, in what."""
     rows: list[tuple[Cell, ...]] = []
     measures: tuple[tuple[str, Callable[[tuple[float, ...]], float]], ...] = (

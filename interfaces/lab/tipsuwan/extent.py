@@ -70,10 +70,10 @@ def work(study: Study, case: str) -> dict[float, tuple[str, ...]]:
     axis, text = case.split()
     row = varied(axis, float(text), study.length)
     numbers = [1000 * study.seed + 500 + k for k in range(max(study.runs // 5, 1))]
-    return {tau: tuple(_outcome(number, tau, row) for number in numbers) for tau in TAUS}
+    return {tau: tuple(outcome_letter(number, tau, row) for number in numbers) for tau in TAUS}
 
 
-def _outcome(number: int, tau: float, row: Varied) -> str:
+def outcome_letter(number: int, tau: float, row: Varied) -> str:
     """One path at one delay: a letter of `WHY`."""
     curve = s_path(number, NOMINAL_T_PRED) if row.t_pred is None else s_path(number, row.t_pred, tau=tau)
 

@@ -47,7 +47,7 @@ def work(study: Study, _case: str) -> Findings:
     }
     chosen = examples(network.ranges, EXAMPLES, rng)
     found = {name: {kind: errors(one, *given) for kind, given in chosen.items()} for name, one in networks.items()}
-    claims = [claim for name in list(networks)[:2] for claim in _accurate(name, found[name])]
+    claims = [claim for name in list(networks)[:2] for claim in accuracy_claims(name, found[name])]
     guarded = {kind: guard(network, given, GUARDED * study.runs // 10) for kind, given in chosen.items()}
     claims += [
         Claim(
@@ -69,7 +69,8 @@ def work(study: Study, _case: str) -> Findings:
     return Findings(tuple(claims), tables, (), (timing,))
 
 
-def _accurate(name: str, found: dict[str, Errors]) -> list[Claim]:
+def accuracy_claims(name: str, found: dict[str, Errors]) -> list[Claim]:
+    """How near a network's gains are to the exact ones, for each kind of input."""
     claims = []
     for kind, one in found.items():
         for what, value, bar in (("p99", one.p99, P99), ("largest", one.largest, LARGEST)):

@@ -129,7 +129,7 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
         tables += [controls(robot, paths), _paths(robot, paths)]
         tracks = found[f"{robot} 0"].tracks
         if tracks:
-            figures.append(_figure(robot, tracks))
+            figures.append(success_figure(robot, tracks))
     return Findings(tuple(claims), tuple(tables), tuple(figures))
 
 
@@ -206,7 +206,9 @@ COLOURS: Final = {
 }
 
 
-def _figure(robot: str, tracks: dict[str, DriveTrace]) -> Figure:
+def success_figure(robot: str, tracks: dict[str, DriveTrace]) -> Figure:
+    """The paths that a robot drove, beside the one that it was to follow."""
+
     def paint(canvas: Canvas) -> None:
         left, right = canvas.subplots(1, 2)
         left.plot(*tracks[IDEAL].curve.table[1].T, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="path")

@@ -94,7 +94,7 @@ def work(study: Study, case: str) -> dict[str, tuple[SuccessResult, ...]]:
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """What the middleware does for each of the controllers."""
     found: dict[str, dict[str, tuple[SuccessResult, ...]]] = dict(zip(CASES, results, strict=True))
-    claims = tuple(_claim(case, runs, study.seed) for case, runs in found.items())
+    claims = tuple(wrapping_claim(case, runs, study.seed) for case, runs in found.items())
     rows: list[tuple[Cell, ...]] = []
     for case, runs in found.items():
         for way, them in runs.items():
@@ -108,7 +108,8 @@ def _mean_error(runs: tuple[SuccessResult, ...]) -> float:
     return 100 * float(np.mean([one.error for one in runs]))
 
 
-def _claim(case: str, runs: dict[str, tuple[SuccessResult, ...]], seed: int) -> Claim:
+def wrapping_claim(case: str, runs: dict[str, tuple[SuccessResult, ...]], seed: int) -> Claim:
+    """The error with the middleware as a share of that without, for one robot and path."""
     robot, name = case.split("/")
     ratios = [behind.error / without.error for behind, without in zip(runs["with"], runs["without"], strict=True)]
     ratio = bootstrap(ratios, seed)

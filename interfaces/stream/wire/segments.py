@@ -78,7 +78,7 @@ def segments_of(dof: int, start: float, wires: Iterable[SegmentWire[Any]]) -> tu
     for wire in wires:
         start = start if wire.start is None else wire.start
         given = wire.coefficients
-        a = _packed(given, dof) if isinstance(given, bytes) else _plain(given, dof)
+        a = coefficients_from_bytes(given, dof) if isinstance(given, bytes) else coefficients_from_lists(given, dof)
         found.append(known_segment(start, wire.duration, a, wire.command_id))
         start += wire.duration
     if found and not np.isfinite(np.concatenate([segment.coefficients.ravel() for segment in found])).all():
@@ -86,14 +86,16 @@ def segments_of(dof: int, start: float, wires: Iterable[SegmentWire[Any]]) -> tu
     return tuple(found)
 
 
-def _packed(data: bytes, dof: int) -> Array:
+def coefficients_from_bytes(data: bytes, dof: int) -> Array:
+    """A segment's coefficients, (powers, dof), as MessagePack carries them: little-endian doubles."""
     row = 8 * dof
     if not row or len(data) % row or len(data) > row * MOST_POWERS:
         raise InvalidValueError("coefficients", f"{len(data)} bytes", f"1 to {MOST_POWERS} rows of {dof} doubles")
     return np.frombuffer(data, _DOUBLE).reshape(-1, dof)
 
 
-def _plain(data: list[list[float]], dof: int) -> Array:
+def coefficients_from_lists(data: list[list[float]], dof: int) -> Array:
+    """A segment's coefficients, (powers, dof), as JSON carries them: a list of rows."""
     if any(len(row) != dof for row in data):
         raise InvalidValueError("coefficients", [len(row) for row in data], f"rows of {dof} numbers")
     a: Array = np.array(data)

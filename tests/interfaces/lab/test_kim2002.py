@@ -19,8 +19,8 @@ from interfaces.lab.kim2002.scenario import (
     PLEASE,
     Scenario,
     ScenarioResult,
+    ScenarioRun,
     ScenarioStop,
-    _ScenarioRun,
     conclude,
     play,
 )
@@ -77,7 +77,7 @@ GOOD = ScenarioResult(
 
 
 def concluded(monkeypatch: pytest.MonkeyPatch, *runs: ScenarioResult) -> dict[str, Claim]:
-    monkeypatch.setattr(scenario, "_picture", lambda _: Figure("", "", ""))
+    monkeypatch.setattr(scenario, "picture", lambda _: Figure("", "", ""))
     measured = tuple(tuple(runs[k :: scenario.TOGETHER]) for k in range(scenario.TOGETHER))
     return {claim.claim: claim for claim in conclude(Study(runs=len(runs)), measured).claims}
 
@@ -116,9 +116,9 @@ def test_a_gap_is_from_outline_to_outline() -> None:
     walker = Person("passer-by", 0.22, 1.7, (0.0, 1.0), ((2.0, 0.1), (2.0, 0.1)))
     body = SimpleNamespace(truth=(0.0, 0.0, 0.0), time=0.0)
     run: Any = SimpleNamespace(_body=body, _room=SimpleNamespace(people=(None, walker)))
-    assert _ScenarioRun._gap(run) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)
+    assert ScenarioRun.gap(run) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)
     body.truth = (2.0, -0.9, math.pi)
-    assert _ScenarioRun._gap(run) == pytest.approx(1.0 - IPR.width / 2 - 0.22)
+    assert ScenarioRun.gap(run) == pytest.approx(1.0 - IPR.width / 2 - 0.22)
 
 
 def test_the_paper_is_known_by_its_name() -> None:

@@ -128,8 +128,8 @@ def test_the_verdict_is_the_paired_intervals() -> None:
 
 def test_a_claim_fails_where_tcp_is_nearer() -> None:
     worse = LinkResult("mon", 0.1, dict.fromkeys(SCHEMES, (0.01,) * 8), {"tcp": Pair((0.02, 0.021), (0.01, 0.011))})
-    assert not links._claim(worse).holds
-    rows = links._wins(
+    assert not links.wins_claim(worse).holds
+    rows = links.wins_table(
         [LinkResult(*worse[:3], dict.fromkeys(("tcp", "fixed", "repeated"), worse.pairs["tcp"]))]
     ).rows
     assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1]

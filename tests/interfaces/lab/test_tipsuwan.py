@@ -224,7 +224,7 @@ def test_a_case_is_run_by_all_controls():
     found = success.work(Study(seed=0, runs=2, length=2.0), "kinematic 0")
     assert {control: len(runs) for control, runs in found.runs.items()} == dict.fromkeys(NetworkControl, 2)
     assert set(found.tracks) == {success.IDEAL, *success.LABELS.values()}
-    figure = success._figure("kinematic", found.tracks)
+    figure = success.success_figure("kinematic", found.tracks)
     assert figure.svg.startswith("<?xml")
 
 
@@ -274,9 +274,9 @@ def test_the_gains_claims_hold(monkeypatch):
 
 def test_the_gains_claims_fail_where_it_is_off_and_name_percent():
     good = gain.Errors(1e-5, 1e-3, 5e-3)
-    assert [claim.measured for claim in gain._accurate("one", {"uniform": good})] == pytest.approx([0.1, 0.5])
+    assert [claim.measured for claim in gain.accuracy_claims("one", {"uniform": good})] == pytest.approx([0.1, 0.5])
     for bad, holds in (({"p99": 1.01e-3}, [False, True]), ({"largest": 5.01e-3}, [True, False])):
-        claims = gain._accurate("one", {"uniform": good, "other": good._replace(**bad)})
+        claims = gain.accuracy_claims("one", {"uniform": good, "other": good._replace(**bad)})
         assert [claim.holds for claim in claims] == [True, True, *holds]
 
 
@@ -293,10 +293,10 @@ def test_a_guard_that_lets_too_much_pass_fails(monkeypatch):
 
 def test_a_controller_that_is_no_better_behind_the_middleware_fails():
     runs = {"without": (GOOD["without"],) * 4, "with": (GOOD["behind"],) * 4}
-    assert wrapping._claim("ipr/one", runs, 0).holds
-    assert wrapping._claim("ipr/one", runs, 0).measured == pytest.approx(0.2)
+    assert wrapping.wrapping_claim("ipr/one", runs, 0).holds
+    assert wrapping.wrapping_claim("ipr/one", runs, 0).measured == pytest.approx(0.2)
     worse = (*(GOOD["behind"],) * 3, GOOD["behind"]._replace(error=0.4))
-    assert not wrapping._claim("ipr/one", runs | {"with": worse}, 0).holds
+    assert not wrapping.wrapping_claim("ipr/one", runs | {"with": worse}, 0).holds
 
 
 @pytest.mark.parametrize(("arrivals", "error", "letter"), [
@@ -314,7 +314,7 @@ def test_a_letter_says_what_became_of_a_path(arrivals, error, letter, monkeypatc
         return SuccessResult(arrived, 1.0, 0.1 if control is NetworkControl.DIRECT else error, 1.0, Reason.SLOW)
 
     monkeypatch.setattr(extent, "seen", seen)
-    assert extent._outcome(0, 0.2, extent.varied("alpha", 2.0, 15.0)) == letter
+    assert extent.outcome_letter(0, 0.2, extent.varied("alpha", 2.0, 15.0)) == letter
 
 
 def test_enough_runs_succeed_by_their_share_not_by_its_interval():

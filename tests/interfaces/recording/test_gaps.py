@@ -109,16 +109,16 @@ def test_what_was_measured_in_an_outage_comes_afterwards(tmp_path):
 def test_a_gap_is_told_and_nothing_in_it_is_scored(tmp_path):
     made = Driven(tmp_path / "live.mcap", "constant:0.05")
     made.run(1.0)
-    made.recorder._capture.measured, heard = lambda samples, *, now: None, made.recorder._capture.measured
+    made.operator.listener.measured, heard = lambda samples, *, now: None, made.operator.listener.measured
     made.run(0.5)
-    made.recorder._capture.measured = heard
+    made.operator.listener.measured = heard
     made.tell(MotionCommand(JointTarget(HOME + 0.3), speed=0.6))
     made.run(0.4)
     # The first half of the move is bent, the gap hides where it bends.
-    made.recorder._capture.measured = lambda samples, *, now: None
+    made.operator.listener.measured = lambda samples, *, now: None
     made.tell(MotionCommand(JointTarget(HOME), speed=0.6, insertion=Insertion.SPLICE))
     made.run(1.5)
-    made.recorder._capture.measured = heard
+    made.operator.listener.measured = heard
     drive(made, 4.0)
     made.run(3.0)
     made.finish()
@@ -154,11 +154,11 @@ def test_a_robot_that_reports_seldom_is_measured_all_the_same(tmp_path):
 
 def test_samples_that_are_all_apart_are_no_measurement(tmp_path):
     made = Driven(tmp_path / "live.mcap", "constant:0.05")
-    heard = made.recorder._capture.measured
+    heard = made.operator.listener.measured
     for _ in range(20):
-        made.recorder._capture.measured = lambda samples, *, now: heard(samples[:1], now=now)
+        made.operator.listener.measured = lambda samples, *, now: heard(samples[:1], now=now)
         made.run(0.034)
-        made.recorder._capture.measured = lambda samples, *, now: None
+        made.operator.listener.measured = lambda samples, *, now: None
         made.run(0.2)
     made.finish()
     with open_recording(tmp_path / "live.mcap") as recording, pytest.raises(FormatError, match="no two samples"):

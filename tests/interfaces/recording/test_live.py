@@ -56,8 +56,8 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
     async def main():
         async with robot_here() as (_, url), recorded(url, path, told) as live:
             site, clock = live.operator, live.clock
-            heard = live.recorder._capture.reported
-            live.recorder._capture.reported = lambda r, *, now: (reports.append(r), heard(r, now=now))
+            heard = live.operator.listener.reported
+            live.operator.listener.reported = lambda r, *, now: (reports.append(r), heard(r, now=now))
             site.execute(MotionCommand(JointTarget(READY)), now=clock.now())
             await asyncio.sleep(0.3)
             site.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
@@ -152,7 +152,7 @@ def test_a_recording_that_breaks_is_told_and_nothing_else_happens(tmp_path, monk
             def broken():
                 raise ValueError("a fault of ours")
 
-            monkeypatch.setattr(live.recorder._capture, "write_out", broken)
+            monkeypatch.setattr(live.operator.listener, "write_out", broken)
             await until(lambda: live.health()["recording"]["problem"])
             receipt = live.operator.execute(MotionCommand(JointTarget(READY)), now=live.clock.now())
             await until(lambda: live.operator.report.q_at > receipt.execute_at + 0.2)

@@ -280,11 +280,11 @@ def test_the_derivation_is_hkdf() -> None:
     from cryptography.hazmat.primitives.hashes import SHA256
     from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
-    from interfaces.rsp.session import _derived
+    from interfaces.rsp.session import hkdf
 
     for length in (16, 32, 64, 70):
         theirs = HKDF(SHA256(), length, b"salt", b"info").derive(b"secret" * 9)
-        assert _derived(b"secret" * 9, b"salt", b"info", length) == theirs
+        assert hkdf(b"secret" * 9, b"salt", b"info", length) == theirs
 
 
 def asked(robot: RobotCore, question: Open, address: bytes, now: float, keys: Keyring | None = None) -> list:

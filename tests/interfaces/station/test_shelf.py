@@ -81,7 +81,7 @@ def test_the_list_says_what_is_wrong_and_is_bounded(kept, tmp_path, monkeypatch)
     assert found["cut.mcap"].playable
     assert (found["none.mcap"].problem[:19], found["none.mcap"].playable) == ("isn't a recording: ", False)
     looked = []
-    monkeypatch.setattr(shelf, "_looked_into", lambda path, entry: looked.append(path.name) or entry)
+    monkeypatch.setattr(shelf, "look_into", lambda path, entry: looked.append(path.name) or entry)
     monkeypatch.setattr(shelf, "AT_ONCE", 1)
     monkeypatch.setattr(shelf, "LISTED", 2)
     directory = Shelf(tmp_path)
@@ -104,18 +104,18 @@ def standing(replay):
 
 def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):
     monkeypatch.setattr(replays, "IDLE", 0.2)
-    monkeypatch.setattr(replays, "_LOOK", 0.02)
+    monkeypatch.setattr(replays, "LOOK", 0.02)
     monkeypatch.setattr(replays, "MOST", 2)
     closed = []
     close = replays.Recording.close
     monkeypatch.setattr(replays.Recording, "close", lambda self: (closed.append(self.path.name), close(self)))
 
     async def opened(served, **query):
-        replay = served._asked({"a": "whole.mcap", **query})
-        assert not replay._let_in("no")
+        replay = served.replay_for({"a": "whole.mcap", **query})
+        assert not replay.let_in("no")
         assert replay.task is None
         slot = replay.board.join()
-        assert replay._let_in("yes")
+        assert replay.let_in("yes")
         async with asyncio.timeout(30):
             while standing(replay)["kind"] == "opening":
                 await asyncio.sleep(0.01)
@@ -125,7 +125,7 @@ def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):
         async with Replays(Shelf(kept), WallClock(), lambda token: token == "yes").running() as served:
             first, slot = await opened(served)
             assert standing(first)["kind"] == "open"
-            assert served._asked({"a": "whole.mcap", "align": "start"}) is first
+            assert served.replay_for({"a": "whole.mcap", "align": "start"}) is first
             assert first.page.playback.tracks[0].recording.path == kept / "whole.mcap"
             other, _ = await opened(served, b="whole.mcap", align="timeline")
             assert other.key.align is Align.TIMELINE
@@ -138,13 +138,13 @@ def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):
                     await asyncio.sleep(0.01)
             assert closed == ["whole.mcap"]
             assert first.page is None
-            assert first not in served._replays.values()
+            assert first not in served.replays.values()
             with pytest.raises(InvalidValueError):
-                served._asked({"a": "../whole.mcap"})
-            monkeypatch.setattr(replays, "_WAITING", len(served._replays))
+                served.replay_for({"a": "../whole.mcap"})
+            monkeypatch.setattr(replays, "WAITING", len(served.replays))
             with pytest.raises(InvalidValueError, match="at most"):
-                served._asked({"a": "whole.mcap", "align": "began", "b": "whole.mcap"})
-            monkeypatch.setattr(replays, "_WAITING", 64)
+                served.replay_for({"a": "whole.mcap", "align": "began", "b": "whole.mcap"})
+            monkeypatch.setattr(replays, "WAITING", 64)
             monkeypatch.setattr(replays, "LOOKED_INTO", 1000)
             large, _ = await opened(served)
             assert standing(large)["kind"] == "failed"

@@ -42,14 +42,14 @@ def test_no_frame_brings_anything_but_a_message_or_a_typed_error(encoding: Encod
 
 
 PLANTED: dict[str, tuple[Any, str, str, str]] = {
-    "a length isn't checked": (segments, "_packed", "or len(data) % row ", ""),
-    "no joints": (segments, "_packed", "not row or ", ""),
+    "a length isn't checked": (segments, "coefficients_from_bytes", "or len(data) % row ", ""),
+    "no joints": (segments, "coefficients_from_bytes", "not row or ", ""),
     "NaN comes in": (segments, "segments_of", "if found and not", "if False and not"),
-    "rows of other lengths": (segments, "_plain", "if any(", "if False and any("),
+    "rows of other lengths": (segments, "coefficients_from_lists", "if any(", "if False and any("),
     "epochs of 65 bits": (control, "epoch", "2**64:", "2**70:"),
     "a corner of a corner": (
         segments,
-        "_packed",
+        "coefficients_from_bytes",
         "row = 8 * dof\n",
         "row = 8 * dof\n    if dof == 5:\n        if len(data) > 3 * row:\n            return data[len(data)]\n",
     ),
@@ -67,7 +67,7 @@ def test_a_planted_fault_is_found(name: str, monkeypatch: pytest.MonkeyPatch) ->
     for user in (segments, control, messages, sites):
         if hasattr(user, function):
             monkeypatch.setattr(user, function, space[function])
-    plain = function == "_plain"
+    plain = function == "coefficients_from_lists"
     finding = fuzzer(Encoding.JSON if plain else Encoding.MSGPACK).run(50_000)
     assert finding is not None
     assert "ProtocolError" not in finding.error

@@ -118,16 +118,16 @@ def body() -> BareBody:
 def spoil(robot: Any, name: str, bad: float) -> None:
     """Let what one sensor reads be bad from now on."""
     read = getattr(robot, name)
-    if name == "_shafts":
+    if name == "shafts":
         setattr(robot, name, lambda: (read()[0], bad))
     else:
         setattr(robot, name, lambda *given: np.where(np.arange(len(given[0])) == 3, bad, read(*given)))
 
 
 @pytest.mark.parametrize("bad", [math.nan, 1e300, -1.0])
-@pytest.mark.parametrize("name", ["_shafts", "_distances"])
+@pytest.mark.parametrize("name", ["shafts", "distances"])
 def test_wheels_and_scans_are_looked_at_before_anybody_reads_them(name: str, bad: float) -> None:
-    if name == "_shafts" and bad == -1.0:
+    if name == "shafts" and bad == -1.0:
         bad = -math.inf
     robot = body()
     robot.drive(0.2, 0.1, 90)
@@ -135,7 +135,7 @@ def test_wheels_and_scans_are_looked_at_before_anybody_reads_them(name: str, bad
     read = getattr(robot, name)
     spoil(robot, name, bad)
     robot.drive(0.2, 0.1, 240)
-    if name == "_shafts":
+    if name == "shafts":
         assert (robot.encoders, robot.reckoned) == known[2:]
         assert robot.watch.fault.startswith("the left wheel's encoder reads ")
     else:
@@ -163,7 +163,7 @@ def test_one_bad_reading_is_no_fault() -> None:
     assert watch.fault == "the sonar ring reads no numbers" or "nan" in watch.fault
 
 
-@pytest.mark.parametrize(("name", "sensor"), [("_shafts", "left wheel's encoder"), ("_distances", "sonar ring")])
+@pytest.mark.parametrize(("name", "sensor"), [("shafts", "left wheel's encoder"), ("distances", "sonar ring")])
 def test_a_live_robot_halts(name: str, sensor: str) -> None:
     async def run() -> None:
         robot = LiveMobileRobot(LiveMobileConfig(place("empty")), Access(free={Role.SITE}))
