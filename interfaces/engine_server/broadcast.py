@@ -73,7 +73,8 @@ class Broadcaster:
         self.journal = source if isinstance(source, Journal) else Journal(source)
         self._edit = self.journal.look()
         self._forecasts = Forecasts()
-        self._falsified: list[FrameVerdict] = []
+        self.falsified: list[FrameVerdict] = []
+        """Frames that turned out wrong, the last ones."""
         self._ranges: tuple[tuple[int, int, int | None], ...] = ()
         self._since = 1
         self._slots: list[FrameSlot] = []
@@ -166,13 +167,13 @@ class Broadcaster:
             self._forecasts.settle(edit.at)
             verdicts = self._forecasts.edited(edit.timeline, edit.culprit)
             found += len(verdicts)
-            self._falsified.extend(verdicts)
+            self.falsified.extend(verdicts)
         self._edit = newest
         self._forecasts.settle(self.journal.past)
         oldest = self.number + 1 - WINDOW
         if found or (self._ranges and self._ranges[0][0] < oldest):
-            self._falsified = [verdict for verdict in self._falsified if verdict.number >= oldest]
-            self._ranges, left_out = ranges(self._falsified)
+            self.falsified = [verdict for verdict in self.falsified if verdict.number >= oldest]
+            self._ranges, left_out = ranges(self.falsified)
             self._since = max(self._since, left_out + 1)
 
     def status(self, number: int) -> FrameVerdict | None:

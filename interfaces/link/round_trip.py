@@ -275,7 +275,8 @@ class RoundTripEstimator:
         self._due = finite("start", start, "finite seconds")
         self._now = -math.inf
         self._sequence = 0
-        self._in_flight: dict[int, float] = {}
+        self.in_flight: dict[int, float] = {}
+        """When each packet was sent [s], by sequence number, of those that haven't come back."""
         self._delays = DelayStatistics(self.config.window)
         self._fates: deque[bool] = deque()
         self._recently_lost = 0
@@ -283,10 +284,10 @@ class RoundTripEstimator:
 
     def next_deadline(self) -> float:
         """When `to_send` has something to do [s]: a probe is due or one in flight is lost. May have passed."""
-        if not self._in_flight:
+        if not self.in_flight:
             return self._due
-        expiry = next(iter(self._in_flight.values())) + self.config.timeout
-        return expiry if len(self._in_flight) >= self.config.most_in_flight else min(expiry, self._due)
+        expiry = next(iter(self.in_flight.values())) + self.config.timeout
+        return expiry if len(self.in_flight) >= self.config.most_in_flight else min(expiry, self._due)
 
     def to_send(self, *, now: float) -> Probe | None:
         """Give up on probes whose time is over, and give the next if it's due: one, however late the call.
@@ -298,12 +299,12 @@ class RoundTripEstimator:
             InvalidValueError: If now isn't finite or runs back.
         """
         self._advance(now)
-        if now < self._due or len(self._in_flight) >= self.config.most_in_flight:
+        if now < self._due or len(self.in_flight) >= self.config.most_in_flight:
             return None
-        while self._sequence in self._in_flight:
+        while self._sequence in self.in_flight:
             self._sequence = (self._sequence + 1) % SEQUENCE_NUMBERS
         probe = Probe(self._session, self._sequence, now)
-        self._in_flight[self._sequence] = now
+        self.in_flight[self._sequence] = now
         self._sequence = (self._sequence + 1) % SEQUENCE_NUMBERS
         self._sent += 1
         due = self._due + self.config.period
@@ -328,7 +329,7 @@ class RoundTripEstimator:
         if refusal is not None:
             self._refused += 1
             return refusal
-        trip = RoundTrip(self._in_flight.pop(echo.sequence), echo.received, echo.replied, now)
+        trip = RoundTrip(self.in_flight.pop(echo.sequence), echo.received, echo.replied, now)
         self._returned += 1
         self._decide(lost=False)
         self._delays.add(trip.delay, now=now)
@@ -373,7 +374,7 @@ class RoundTripEstimator:
     def _refuse(self, echo: Echo, now: float) -> EchoRefusal | None:
         if echo.session != self._session:
             return EchoRefusal.FOREIGN
-        sent = self._in_flight.get(echo.sequence)
+        sent = self.in_flight.get(echo.sequence)
         if sent is None or sent != echo.sent:
             return EchoRefusal.UNEXPECTED
         if not (abs(echo.received) <= LARGEST and abs(echo.replied) <= LARGEST):
@@ -387,11 +388,11 @@ class RoundTripEstimator:
         if finite("now", now, "finite seconds") < self._now:
             raise InvalidValueError("now", now, f"at least {self._now}, the time of the last call")
         self._now = now
-        while self._in_flight:
-            sequence, sent = next(iter(self._in_flight.items()))
+        while self.in_flight:
+            sequence, sent = next(iter(self.in_flight.items()))
             if now < sent + self.config.timeout:
                 break
-            del self._in_flight[sequence]
+            del self.in_flight[sequence]
             self._lost += 1
             self._decide(lost=True)
 

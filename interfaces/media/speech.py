@@ -163,7 +163,8 @@ class Aloud:
         self._speech = SpeechConfig() if speech is None else speech
         self.text = ""
         """What is being said; empty in silence."""
-        self._until = -math.inf
+        self.until = -math.inf
+        """When what is being said ends [s]; inf while nobody knows."""
         self._task: asyncio.Task[None] | None = None
 
     def speak(self, text: str, *, now: float) -> None:
@@ -174,7 +175,7 @@ class Aloud:
             now: [s].
         """
         self.hush()
-        self.text, self._until = text, math.inf
+        self.text, self.until = text, math.inf
         self._task = asyncio.create_task(self._measure(shortened(text), now))
 
     async def _measure(self, words: str, began: float) -> None:
@@ -186,16 +187,16 @@ class Aloud:
                 lasts = len(samples) / rate
         except SpeechError:
             pass
-        self._until = began + lasts
+        self.until = began + lasts
 
     def hush(self) -> None:
         """Be silent at once."""
         if self._task is not None:
             self._task.cancel()
-        self.text, self._until, self._task = "", -math.inf, None
+        self.text, self.until, self._task = "", -math.inf, None
 
     def is_speaking(self, *, now: float) -> bool:
         """Whether what was begun isn't over yet at now [s]."""
-        if now >= self._until:
+        if now >= self.until:
             self.text = ""
-        return now < self._until
+        return now < self.until

@@ -316,13 +316,13 @@ def _beginning(neurons: int, rng: np.random.Generator) -> Array:
     return weights
 
 
-def _output(weights: Array, x: Array) -> tuple[Array, Array]:
+def forward_pass(weights: Array, x: Array) -> tuple[Array, Array]:
     """Hidden values (k, n) and outputs (k,)."""
     hidden = np.tanh(x @ weights[:-1, :2].T + weights[:-1, 2])
     return hidden, hidden @ weights[:-1, 3] + weights[-1, 0]
 
 
-def _jacobian(weights: Array, x: Array, hidden: Array) -> Array:
+def jacobian(weights: Array, x: Array, hidden: Array) -> Array:
     """Derivatives of the outputs by all weights, (k, 4 n + 1)."""
     inner = (1.0 - hidden * hidden) * weights[:-1, 3]
     columns = np.stack([inner * x[:, :1], inner * x[:, 1:], inner, hidden], -1)
@@ -333,19 +333,19 @@ def _marquardt(
     weights: Array, x: Array, y: Array, config: TrainingConfig, progress: Callable[[int, float], None]
 ) -> tuple[Array, int]:
     """Least squares from the first weights on; returns the last ones, and how many steps they took."""
-    hidden, out = _output(weights, x)
+    hidden, out = forward_pass(weights, x)
     error = float(np.mean((out - y) ** 2))
     damping, epoch = 1e-3, 0
     while epoch < config.epochs and error > config.goal and damping < _MOST_DAMPING:
         epoch += 1
-        J = _jacobian(weights, x, hidden)
+        J = jacobian(weights, x, hidden)
         normal, slope = J.T @ J, J.T @ (out - y)
         while damping < _MOST_DAMPING:
             step = np.linalg.solve(normal + damping * np.eye(len(normal)), slope)
             tried = weights.copy()
             tried[:-1] -= step[:-1].reshape(-1, 4)
             tried[-1, 0] -= step[-1]
-            tried_hidden, tried_out = _output(tried, x)
+            tried_hidden, tried_out = forward_pass(tried, x)
             tried_error = float(np.mean((tried_out - y) ** 2))
             if tried_error < error:
                 weights, hidden, out, error = tried, tried_hidden, tried_out, tried_error

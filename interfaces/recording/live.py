@@ -168,7 +168,8 @@ class LiveRecorder:
             sampled=PERIOD,
             late=late_of(self._capture.late),
         )
-        self._recorder: Recorder | None = None
+        self.recorder: Recorder | None = None
+        """Writes the file, once there is one."""
         self._real, self._real_links = Paced(POSE_RATE), Paced(LINK_RATE)
         self._connected = self._told = False
         self._stopped = ""
@@ -182,11 +183,11 @@ class LiveRecorder:
         """
         sink = Sink.create(self.path, over=self._what.over)
         try:
-            self._recorder = Recorder(sink, self._begin, first=self._capture.first())
+            self.recorder = Recorder(sink, self._begin, first=self._capture.first())
         except RecordingError:
             self.leave()
             raise
-        self._capture.put = self._recorder.put
+        self._capture.put = self.recorder.put
 
     def leave(self) -> None:
         """Listen no more."""
@@ -239,7 +240,7 @@ class LiveRecorder:
     @property
     def problem(self) -> str | None:
         """Why it doesn't record; None while it does."""
-        return self._stopped or (None if self._recorder is None else self._recorder.problem)
+        return self._stopped or (None if self.recorder is None else self.recorder.problem)
 
     def stop(self, why: str) -> None:
         """Record nothing more, for a reason."""
@@ -273,7 +274,7 @@ class LiveRecorder:
 
     def close(self) -> None:
         """Write the last notes down, and close the file; from any thread, after `end`."""
-        recorder, capture = self._recorder, self._capture
+        recorder, capture = self.recorder, self._capture
         assert self._rest is not None
         end, receipts = self._rest
         if recorder is None:
@@ -289,7 +290,7 @@ class LiveRecorder:
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
-        recorder = self._recorder
+        recorder = self.recorder
         return {
             "file": str(self.path),
             "written_s": self._begin.t if recorder is None else recorder.written,
@@ -300,4 +301,4 @@ class LiveRecorder:
     @property
     def size(self) -> int:
         """Bytes in the file."""
-        return 0 if self._recorder is None else self._recorder.size
+        return 0 if self.recorder is None else self.recorder.size

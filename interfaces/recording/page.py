@@ -139,7 +139,7 @@ class ReplayPage:
             board: What pages look at already; one of its own unless given.
             show: Time between two frames [s].
         """
-        self.playback, self._clock, self._first, self._show = playback, clock, first, show
+        self.playback, self.clock, self._first, self._show = playback, clock, first, show
         self._stages = tuple(stage_of(track.recording) for track in playback.tracks)
         self.scenes = tuple(stage.scene for stage in self._stages)
         self.board = Newest(BEGIN) if board is None else board
@@ -178,7 +178,7 @@ class ReplayPage:
 
     async def _run(self) -> None:
         while True:
-            self.turn(now=self._clock.now())
+            self.turn(now=self.clock.now())
             await asyncio.sleep(self._show if self.board.readers else IDLE)
 
     def turn(self, *, now: float) -> None:
@@ -220,7 +220,7 @@ class ReplayPage:
     def hear(self, text: str) -> str:
         """Do what a page asks for; why it isn't done, empty if it is."""
         try:
-            self._do(_decoder.decode(text), self._clock.now())
+            self._do(_decoder.decode(text), self.clock.now())
         except msgspec.MsgspecError:
             return json.dumps({"kind": "refused", "text": "this isn't a wish that is known here"})
         except VrsError as error:

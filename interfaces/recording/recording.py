@@ -109,7 +109,8 @@ class Recording:
         self._source = FileSource(path)
         try:
             self._blocks = Blocks(self._source)
-            self._logs = {topic: Log(self._blocks, topic, str(path)) for topic in NUMBERS}
+            self.logs = {topic: Log(self._blocks, topic, str(path)) for topic in NUMBERS}
+            """Entries by channel."""
             self._end: End | None = None
             begin = self._session()
             if begin is None:
@@ -141,12 +142,12 @@ class Recording:
         """Whether the recording has ended; the first beginning that's readable."""
         held = self._blocks.having(NUMBERS["/session"])
         if held and not self._end:
-            ends = [entry for entry in self._logs["/session"].of(held[-1]) if isinstance(entry, End)]
+            ends = [entry for entry in self.logs["/session"].of(held[-1]) if isinstance(entry, End)]
             if ends:
                 self._end = ends[-1]
                 self._blocks.ended()
         for index in held:
-            for entry in self._logs["/session"].of(index):
+            for entry in self.logs["/session"].of(index):
                 if isinstance(entry, Begin):
                     return entry
         return None
@@ -178,7 +179,7 @@ class Recording:
     def dropped(self) -> dict[str, int]:
         """Messages that weren't recorded because the disk was too slow, by topic."""
         found: dict[str, int] = {}
-        for entry in self._logs["/session"].entries():
+        for entry in self.logs["/session"].entries():
             if isinstance(entry, Dropped):
                 for drop in entry.counts:
                     found[drop.topic] = max(drop.count, found.get(drop.topic, 0))
@@ -251,18 +252,18 @@ class Recording:
             raise FormatError(str(self.path), f"a command from before it: {error}") from None
 
     def _commands(self) -> list[CommandEntry | Anchor | ReceiptEntry | PacketEntry | GivenEntry]:
-        return self._logs["/commands"].entries()
+        return self.logs["/commands"].entries()
 
     @property
     def events(self) -> tuple[RunEvent, ...]:
         """What else happened, by time."""
-        entries: list[EventEntry] = self._logs["/events"].entries()
+        entries: list[EventEntry] = self.logs["/events"].entries()
         return tuple(RunEvent(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
 
     @property
     def changes(self) -> tuple[AnyHistory | AnyChange, ...]:
         """The messages about the timeline, as they stand in the file."""
-        return tuple(self._logs["/timeline"].entries())
+        return tuple(self.logs["/timeline"].entries())
 
     @property
     def edits(self) -> tuple[RecordedEdit, ...]:
@@ -274,7 +275,7 @@ class Recording:
         return tuple(self._edits())
 
     def _edits(self) -> list[RecordedEdit]:
-        entries = self._logs["/timeline"].entries()
+        entries = self.logs["/timeline"].entries()
         while self._applied < len(entries):
             self._chain.add(entries[self._applied])
             self._applied += 1
@@ -371,13 +372,13 @@ class Recording:
     @property
     def room(self) -> RoomEntry | None:
         """Where a mobile robot drove; None if that isn't there."""
-        rooms = [entry for entry in self._logs["/session"].entries() if isinstance(entry, RoomEntry)]
+        rooms = [entry for entry in self.logs["/session"].entries() if isinstance(entry, RoomEntry)]
         return rooms[0] if rooms else None
 
     @property
     def learned(self) -> tuple[CellsEntry, ...]:
         """What came into the virtual environment, and went, in order."""
-        return tuple(self._logs["/environment"].entries())
+        return tuple(self.logs["/environment"].entries())
 
     def messages(self) -> Array:
         """When packets to the robot were sent and arrived [s], (m, 2), in the order of the file; NaN: lost."""
@@ -391,7 +392,7 @@ class Recording:
     @property
     def link(self) -> tuple[LinkEntry, ...]:
         """Packets of the link whose fate was known, both ways, in the order of the file."""
-        return tuple(self._logs["/link"].entries())
+        return tuple(self.logs["/link"].entries())
 
 
 def check_alike(recordings: Sequence[Recording]) -> None:

@@ -199,8 +199,9 @@ class LocalCore:
         self.streams = StreamOutbox(model.buffers)
         self.period = PeriodControl(self._config.period)
         self._outputs: list[LocalOutput] = []
-        self._asked = Open(rank, False, bytes(TAG))
-        self._session: SessionNumbers | None = None
+        self.opening = Open(rank, False, bytes(TAG))
+        self.numbers: SessionNumbers | None = None
+        """Of the session; None where there's none."""
         self._next = self._until = math.inf
         self._heard = -math.inf
         self._active: set[int] = set()
@@ -208,18 +209,19 @@ class LocalCore:
         self._reset()
 
     def _reset(self) -> None:
-        self._commands, self._inbox = CommandOutbox(), MemoryInbox()
-        self._memory = MemoryOutbox(self.layout.room[PacketDirection.DOWN])
+        self.command_outbox, self._inbox = CommandOutbox(), MemoryInbox()
+        self.memory_outbox = MemoryOutbox(self.layout.room[PacketDirection.DOWN])
+        """What isn't acknowledged."""
         self._written: dict[int, _Written] = {}
         self._events: dict[int, int] = {}
-        self._round_trip = PacketRoundTrip()
+        self.packet_round_trip = PacketRoundTrip()
         self._clears = 0
         self.streams = StreamOutbox(self.model.buffers)
 
     @property
     def round_trip(self) -> float | None:
         """Smoothed, the robot's own period included [s]; None before the first."""
-        return self._round_trip.smoothed
+        return self.packet_round_trip.smoothed
 
     # What the simulacrum is told.
 
@@ -236,8 +238,8 @@ class LocalCore:
         if self.state is not LocalState.CLOSED:
             raise RspError(f"the session is {self.state.value} already")
         self._reset()
-        self._asked = Open(self._rank, takeover, self._random(TAG))
-        self.state, self._session = LocalState.OPENING, SessionNumbers(self.model.id, 0)
+        self.opening = Open(self._rank, takeover, self._random(TAG))
+        self.state, self.numbers = LocalState.OPENING, SessionNumbers(self.model.id, 0)
         self._next, self._until = now, now + self._config.patience
 
     def end(self, *, now: float) -> None:
@@ -267,7 +269,7 @@ class LocalCore:
         Raises:
             FullError: If too many wait.
         """
-        return self._commands.put(index, values)
+        return self.command_outbox.put(index, values)
 
     def store(self, index: int, data: bytes, *, deadline: float) -> int:
         """Give a memory command that must be settled by a time [s]; returns its ID.
@@ -277,7 +279,7 @@ class LocalCore:
             FullError: If too many wait.
         """
         self.layout.check_data(index, data)
-        return self._memory.put(index, data, deadline)
+        return self.memory_outbox.put(index, data, deadline)
 
     def play(self, index: int, data: bytes) -> None:
         """Send data to a stream.
@@ -307,12 +309,12 @@ class LocalCore:
 
     def to_send(self, *, now: float) -> list[bytes]:
         """Datagrams that are due by now [s]."""
-        self._outputs += self._memory.expire(now)
+        self._outputs += self.memory_outbox.expire(now)
         if self.state is LocalState.OPEN and now - self._heard >= self._config.lifetime:
             self._close(EndReason.LOST)
         if self.state is LocalState.CLOSED or now < self._next - SLACK:
             return []
-        session = self._session
+        session = self.numbers
         assert session is not None
         if self.state is not LocalState.OPEN and now >= self._until:
             self._close(EndReason.CLOSED if self.state is LocalState.ENDING else EndReason.LOST)
@@ -321,7 +323,7 @@ class LocalCore:
             self._next = now + self._config.retry
             head = Header(self.model.id, False, PacketType.OPEN, 0, milliseconds(now), 0, MODULUS - 1, 0)
             return [
-                handshake.sent(PacketType.OPEN, handshake.encode_open(self._asked), head, self._keys, self._rank)
+                handshake.sent(PacketType.OPEN, handshake.encode_open(self.opening), head, self._keys, self._rank)
             ]
         if self.state is LocalState.ENDING:
             self._next = now + self._config.retry
@@ -347,11 +349,11 @@ class LocalCore:
                 written.first = number
             if not written.known or index in self._active:
                 payloads[index] = written.payload
-        self._commands.fill(payloads, number)
-        self._memory.fill(payloads, now=now, timeout=max(self._config.timeout, 2 * (self.round_trip or 0.0)))
+        self.command_outbox.fill(payloads, number)
+        self.memory_outbox.fill(payloads, now=now, timeout=max(self._config.timeout, 2 * (self.round_trip or 0.0)))
         self._inbox.fill(payloads, number)
         self.streams.fill(payloads, number, self.layout.left(payloads))
-        self._round_trip.sent(number, now)
+        self.packet_round_trip.sent(number, now)
         return session.make(PacketType.DOWN, self.layout.join(payloads), now, self._clears)
 
     def _receive(self, data: bytes, now: float) -> None:
@@ -360,7 +362,7 @@ class LocalCore:
             raise PacketDropped(DropReason.MODEL)
         if head.encrypted != (self._keys is not None):
             raise PacketDropped(DropReason.DOWNGRADE)
-        session = self._session
+        session = self.numbers
         if session is None or head.type not in _EXPECTED[self.state]:
             raise PacketDropped(DropReason.UNEXPECTED)
         if self.state is LocalState.OPENING:
@@ -385,38 +387,38 @@ class LocalCore:
             raise PacketDropped(DropReason.AUTHENTICATION)
         if head.type is PacketType.REFUSED:
             nonce, refusal = handshake.decode_refused(body)
-            if nonce != self._asked.nonce:
+            if nonce != self.opening.nonce:
                 raise PacketDropped(DropReason.SESSION)
             self._outputs.append(Refused(refusal))
-            self.state, self._session = LocalState.CLOSED, None
+            self.state, self.numbers = LocalState.CLOSED, None
             return
         answer = handshake.decode_answer(body)
-        if answer.nonce != self._asked.nonce:
+        if answer.nonce != self.opening.nonce:
             raise PacketDropped(DropReason.SESSION)
         if head.type is PacketType.CHALLENGE:
-            if self._asked.cookie == handshake.NO_COOKIE:
+            if self.opening.cookie == handshake.NO_COOKIE:
                 # Somebody is there: the second round trip has as much time as the first.
                 self._until = now + self._config.patience
-            if self._asked.cookie != answer.given:
-                self._asked, self._next = self._asked._replace(cookie=answer.given), now
+            if self.opening.cookie != answer.given:
+                self.opening, self._next = self.opening._replace(cookie=answer.given), now
             return
         sealer = opener = None
         if self._keys is not None:
             down, up = self._keys.session(self._rank, answer.nonce + answer.given, head.session)
             sealer, opener = Sealer(down), Opener(up)
-        self._session = SessionNumbers(self.model.id, head.session, sealer, opener)
+        self.numbers = SessionNumbers(self.model.id, head.session, sealer, opener)
         self.state, self._heard, self._next = LocalState.OPEN, now, now
         self._outputs.append(Began(head.session))
 
     def _acknowledged(self, last: int, head: Header, now: float) -> None:
         """Take what the robot has of ours."""
-        self._outputs += self._commands.acknowledge(last)
+        self._outputs += self.command_outbox.acknowledge(last)
         self._inbox.heard(last)
         self.streams.report(head.buffers, last)
         for written in self._written.values():
             if not written.known and 0 <= written.first <= last:
                 written.known = True
-        seconds = self._round_trip.acknowledged(last, now)
+        seconds = self.packet_round_trip.acknowledged(last, now)
         if seconds is not None:
             self.period.round_trip(seconds, now=now)
 
@@ -426,7 +428,7 @@ class LocalCore:
             element = self.model.elements[index]
             match element:
                 case MemoryCommand():
-                    self._outputs += self._memory.acknowledge(index, payload)
+                    self._outputs += self.memory_outbox.acknowledge(index, payload)
                 case MemoryEvent():
                     stored.append((index, payload))
                 case Event():
@@ -444,11 +446,15 @@ class LocalCore:
             self._outputs.append(Occurred(index, number, payload[ID.size :]))
 
     def _close(self, reason: EndReason) -> None:
-        session = 0 if self._session is None else self._session.id
-        self._outputs += [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self._commands.drain()]
-        self._outputs += [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self._memory.drain()]
+        session = 0 if self.numbers is None else self.numbers.id
+        self._outputs += [
+            Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self.command_outbox.drain()
+        ]
+        self._outputs += [
+            Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self.memory_outbox.drain()
+        ]
         self._outputs.append(SessionEnded(session, reason))
-        self.state, self._session = LocalState.CLOSED, None
+        self.state, self.numbers = LocalState.CLOSED, None
 
 
 _EXPECTED: Final = {

@@ -209,7 +209,7 @@ class RobotCore:
         self.model, self.layout = model, Layout(model)
         self._config = RobotConfig() if config is None else config
         self._sealed = keys is not None
-        self._door = SessionDoor(
+        self.door = SessionDoor(
             model.id, random_bytes, keys, idle=self._config.idle, takeover=self._config.takeover
         )
         self.dropped = dict.fromkeys(DropReason, 0)
@@ -220,7 +220,8 @@ class RobotCore:
         self._limits = {i: e.wire_limits for i, e in enumerate(model) if isinstance(e, Effector)}
         self._floats = {i: e for i, e in enumerate(model) if isinstance(e, Command) and e.type is Scalar.F32}
         self._outputs: list[RobotOutput] = []
-        self._claim: SessionClaim | None = None
+        self.claim: SessionClaim | None = None
+        """The session that has the robot."""
         self._over: SessionClaim | None = None
         """The last session that ended: whoever didn't hear that asks again."""
         self._stopping = False
@@ -241,20 +242,21 @@ class RobotCore:
                 self.motion.set(index, values)
         self._changed |= {index for index in self._formats if self.motion.given(index) != given[index]}
         self._command = -1
-        self._inbox, self._round_trip = MemoryInbox(), PacketRoundTrip()
-        self._memory = MemoryOutbox(self.layout.room[PacketDirection.UP])
+        self._inbox, self.packet_round_trip = MemoryInbox(), PacketRoundTrip()
+        self.memory_outbox = MemoryOutbox(self.layout.room[PacketDirection.UP])
+        """What isn't acknowledged."""
         self._telling.reset()
         self._clears = 0
         self._told: dict[int, Values] = {}
         self._lost = False
-        self._heard = self._next = now
+        self.heard = self._next = now
         self._stamp: int | None = None
         self._T = self._config.period
 
     @property
     def session(self) -> int | None:
         """ID of the session in force; None without one."""
-        return None if self._claim is None else self._claim.session.id
+        return None if self.claim is None else self.claim.session.id
 
     @property
     def stopping(self) -> bool:
@@ -282,7 +284,7 @@ class RobotCore:
             FullError: If too many wait.
         """
         self.layout.check_data(index, data)
-        return self._memory.put(index, data, deadline)
+        return self.memory_outbox.put(index, data, deadline)
 
     def rested(self) -> None:
         """The body is at rest: a new session's packets count from now on."""
@@ -293,7 +295,7 @@ class RobotCore:
         self._watch(now)
         forced = {index: self.motion.given(index) for index in self._changed}
         self._changed.clear()
-        played = self.motion.play(now) if not self._lost and self._claim is not None else {}
+        played = self.motion.play(now) if not self._lost and self.claim is not None else {}
         changed = forced | played
         for index in changed:
             self._monitor(index)
@@ -314,8 +316,8 @@ class RobotCore:
         """Datagrams that are due by now [s], each with its address."""
         self._watch(now)
         answers, self._answers = self._answers, []
-        self._outputs += self._memory.expire(now)
-        claim = self._claim
+        self._outputs += self.memory_outbox.expire(now)
+        claim = self.claim
         if claim is None or now < self._next - SLACK:
             return answers
         self._next = max(self._next + self._T, now + 0.5 * self._T)
@@ -325,7 +327,7 @@ class RobotCore:
         """When something is to be sent [s]; None without a session."""
         if self._answers:
             return -math.inf
-        return None if self._claim is None else self._next
+        return None if self.claim is None else self._next
 
     def take(self) -> list[RobotOutput]:
         """What happened since the last call."""
@@ -339,21 +341,21 @@ class RobotCore:
         if head.encrypted != self._sealed:
             raise PacketDropped(DropReason.DOWNGRADE)
         if head.type is PacketType.OPEN:
-            held = None if self._claim is None else self._heard
-            self._answers += self._door.opened(head, data, address, held, now=now)
+            held = None if self.claim is None else self.heard
+            self._answers += self.door.opened(head, data, address, held, now=now)
             return
         if head.type not in (PacketType.DOWN, PacketType.END):
             raise PacketDropped(DropReason.UNEXPECTED)
         claim = self._claim_of(head, address)
         body, number = claim.session.take(head, data)
-        if claim not in (self._claim, self._over):
+        if claim not in (self.claim, self._over):
             self._begin(claim, now)
-        if self._stopping and claim is self._claim:
+        if self._stopping and claim is self.claim:
             raise PacketDropped(DropReason.STOPPING)
         if head.type is PacketType.END:
             claim.session.newest = number
             self._answers.append((claim.session.make(PacketType.ENDED, b"", now), claim.address))
-            if claim is self._claim:
+            if claim is self.claim:
                 self._end(EndReason.CLOSED, now)
             return
         payloads = self.layout.split(body, PacketDirection.DOWN)
@@ -368,27 +370,27 @@ class RobotCore:
         Raises:
             Dropped: If it's nobody's.
         """
-        for claim in (self._claim, self._door.pending, self._over if head.type is PacketType.END else None):
+        for claim in (self.claim, self.door.pending, self._over if head.type is PacketType.END else None):
             if claim is not None and claim.fits(head, address):
                 return claim
         raise PacketDropped(DropReason.SESSION)
 
     def _begin(self, claim: SessionClaim, now: float) -> None:
         """A session proved to be there: it's in force, and an older one is over."""
-        old = self._claim
+        old = self.claim
         if old is not None:
             over = old.session
             self._answers += [(over.make(PacketType.ENDED, b"", now), old.address) for _ in range(3)]
             self._end(EndReason.TAKEN, now)
             self._stopping = True
-        self._door.pending, self._claim = None, claim
+        self.door.pending, self.claim = None, claim
         self._reset(now)
         self._outputs.append(Began(claim.session.id))
 
     def _end(self, reason: EndReason, now: float) -> None:
-        assert self._claim is not None
-        self._outputs += [*self._memory.drain(), SessionEnded(self._claim.session.id, reason), Cleared()]
-        self._over, self._claim = self._claim, None
+        assert self.claim is not None
+        self._outputs += [*self.memory_outbox.drain(), SessionEnded(self.claim.session.id, reason), Cleared()]
+        self._over, self.claim = self.claim, None
         self._reset(now)
 
     def _values(self, payloads: Mapping[int, bytes]) -> dict[int, Values]:
@@ -428,13 +430,13 @@ class RobotCore:
         told: Mapping[int, Values],
         now: float,
     ) -> None:
-        self._heard = now
+        self.heard = now
         if self._lost:
             self._find(told)
         last = claim.session.acknowledged(head)
         self._inbox.heard(last)
         self._telling.heard(last)
-        self._round_trip.acknowledged(last, now)
+        self.packet_round_trip.acknowledged(last, now)
         if head.buffers != self._clears:
             self._clears = head.buffers
             self.streams.clear()
@@ -456,7 +458,7 @@ class RobotCore:
                 case MemoryCommand():
                     stored.append((index, payload))
                 case MemoryEvent():
-                    self._outputs += self._memory.acknowledge(index, payload)
+                    self._outputs += self.memory_outbox.acknowledge(index, payload)
                 case _:
                     asked.add(index)
         self._execute(commands)
@@ -475,18 +477,18 @@ class RobotCore:
         number = claim.session.number
         payloads: dict[int, bytes] = {}
         self._telling.fill(payloads, number)
-        self._memory.fill(
-            payloads, now=now, timeout=max(self._config.timeout, 2 * (self._round_trip.smoothed or 0.0))
+        self.memory_outbox.fill(
+            payloads, now=now, timeout=max(self._config.timeout, 2 * (self.packet_round_trip.smoothed or 0.0))
         )
         self._inbox.fill(payloads, number)
-        self._round_trip.sent(number, now)
+        self.packet_round_trip.sent(number, now)
         return claim.session.make(PacketType.UP, self.layout.join(payloads), now, min(self.streams.free, 255))
 
     def _watch(self, now: float) -> None:
         """Rest what rests on loss, and end what is lost for good."""
-        if self._claim is None:
+        if self.claim is None:
             return
-        silent = now - self._heard
+        silent = now - self.heard
         if silent >= self._config.lifetime:
             self._end(EndReason.LOST, now)
         elif silent >= self._config.loss and not self._lost:

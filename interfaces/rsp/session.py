@@ -192,7 +192,7 @@ class SessionNumbers:
         """Begin with number 0, sealed if there are a sealer and an opener."""
         self.id = session
         self.sealed = sealer is not None
-        self._model, self._sealer, self._opener = model, sealer, opener
+        self.model, self.sealer, self._opener = model, sealer, opener
         self.number = 0
         """Of the next packet that goes out, without end."""
         self.newest = -1
@@ -210,7 +210,7 @@ class SessionNumbers:
         number, self.number = self.number, self.number + 1
         head = header.encode(
             Header(
-                self._model,
+                self.model,
                 self.sealed,
                 kind,
                 number % MODULUS,
@@ -220,7 +220,7 @@ class SessionNumbers:
                 buffers,
             )
         )
-        return head + body if self._sealer is None else self._sealer.seal(head, body, number)
+        return head + body if self.sealer is None else self.sealer.seal(head, body, number)
 
     def take(self, head: Header, data: bytes) -> tuple[bytes, int]:
         """The body of a packet that came, and its number, if it's newer than all before.

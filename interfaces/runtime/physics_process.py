@@ -66,27 +66,27 @@ class PumaTicks:
     """The PyBullet PUMA 560, a tick at a time."""
 
     def __init__(self, arm: RealArm) -> None:
-        self._arm = arm
+        self.arm = arm
 
     def prepare(self, rows: Array) -> Sequence[Prepared]:
         """Work out the feed-forward."""
-        prepared = self._arm.prepare(*rows.transpose(1, 0, 2))
+        prepared = self.arm.prepare(*rows.transpose(1, 0, 2))
         return [prepared.row(i) for i in range(len(rows))]
 
     def step(self, prepared: Prepared) -> Moved:
         """Let the servo and the physics act for a tick."""
-        measured = self._arm.follow(prepared)
+        measured = self.arm.follow(prepared)
         return Moved(measured.q[0].tolist(), measured.qd[0].tolist(), measured.tau[0].tolist())
 
     def attach(self, mass: float) -> None:
         """Take a load that the servo doesn't know."""
         from robots.bullet import Payload
 
-        self._arm.attach(Payload(mass=mass))
+        self.arm.attach(Payload(mass=mass))
 
     def release(self) -> None:
         """Drop the load."""
-        self._arm.release()
+        self.arm.release()
 
 
 @contextmanager

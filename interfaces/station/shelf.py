@@ -65,7 +65,8 @@ class Shelf:
     def __init__(self, directory: Path) -> None:
         """Look at a directory, which needn't be there yet."""
         self.directory = directory
-        self._known: OrderedDict[tuple[str, int, int], ShelfEntry] = OrderedDict()
+        self.known: OrderedDict[tuple[str, int, int], ShelfEntry] = OrderedDict()
+        """Files that were looked into, by name, size and time; the last ones."""
 
     def place(self, name: object) -> Path:
         """Where a new recording goes; the directory is made if it's missing.
@@ -115,14 +116,14 @@ class Shelf:
         entries, left = [], AT_ONCE
         for name, state in found[:LISTED]:
             key = name, state.st_size, state.st_mtime_ns
-            known = self._known.get(key)
+            known = self.known.get(key)
             if known is None:
                 known = ShelfEntry(name, state.st_size, state.st_mtime)
                 if left > 0 and name != growing:
                     left -= 1
-                    known = self._known[key] = look_into(self.directory / name, known)
-                    while len(self._known) > 2 * LISTED:
-                        self._known.popitem(last=False)
+                    known = self.known[key] = look_into(self.directory / name, known)
+                    while len(self.known) > 2 * LISTED:
+                        self.known.popitem(last=False)
             entries.append(known)
         return entries, max(len(found) - LISTED, 0)
 

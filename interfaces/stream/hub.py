@@ -142,7 +142,7 @@ class Hub:
         self._state_due = -math.inf
         self.network_version = 0
         """Counts the changes of the way to the robot."""
-        self._emulation = emulation
+        self.emulation = emulation
         self._changes = Bucket(CHANGES, 2 * CHANGES, 0.0)
         self._sessions: dict[HubSession, None] = {}
         self._opened: dict[HubSession, str] = {}
@@ -336,17 +336,17 @@ class Hub:
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
         """How the way to the robot is, worked out now and then for all who ask; None where none is emulated."""
-        if self._emulation is None:
+        if self.emulation is None:
             return None
         at, version, found = self._surveyed
         if found is None or version != self.network_version or now >= at + SURVEYED:
-            found = self._emulation.network(now=now)
+            found = self.emulation.network(now=now)
             self._surveyed = now, self.network_version, found
         return found if found is None or answers is None else replace(found, answers=answers)
 
     def impair(self, seat: SessionState, wish: Impair, now: float) -> Problem | None:
         """Let the holder of the lease change the way to the robot; why not, None where it's done."""
-        if self._emulation is None:
+        if self.emulation is None:
             return Problem(ProblemCode.NOT_ALLOWED, "no way to a robot is emulated here", wish.number)
         if seat.role is Role.VIEWER:
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer changes nothing", wish.number)
@@ -357,7 +357,7 @@ class Hub:
             text = f"the way to the robot changes at most {CHANGES:g} times a second"
             return Problem(ProblemCode.TOO_FAST, text, wish.number)
         try:
-            self._emulation.impair(wish, seat.name, now=now)
+            self.emulation.impair(wish, seat.name, now=now)
         except VrsError as error:
             return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number)
         self.network_version += 1

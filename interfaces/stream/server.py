@@ -158,7 +158,8 @@ class HubServer:
         """
         self.hub, self.clock = hub, clock
         self._health, self._turned = health, turned
-        self._clients: dict[HubSession, _ServedClient] = {}
+        self.clients: dict[HubSession, _ServedClient] = {}
+        """Those that are served."""
         self._turning = Turning(clock, self._turn, longest=math.inf)
         self._now = clock.now()
         self._slices = Slices()
@@ -181,8 +182,8 @@ class HubServer:
             self._turning.stop()
             watcher.cancel()
             for session in self.hub.close():
-                if session in self._clients:
-                    self._clients[session].wake.set()
+                if session in self.clients:
+                    self.clients[session].wake.set()
 
     def kick(self) -> None:
         """Something has come: do soon what is due."""
@@ -192,7 +193,7 @@ class HubServer:
         """Do what is due, and wake the writers that have something to send."""
         self._now = now
         for session in self.hub.advance(now=now):
-            self._clients[session].wake.set()
+            self.clients[session].wake.set()
         if self._turned is not None:
             self._turned()
         return self.hub.next_deadline()
@@ -202,7 +203,7 @@ class HubServer:
         address = (scope.get("client") or ("", 0))[0]
         session = self.hub.open(encoding, now=self.clock.now(), address=address)
         socket: BoundedWebSocket = scope["state"]["socket"]
-        client = self._clients[session] = _ServedClient(session, socket)
+        client = self.clients[session] = _ServedClient(session, socket)
         writer = asyncio.create_task(self._write(client, send))
         writer.add_done_callback(partial(self._written, client))
         client.wake.set()
@@ -230,7 +231,7 @@ class HubServer:
             done = message.get("code") in _DONE and session.closing is None
         finally:
             writer.cancel()
-            del self._clients[session]
+            del self.clients[session]
             self.hub.leave(session, done=done, now=self.clock.now())
             await asyncio.wait([writer])
 
@@ -262,7 +263,7 @@ class HubServer:
         while True:
             await asyncio.sleep(_LOOK)
             limit = self.clock.now() - BLOCKED
-            for client in list(self._clients.values()):
+            for client in list(self.clients.values()):
                 if client.blocked_since is not None and client.blocked_since < limit:
                     self.cut_off += 1
                     client.socket.abort()
@@ -274,7 +275,7 @@ class HubServer:
             "now": self.clock.now(),
             "robot": hub.site.robot,
             "server": hub.config.server,
-            "clients": len(self._clients),
+            "clients": len(self.clients),
             "cut_off": self.cut_off,
             "lease": hub.lease_state.value,
         }

@@ -125,7 +125,7 @@ class HubSession:
         self._spending, self._told = spending, 0
         self._wanted: set[Want] = set()
         """What was asked for and is on its way."""
-        self._desk, self._limits = desk, desk.limits
+        self.desk, self._limits = desk, desk.limits
         self.encoding = encoding
         self.seat: SessionState | None = None
         self.closing: Closing | None = None
@@ -184,7 +184,7 @@ class HubSession:
     @property
     def commands(self) -> bool:
         """Whether it has control, or shares it."""
-        return self.seat is not None and self._desk.commanding(self.seat)
+        return self.seat is not None and self.desk.commanding(self.seat)
 
     def spend(self, work: float, *, now: float) -> None:
         """Note what the messages of the client have cost.
@@ -230,34 +230,34 @@ class HubSession:
         elif isinstance(message, Order | Ask | Follow | Want):
             self._serve(seat, message, now)
         elif isinstance(message, Wish):
-            answer = self._desk.wish(seat, message, now)
+            answer = self.desk.wish(seat, message, now)
             if isinstance(answer, control.Lease):
-                self._lease = self._desk.lease_version
+                self._lease = self.desk.lease_version
             if answer is not None:
                 self._put(answer)
         elif isinstance(message, Survey | Impair):
             self._survey(seat, message, now)
         elif isinstance(message, TaskOrder):
-            self._put(self._desk.task(seat, message, now))
+            self._put(self.desk.task(seat, message, now))
 
     def _survey(self, seat: SessionState, message: Survey | Impair, now: float) -> None:
         """Tell how the way to the robot is, after it was changed where that was asked for."""
-        problem = self._desk.impair(seat, message, now) if isinstance(message, Impair) else None
-        found = None if problem is not None else self._desk.network(now, message.number)
+        problem = self.desk.impair(seat, message, now) if isinstance(message, Impair) else None
+        found = None if problem is not None else self.desk.network(now, message.number)
         if found is not None:
-            self._network = self._desk.network_version
+            self._network = self.desk.network_version
             self._put(found)
         else:
             text = "no way to a robot is emulated here"
             self._put(problem or Problem(ProblemCode.NOT_ALLOWED, text, message.number))
 
     def _greet(self, hello: control.Hello, now: float) -> None:
-        found = self._desk.greet(self, hello, now)
+        found = self.desk.greet(self, hello, now)
         if isinstance(found, Problem):
             self.close(TRY_AGAIN if found.code is ProblemCode.FULL else POLICY, found.code, found.text)
             return
         self.seat, welcome = found
-        self._lease = self._desk.lease_version
+        self._lease = self.desk.lease_version
         self._put(welcome)
 
     def _serve(self, seat: SessionState, message: Order | Ask | Follow | Want, now: float) -> None:
@@ -272,7 +272,7 @@ class HubSession:
             text = "a viewer commands nothing"
             self._complain(Problem(ProblemCode.NOT_ALLOWED, text, message.number), now)
             return
-        seat.servlet.receive(message, now=self._desk.engine_time(now))
+        seat.servlet.receive(message, now=self.desk.engine_time(now))
         self.look(now=now)
 
     def look(self, *, now: float) -> None:
@@ -286,7 +286,7 @@ class HubSession:
             self._fail(error)
 
     def _look(self, seat: SessionState, now: float) -> None:
-        for reply in seat.servlet.advance(now=self._desk.engine_time(now)):
+        for reply in seat.servlet.advance(now=self.desk.engine_time(now)):
             if isinstance(reply, Broadcast | Pulse):
                 self._outbox.put_newest(reply)
                 continue
@@ -298,14 +298,14 @@ class HubSession:
             return True
         if self.seat is None:
             return now >= self._hello_until
-        if self._desk.lease_version != self._lease or self._desk.state is not self._state:
+        if self.desk.lease_version != self._lease or self.desk.state is not self._state:
             return True
-        if self._network is not None and self._desk.network_version != self._network:
+        if self._network is not None and self.desk.network_version != self._network:
             return True
-        if any(self._news.get(kind) is not news for kind, news in self._desk.news.items()):
+        if any(self._news.get(kind) is not news for kind, news in self.desk.news.items()):
             return True
         t = self.seat.servlet.next_deadline()
-        return t is not None and t <= self._desk.engine_time(now)
+        return t is not None and t <= self.desk.engine_time(now)
 
     def next_deadline(self) -> float | None:
         """When `Hello` must have come [s]; afterwards the hub asks `is_due` as often as it makes frames."""
@@ -331,7 +331,7 @@ class HubSession:
         return found
 
     def _look_around(self, seat: SessionState, now: float) -> None:
-        desk = self._desk
+        desk = self.desk
         if desk.lease_version != self._lease:
             self._lease = desk.lease_version
             self._outbox.put_newest(desk.lease_for(seat))

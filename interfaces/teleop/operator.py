@@ -217,10 +217,11 @@ class OperatorSite:
         """
         self.config = OperatorSiteConfig() if config is None else config
         self._model, self._lateness = model, lateness
-        self._clock = ManualClock(now)
+        self.clock = ManualClock(now)
+        """The engine's; calls here set it."""
         self.listener: SiteObserver | None = None
         """Who is told of all that happens here."""
-        self.engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self._clock, lateness=lateness)
+        self.engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self.clock, lateness=lateness)
         """The virtual robot; what it's told goes to the real one, whoever tells it."""
         self.epoch, self._began = 1, now
         self.halted = halted
@@ -268,13 +269,13 @@ class OperatorSite:
             InvalidValueError: If the command's form doesn't fit the robot.
             UnknownCommandError: If it names a command that isn't known.
         """
-        self._clock.set(now)
+        self.clock.set(now)
         answer: Receipt | Position | None = self.engine.execute(command)
         return answer
 
     def undo(self, *, now: float) -> Receipt | None:
         """Take back the newest command, as far as it lies in the future; see `vrs.Engine.undo`."""
-        self._clock.set(now)
+        self.clock.set(now)
         return self.engine.undo()
 
     def _refusal(self) -> str:
@@ -349,11 +350,11 @@ class OperatorSite:
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
-        return self._clock.now() if self._new else self._due
+        return self.clock.now() if self._new else self._due
 
     def receive(self, report: Report, *, now: float) -> None:
         """Take in a report of the robot; where it was measured counts whatever the epoch, and however late."""
-        self._clock.set(now)
+        self.clock.set(now)
         alone = Sample(0, report.measured_at, report.q_at, report.q, report.reference)
         found = self.gathering.take(report.samples if report.oldest else (alone,), report.oldest, now=now)
         if found:
@@ -446,7 +447,7 @@ class OperatorSite:
         self._under_way.clear()
         self._new = []
         self._waits = None
-        self._due = self._clock.now()
+        self._due = self.clock.now()
 
     def measure_anew(self, *, now: float) -> None:
         """Forget the round trips of messages that were sent before now [s]: the way is another one."""
@@ -455,7 +456,7 @@ class OperatorSite:
 
     def _follow(self, part: PlanPart, reason: str) -> None:
         """Let the virtual robot follow the real one's plan, and what is still under way to it."""
-        now = self._clock.now()
+        now = self.clock.now()
         compared = part.version, self.entries_sent, len(self._under_way), self.engine.timeline.version
         if compared == self._compared:
             return
@@ -489,7 +490,7 @@ class OperatorSite:
         Returns:
             Why it can't be yet; empty if it's done.
         """
-        self._clock.set(now)
+        self.clock.set(now)
         if self.gone:
             return self.gone
         if not self.halted:

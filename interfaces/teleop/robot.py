@@ -222,7 +222,7 @@ class RobotSite:
         self._due = now
         self._measured, self._measured_at = np.array(q, float), (now, self._play_at(now))
         self._samples = SampleLog(len(self._measured), reported)
-        self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
+        self.watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
         self._verdict = Verdict.FRESH
 
     @property
@@ -290,27 +290,27 @@ class RobotSite:
 
     def _counts(self, orders: Orders, now: float, correction: float, uncertainty: float) -> bool:
         """Whether the watchdog lets a message count."""
-        if self._watchdog is None:
+        if self.watchdog is None:
             return True
         stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
-        self._verdict = self._watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
+        self._verdict = self.watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
         return self._verdict.counts
 
     def _watch(self, now: float) -> None:
         """Let the watchdog do what is due by now."""
-        if self._watchdog is None:
+        if self.watchdog is None:
             return
-        for action in self._watchdog.advance(now=now):
+        for action in self.watchdog.advance(now=now):
             if isinstance(action, BeginStop):
-                self.halt(lost(self._watchdog.config, self._verdict), now=now)
+                self.halt(lost(self.watchdog.config, self._verdict), now=now)
         if self.halted and self.rests(now=now):
-            self._watchdog.stopped(self._watchdog.number, now=now)
+            self.watchdog.stopped(self.watchdog.number, now=now)
 
     def _begin(self, orders: Orders, now: float) -> None:
         """Follow a new epoch, from where the arm rests."""
-        if self._watchdog is not None:
+        if self.watchdog is not None:
             self._watch(now)
-            if not self._watchdog.arm(orders.epoch, now=now).counts:
+            if not self.watchdog.arm(orders.epoch, now=now).counts:
                 return
         fixed, stood = self.config.fixed_offset, self.engine.timeline
         began = orders.epoch_began if fixed is None else engine_time(now, fixed)
@@ -373,7 +373,7 @@ class RobotSite:
     def next_deadline(self) -> float:
         """When there's something to do, by the robot's clock [s]."""
         play = None if isinstance(self._play, EvenPlay) else self._play.next_deadline()
-        watch = None if self._watchdog is None else self._watchdog.next_deadline()
+        watch = None if self.watchdog is None else self.watchdog.next_deadline()
         return min(self._due, math.inf if play is None else play, math.inf if watch is None else watch)
 
     def play_at(self, t: Array) -> PlayState:
@@ -457,8 +457,8 @@ class RobotSite:
         self._plays.append((now, self._play))
         self.halted, self.parted = self.halted or reason, True
         self._due = now
-        if self._watchdog is not None and self._watchdog.state is WatchdogState.RUNNING:
-            self._watchdog.stop(StopReason.FAULT if self.violation is None else StopReason.TOLERANCE, now=now)
+        if self.watchdog is not None and self.watchdog.state is WatchdogState.RUNNING:
+            self.watchdog.stop(StopReason.FAULT if self.violation is None else StopReason.TOLERANCE, now=now)
 
     def _play_at(self, now: float) -> float:
         return float(self._play.at(np.array([now])).p[0])

@@ -188,7 +188,7 @@ class Drives:
                 self._sliding = None if 0 in modes else f
                 return a, f
         self._sliding = None
-        return self._relax(M, rhs, qd)
+        return self.relax(M, rhs, qd)
 
     def _some_stuck(
         self, M: Sequence[Sequence[float]], rhs: list[float], qd: Sequence[float], f: list[float]
@@ -211,7 +211,7 @@ class Drives:
             f[i] = rhs[i] - _dot(M[i], a) - self._diagonal[i] * a[i]
         return a
 
-    def _relax(
+    def relax(
         self, M: Sequence[Sequence[float]], rhs: list[float], qd: Sequence[float]
     ) -> tuple[list[float], list[float]]:
         """Minimise one joint at a time until nothing changes: slow, and it always converges."""

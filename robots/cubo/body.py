@@ -72,7 +72,7 @@ class CuboBody(MobileBody):
         """Commands that were carried out: when [s], which, with what."""
         self.played = 0
         """Bytes of sound that were played."""
-        self._rims = [0.0, 0.0]
+        self.rims = [0.0, 0.0]
         self._energy = p.CAPACITY
         self._events: deque[str] = deque(maxlen=_MOST_KEPT)
         self._touched = False
@@ -97,9 +97,9 @@ class CuboBody(MobileBody):
         if binding not in MOVES or binding == "speaker" or len(values) < least:
             raise InvalidValueError("binding", (binding, values), f"one of {', '.join(MOVES)}, with its values")
         if binding == "wheels":
-            self._rims = [values[0], values[1]]
+            self.rims = [values[0], values[1]]
         elif binding.startswith("wheel."):
-            self._rims[binding == "wheel.left"] = values[0]
+            self.rims[binding == "wheel.left"] = values[0]
         elif binding in _LIMBS:
             self._swing(p.CUBO.limbs[_LIMBS[binding]], _LIMBS[binding], values)
         else:
@@ -109,7 +109,7 @@ class CuboBody(MobileBody):
         """Do something once: a binding of `COMMANDS`, or one that it doesn't know, which is only noted."""
         self.done.append((self.time, binding, values))
         if binding == "stop":
-            self._rims = [0.0, 0.0]
+            self.rims = [0.0, 0.0]
             for number, angle in enumerate(self.angles()):
                 self._swing(p.CUBO.limbs[number], number, (angle,))
 
@@ -181,7 +181,7 @@ class CuboBody(MobileBody):
         Raises:
             LostError: If it fell over.
         """
-        right, left = self._rims
+        right, left = self.rims
         v, w = 0.5 * (right + left), (right - left) / p.WHEEL_BASE
         self.drive(clipped(v, p.LIMITS.v_max), clipped(w, p.LIMITS.w_max), steps)
         self._posture = self._position.posture()

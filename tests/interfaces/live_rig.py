@@ -44,7 +44,7 @@ class Rows:
 
     def __init__(self, robot: LiveRobot) -> None:
         self.q: dict[int, Any] = {}
-        physics = robot._physics
+        physics = robot.physics
         assert physics is not None
         feed = physics.feed
 

@@ -160,7 +160,7 @@ class TestBroadcaster:
                 listed = message.verdicts.falsified
                 assert not listed or listed[0][0] >= message.verdicts.since
         assert most == RANGES
-        assert len(broadcaster._falsified) <= 4096
+        assert len(broadcaster.falsified) <= 4096
 
     def test_ranges(self):
         def by(*pairs):

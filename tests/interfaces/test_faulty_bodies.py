@@ -209,7 +209,7 @@ def test_a_joint_that_seizes_is_a_typed_abort_and_the_arm_goes_on_once_it_is_fre
     assert (site.violation.joint, site.violation.tolerance) == (1, 0.1)
     assert 0.1 < site.violation.error < 0.2
     if watchdog is not None:
-        assert (site._watchdog.state, site._watchdog.reason) == (WatchdogState.HALTED, StopReason.TOLERANCE)
+        assert (site.watchdog.state, site.watchdog.reason) == (WatchdogState.HALTED, StopReason.TOLERANCE)
     # It's held where it was measured, and stays.
     assert not ends.asked[-1][1:].any()
     assert ends.asked[-1][0][1] == pytest.approx(seized, abs=1e-9)

@@ -247,9 +247,9 @@ def test_a_puma_has_friction_if_that_is_asked_for(friction: bool) -> None:
     setup = PhysicsSetup(BodyKind.PUMA560, friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
     with tick_body(setup) as body, simulated_puma(friction=friction)(NOMINAL) as arm:
         for made in (body, arm):
-            reality = made._arm.reality  # type: ignore[attr-defined]
+            reality = made.arm.reality  # type: ignore[attr-defined]
             assert reality.friction is friction
-        assert body._arm.reality.dt == 0.002  # type: ignore[attr-defined]
+        assert body.arm.reality.dt == 0.002  # type: ignore[attr-defined]
 
 
 def test_a_fault_waits_until_the_parent_reads_and_measurements_do_not() -> None:

@@ -105,7 +105,7 @@ def test_what_the_diagrams_show_runs() -> None:
         LiveMobileConfig(place("empty"), driven=DrivenConfig(watchdog=WatchdogConfig())), Access(free={Role.SITE})
     )
     try:
-        robot.host.site = robot._site(robot.clock.now())
+        robot.host.site = robot.new_site(robot.clock.now())
         assert mobile - reachable([robot]) == set()
     finally:
         robot.body.close()

@@ -23,7 +23,7 @@ class Hand:
         self.number = 0
 
     def order(self, command, now):
-        self.operator._clock.set(now)
+        self.operator.clock.set(now)
         self.number += 1
         self.servlet.receive(Order(self.number, command, 1), now=now)
         return self.servlet.advance(now=now)[-1]
@@ -42,10 +42,10 @@ def test_a_deleted_move_comes_back_however_long_ago():
 def test_after_a_correction_it_says_why_nothing_is_taken_back():
     hand = Hand()
     hand.order(MotionCommand(JointTarget(READY), execute_at=30.0), 1.0)
-    truth = Engine(MODEL, timeline=hand.operator.engine.timeline, clock=hand.operator._clock)
+    truth = Engine(MODEL, timeline=hand.operator.engine.timeline, clock=hand.operator.clock)
     hand.order(Cancel(1), 5.0)
     # The robot heard of the deletion too late, and goes.
-    hand.operator._clock.set(6.0)
+    hand.operator.clock.set(6.0)
     hand.operator.engine.anchor(truth.timeline)
     outcome = hand.order(None, 7.0)
     assert outcome.receipt is None

@@ -40,7 +40,7 @@ def test_friction_laws_hold_at_the_end_of_every_step(seed: int, slow_path: bool)
         M, c, tau = spd(rng), rng.normal(size=6), rng.normal(scale=4, size=6)
         if slow_path:
             rhs = (tau - c - B * qd).tolist()
-            a = np.array(drives._relax(M.tolist(), rhs, qd.tolist())[0])
+            a = np.array(drives.relax(M.tolist(), rhs, qd.tolist())[0])
             applied = M @ a + c
         else:
             applied = np.array(drives.joint_torques(M.tolist(), c.tolist(), qd.tolist(), tau.tolist()))

@@ -103,11 +103,12 @@ def seen(drive: DriveRun) -> ArchitectureResult:
     driven = match.distance[match.t <= drive.case.length]
     late = match.time_difference[1]
     return ArchitectureResult(
-        summed_up(match), _growth(driven), _growth(late), drive.collisions, drive.limits_passed()
+        summed_up(match), growth(driven), growth(late), drive.collisions, drive.limits_passed()
     )  # fmt: skip
 
 
-def _growth(values: Array) -> float:
+def growth(values: Array) -> float:
+    """How much larger the mean of the last third is than that of the first."""
     third = len(values) // 3
     return float(values[-third:].mean() - values[:third].mean()) if third else 0.0
 

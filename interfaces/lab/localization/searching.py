@@ -175,10 +175,10 @@ def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float,
             if localizer.status is Status.TRACKING:
                 break
             body.drive(0.0, TURN, round(CONTROL / body.reality.dt))
-        return Start(room.name, _answer(localizer, body.truth))
+        return Start(room.name, answer_of(localizer, body.truth))
 
 
-def _answer(localizer: Localizer, truth: tuple[float, float, float]) -> str:
+def answer_of(localizer: Localizer, truth: tuple[float, float, float]) -> str:
     """What is to be thought of what a localizer says."""
     if localizer.posture is None or localizer.status is not Status.TRACKING:
         return "ambiguous" if localizer.status is Status.AMBIGUOUS else "none"

@@ -192,7 +192,7 @@ class LiveMobileRobot:
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
         self.host = DrivenHost(
-            self._site,
+            self.new_site,
             HostConfig(lead=0.0, halting=config.halting),
             now=self.clock.now(),
             seed=secrets.randbelow(2**32),
@@ -253,14 +253,14 @@ class LiveMobileRobot:
                 missed = int(late / CONTROL)
                 self.skipped += missed
                 due += (1 + missed) * CONTROL
-                self._drive(now)
+                self.drive_tick(now)
                 self._took.add(self.clock.now() - now, now=now)
         except Exception:
             # Whoever waits for the robot must not wait for ever.
             self.ended.set()
             raise
 
-    def _drive(self, now: float) -> None:
+    def drive_tick(self, now: float) -> None:
         """One control period."""
         drive = self.host.drive(now=now)
         self._sight.look()
@@ -276,7 +276,7 @@ class LiveMobileRobot:
             self.host.halt(f"the robot touches something: {collisions[-1].thing}", now=now)
         self._turning.soon()
 
-    def _site(self, t: float) -> DrivenRobot:
+    def new_site(self, t: float) -> DrivenRobot:
         """What follows an operator from the time t of its clock on [s]."""
         body, watchdog = self.body, self.host.watchdog(self.config.driven.watchdog)
         if watchdog is not None:

@@ -76,7 +76,8 @@ class LiveRobot:
         self._server = RobotServer(
             self.host, self.clock, access, attached=self._attached, met=self._follow, heard=self._decide
         )
-        self._physics: PhysicsProcess | None = None
+        self.physics: PhysicsProcess | None = None
+        """The body's own process; None without one."""
         self._feeder: Feeder | None = None
         self._measured: Measurement | None = None
         self.ended = asyncio.Event()
@@ -105,7 +106,7 @@ class LiveRobot:
         )
         loop = asyncio.get_running_loop()
         with PhysicsProcess(config, self.clock) as physics:
-            self._physics = physics
+            self.physics = physics
             self._feeder = Feeder(self.host, physics, now=self.clock.now())
             loop.add_reader(physics.fileno(), self._turning.soon)
             self._turning.start()
@@ -115,7 +116,7 @@ class LiveRobot:
                 self._turning.stop()
                 loop.remove_reader(physics.fileno())
                 self._server.close()
-                self._physics = self._feeder = None
+                self.physics = self._feeder = None
 
     async def ready(self) -> None:
         """Wait until the body stands and is measured."""
@@ -132,7 +133,7 @@ class LiveRobot:
                     await asyncio.sleep(0.01)
 
     def _turn(self, now: float) -> float:
-        physics, feeder = self._physics, self._feeder
+        physics, feeder = self.physics, self._feeder
         assert physics is not None
         assert feeder is not None
         for event in physics.poll(now=now):

@@ -132,7 +132,7 @@ class CommittedPath:
         begun = play > t[0]
         if begun:
             points = np.vstack([self._tool_at(self._timeline.sample(play)), points[t > play + 1e-9]])
-        line = _thinned(points)
+        line = thinned(points)
         marks: list[tuple[Array, float]] = []
         whole = index % round(1 / PIECE) == 0
         arrived = low > 0 and bool(np.linalg.norm(self._points[low] - self._points[low - per]) > SAME)
@@ -168,7 +168,7 @@ class CommittedPath:
         return points
 
 
-def _thinned(points: Array) -> Array:
+def thinned(points: Array) -> Array:
     """The line's ends, and between them a point wherever it has gone on by SPACING."""
     gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     if gone[-1] <= SAME:

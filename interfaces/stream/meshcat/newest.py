@@ -25,7 +25,8 @@ class Newest:
         self.greeting = greeting
         self.version = 0
         """Counts up with each change of any value."""
-        self._values: dict[str, tuple[int, bytes]] = {}
+        self.values: dict[str, tuple[int, bytes]] = {}
+        """The newest of each key, and the version it came with."""
         self._slots: set[ReaderPosition] = set()
         self._later: dict[int, tuple[bytes, ...]] = {}
 
@@ -36,12 +37,12 @@ class Newest:
 
     def put(self, key: str, data: bytes) -> None:
         """Replace the value of a key; an equal value changes nothing."""
-        known = self._values.get(key)
+        known = self.values.get(key)
         if known is not None and known[1] == data:
             return
-        self._values.pop(key, None)
+        self.values.pop(key, None)
         self.version += 1
-        self._values[key] = self.version, data
+        self.values[key] = self.version, data
         self._later.clear()
 
     def wake(self) -> None:
@@ -73,7 +74,7 @@ class Newest:
         found = self._later.get(version)
         if found is None:
             newer = []
-            for of, data in reversed(self._values.values()):
+            for of, data in reversed(self.values.values()):
                 if of <= version:
                     break
                 newer.append(data)
@@ -85,7 +86,7 @@ class Newest:
         newer = len(self.later(version))
         if count >= newer:
             return self.version
-        versions = [of for of, _ in self._values.values()]
+        versions = [of for of, _ in self.values.values()]
         return versions[len(versions) - newer + count - 1]
 
 

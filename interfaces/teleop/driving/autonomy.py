@@ -144,8 +144,8 @@ class Autonomy:
         """
         self._pilot = pilot
         self._hands = Hands() if hands is None else hands
-        self._runner = JobRunner(config=config)
-        self._digest = digest(self._runner.jobs)
+        self.runner = JobRunner(config=config)
+        self._digest = digest(self.runner.jobs)
         self._next: Goal | None = None
         """Where to set out for once the robot rests."""
         self._aside: tuple[JourneyState, str] | None = None
@@ -157,14 +157,14 @@ class Autonomy:
     @property
     def doing(self) -> Doing:
         """What it does."""
-        if self._runner.running:
+        if self.runner.running:
             return Doing.JOBS
         return Doing.GOAL if self._next is not None or self._pilot.state in GOING else Doing.NOTHING
 
     @property
     def loss(self) -> OperatorLoss:
         """What follows when the operator is lost."""
-        return self._runner.config.loss
+        return self.runner.config.loss
 
     @property
     def left(self) -> float:
@@ -175,29 +175,29 @@ class Autonomy:
         """Take a task; one that can't be done now changes nothing."""
         match task:
             case Go(goal):
-                self._runner.receive(Interrupted(DIRECT), now=now)
+                self.runner.receive(Interrupted(DIRECT), now=now)
                 self._turn(now)
                 self._set_out(goal)
             case Halt(reason):
                 self.stop(reason, now=now)
             case Load():
-                self._runner.receive(task, now=now)
-                self._digest = digest(self._runner.jobs)
+                self.runner.receive(task, now=now)
+                self._digest = digest(self.runner.jobs)
             case ListCommand():
-                if task in (ListCommand.RUN, ListCommand.RESUME) and not self._runner.running:
+                if task in (ListCommand.RUN, ListCommand.RESUME) and not self.runner.running:
                     self._leave()
-                self._runner.receive(task, now=now)
+                self.runner.receive(task, now=now)
         self._turn(now)
 
     def stop(self, reason: str, *, now: float) -> None:
         """Leave off; a list is paused."""
-        self._runner.receive(Interrupted(reason), now=now)
+        self.runner.receive(Interrupted(reason), now=now)
         self._turn(now)
         self._leave(reason)
 
     def lost(self, reason: str, *, now: float) -> None:
         """The operator is lost: stop or go on, as the policy says."""
-        self._runner.receive(OperatorLost(reason), now=now)
+        self.runner.receive(OperatorLost(reason), now=now)
         self._turn(now)
         if self.loss is OperatorLoss.STOP:
             self._leave(reason)
@@ -231,7 +231,7 @@ class Autonomy:
             state, reason, goal, route = JourneyState.DRIVING, "", self._next, ()
         elif self._aside is not None:
             state, reason = self._aside
-        progress, loss = self._runner.progress, self.loss
+        progress, loss = self.runner.progress, self.loss
         return TaskReport(state, reason, goal, route, self._digest, progress, loss, self._shows, self._says)
 
     def _set_out(self, goal: Goal) -> None:
@@ -254,7 +254,7 @@ class Autonomy:
             requests = self._answered(now)
 
     def _answered(self, now: float) -> tuple[Request, ...]:
-        pilot, hands, runner = self._pilot, self._hands, self._runner
+        pilot, hands, runner = self._pilot, self._hands, self.runner
         if self._move and self._next is None and pilot.state not in GOING:
             attempt, self._move = self._move, 0
             well = pilot.state is JourneyState.ARRIVED
@@ -283,7 +283,7 @@ class Autonomy:
             case RunArm(attempt, program, source):
                 refusal = hands.arm.run(program, source, now=now)
                 if refusal:
-                    self._runner.receive(JobFailed(attempt, refusal), now=now)
+                    self.runner.receive(JobFailed(attempt, refusal), now=now)
                 else:
                     self._work = attempt
             case EndJob(attempt):

@@ -145,7 +145,7 @@ def test_a_run_is_summed_up_with_what_it_broke() -> None:
     assert architectures.seen(replace(drive, drives=fast)).limits_passed == 2
     fast[40] = drive.drives[40, 0], 1.0
     assert architectures.seen(replace(drive, drives=fast)).limits_passed == 1
-    assert architectures._growth(np.arange(9.0)) == 6.0
+    assert architectures.growth(np.arange(9.0)) == 6.0
 
 
 def test_a_seed_counts_once_however_many_networks_it_ran_under() -> None:

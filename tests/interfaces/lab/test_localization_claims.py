@@ -126,7 +126,7 @@ def test_an_answer_is_right_within_10_cm_and_3_deg(
     status: Status, posture: tuple[float, float, float] | None, answer: str
 ) -> None:
     told: Any = SimpleNamespace(status=status, posture=posture)
-    assert searching._answer(told, (1.0, 2.0, 0.0)) == answer
+    assert searching.answer_of(told, (1.0, 2.0, 0.0)) == answer
 
 
 TWOFOLD = Twofold("room", "ambiguous", 2, 2, 0.05)

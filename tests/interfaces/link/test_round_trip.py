@@ -88,7 +88,7 @@ def test_statistics_are_those_of_the_window():
         assert (known.mean, known.median) == (estimator.mean, estimator.median)
     known = estimator.statistics()
     assert known.sent > 500
-    assert known.sent == known.returned + known.lost + len(estimator._in_flight)
+    assert known.sent == known.returned + known.lost + len(estimator.in_flight)
     assert known.refused > 20
     assert known.loss_share == pytest.approx(0.2, abs=0.12)
 
@@ -227,7 +227,7 @@ def test_any_schedule_is_counted_exactly(fates, most, period):
     known = estimator.statistics()
     assert known.returned == len(returned)
     assert known.returned + known.refused == len(arrivals)
-    assert known.sent == known.returned + known.lost + len(estimator._in_flight)
+    assert known.sent == known.returned + known.lost + len(estimator.in_flight)
 
 
 def test_relative_delays_do_not_know_the_offset():

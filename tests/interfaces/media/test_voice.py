@@ -251,7 +251,7 @@ def test_a_loudspeaker_on_board_is_done_when_its_words_are(monkeypatch: pytest.M
             await asyncio.sleep(0.005)
         aloud.speak("Hello!", now=5.0)
         assert aloud.is_speaking(now=1e6)
-        while aloud._until == math.inf:
+        while aloud.until == math.inf:
             await asyncio.sleep(0.005)
         samples, rate = await spoken("Hello!", SpeechConfig())
         assert aloud.is_speaking(now=4.9 + len(samples) / rate)
@@ -263,7 +263,7 @@ def test_a_loudspeaker_on_board_is_done_when_its_words_are(monkeypatch: pytest.M
         aloud.speak("Hello!", now=0.0)
         while aloud.is_speaking(now=60.0):
             await asyncio.sleep(0.005)
-        return reading_time("Hello!"), aloud._until
+        return reading_time("Hello!"), aloud.until
 
     expected, found = asyncio.run(talk())
     assert found == expected

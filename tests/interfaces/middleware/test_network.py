@@ -17,11 +17,11 @@ from interfaces.middleware.network import (
     GainNetwork,
     Ranges,
     TrainingConfig,
-    _jacobian,
-    _output,
     default_network,
     errors,
     examples,
+    forward_pass,
+    jacobian,
     lessons,
     load_network,
     read_network,
@@ -101,11 +101,11 @@ def test_what_is_learned_is_exact():
 def test_the_jacobian_is_the_outputs_derivative():
     rng = np.random.default_rng(0)
     weights, x = rng.normal(size=(6, 4)), rng.uniform(-1, 1, (9, 2))
-    J = _jacobian(weights, x, _output(weights, x)[0])
+    J = jacobian(weights, x, forward_pass(weights, x)[0])
     for column in range(21):
         step = np.zeros_like(weights)
         step.flat[column] = 1e-6
-        difference = (_output(weights + step, x)[1] - _output(weights - step, x)[1]) / 2e-6
+        difference = (forward_pass(weights + step, x)[1] - forward_pass(weights - step, x)[1]) / 2e-6
         assert J[:, column] == pytest.approx(difference, abs=1e-8)
 
 

@@ -29,7 +29,7 @@ from vrs.errors import InvalidValueError
 def begin_late(sitting, path, **given):
     """Record a sitting from now on."""
     now, engine = sitting.clock, sitting.site.engine
-    sitting.site._clock.set(now)
+    sitting.site.clock.set(now)
     sitting.capture = capture = Capture(sitting.site, MODEL, now=now, step=0.02, every=True, **given)
     begin = Begin(
         t=now, robot="puma560", driver="live", title="late", seed=0, delay="none", offset="adaptive",

@@ -191,7 +191,7 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
     line.link.backward.send(b"report", 1.4, 6)
     assert line.link.backward.receive(1.5)
     recorder.advance(now=1.5, connected=False)
-    assert not recorder._recorder.put(EventEntry(1.5, "other", "x" * 9 * 2**20), t=1.5)
+    assert not recorder.recorder.put(EventEntry(1.5, "other", "x" * 9 * 2**20), t=1.5)
     assert recorder.health()["dropped"] == 1
     recorder.finish(now=1.6)
     assert line.operator.listener is None
@@ -205,7 +205,7 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
         assert track.t == pytest.approx([0.3, 0.4, 0.5, 0.6])
         assert track.play == pytest.approx(track.t - 0.2)
         assert (track.q == q).all()
-        assert len(recording._logs[REAL].entries()) == 4
+        assert len(recording.logs[REAL].entries()) == 4
         assert [(entry.direction, entry.sent) for entry in recording.link] == [("backward", 1.4)]
         assert len(recording.receipts("real")) == 3
 
@@ -226,7 +226,7 @@ def test_what_was_before_a_late_recording_isnt_told_again(tmp_path):
         assert [entry.receipt.command_id for entry in recording.commands] == [2]
         assert recording.session.t == 60.0
         assert not recording.link
-        told = recording._logs["/commands"].entries()
+        told = recording.logs["/commands"].entries()
         assert [one.receipt.command_id for one in told if isinstance(one, ReceiptEntry)] == [2]
 
 
@@ -238,7 +238,7 @@ def test_what_is_written_at_the_end_needs_no_room(tmp_path, monkeypatch):
         goal = JointTarget(READY if k % 2 else NOMINAL)
         line.operator.execute(MotionCommand(goal, insertion=Insertion.APPEND), now=0.1 * k)
         recorder.advance(now=0.1 * k, connected=True)
-        while recorder._recorder._queue:
+        while recorder.recorder._queue:
             time.sleep(0.001)
     recorder.finish(now=2.0)
     assert recorder.health()["dropped"] == 0

@@ -87,7 +87,7 @@ def drawn_as(page, k, twin, q):
 
 def near(server, t):
     """Wait until the head stands at a time."""
-    until(lambda: abs(server.playback.place(now=server.page._clock.now()) - t) < 1e-9)
+    until(lambda: abs(server.playback.place(now=server.page.clock.now()) - t) < 1e-9)
     assert server.playback.mode is Mode.PAUSED
 
 
@@ -103,7 +103,7 @@ def test_it_opens_and_moves_and_shows_g(files, open_page):
     path, site = files[0]
     first, took = [], []
     with served(path, first=first.append) as server:
-        server.call(server.playback.play, now=server.page._clock.now())
+        server.call(server.playback.play, now=server.page.clock.now())
         while min(took, default=5.0) >= 5.0 and len(took) < 3:
             crowd = crowded()
             begun = time.monotonic()

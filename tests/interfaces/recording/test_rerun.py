@@ -26,7 +26,7 @@ def same(one, other):
 
 def facts(receipts):
     """All that receipts say."""
-    names = [name for name in Receipt.__slots__ if not name.endswith("_names") and name != "q"]
+    names = [name for name in Receipt.__slots__ if not name.endswith("names") and name != "q"]
     return [
         (*(getattr(r, name) for name in names), None if r.q is None else r.q.tolist(), r.shifted, r.superseded)
         for r in receipts

@@ -61,11 +61,11 @@ class Pair:
 
     def count_from(self, number: int) -> None:
         """Let both sides' numbers go on from another one: near to where they go round."""
-        local, robot = self.local._session, self.robot._claim.session
+        local, robot = self.local.numbers, self.robot.claim.session
         self.network.flight.clear()
         local.number, robot.number = number, number + 7
         robot.newest, local.newest = number - 1, number + 6
-        self.local._round_trip, self.robot._round_trip = PacketRoundTrip(), PacketRoundTrip()
+        self.local.packet_round_trip, self.robot.packet_round_trip = PacketRoundTrip(), PacketRoundTrip()
 
     def until(self, condition, within: float) -> None:
         end = self.now + within
@@ -187,11 +187,11 @@ def talk(pair: Pair, judge: Judge, random: Random, packets: int) -> None:
         if chance < 0.1 and len(judge.commands) - len(judge.executed) < 200:
             number = local.command(random.choice(commands), value(len(judge.commands)))
             judge.commands.append(number)
-        elif chance < 0.13 and len(local._memory) < 50:
+        elif chance < 0.13 and len(local.memory_outbox) < 50:
             deadline = pair.now + random.choice((0.05, 0.5, 2.0, 15.0))
             data = value(len(judge.stores)) * (len(judge.stores) % 50)
             judge.stores[local.store(random.choice(programs), data, deadline=deadline)] = deadline
-        elif chance < 0.15 and len(robot._memory) < 50 and robot.session:
+        elif chance < 0.15 and len(robot.memory_outbox) < 50 and robot.session:
             deadline = pair.now + random.choice((0.05, 0.5, 2.0, 15.0))
             judge.events[robot.store(random.choice(logs), b"!" * random.randrange(256), deadline=deadline)] = (
                 deadline
@@ -202,6 +202,6 @@ def talk(pair: Pair, judge: Judge, random: Random, packets: int) -> None:
             local.write(wheel, random.randrange(500).to_bytes(2, "big"))
     pair.network.loss, pair.network.silences = 0.1, ()
     end = pair.now + 300.0
-    while pair.now < end and (len(local._commands) or len(local._memory) or len(robot._memory)):
+    while pair.now < end and (len(local.command_outbox) or len(local.memory_outbox) or len(robot.memory_outbox)):
         pair.step()
         judge.look()

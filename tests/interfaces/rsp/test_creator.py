@@ -324,7 +324,7 @@ def test_a_lost_link_stops_the_body_in_time(written: Path, monkeypatch: pytest.M
         site.run(1.0)
         before, lost = body.motion[0], site.clock.now()
         assert before > 0.25
-        while body._rims != [0.0, 0.0]:
+        while body.rims != [0.0, 0.0]:
             now = site.clock.advance(0.001)
             site.host.advance(now=now)
             assert now - lost < 0.6

@@ -38,7 +38,7 @@ def test_every_rule_holds(link: str, sealed: bool) -> None:
     judge = Judge(pair)
     talk(pair, judge, Random(2), PACKETS)
     judge.conclude()
-    assert pair.local._session.number > 65_536, "numbers must have gone round"
+    assert pair.local.numbers.number > 65_536, "numbers must have gone round"
     assert judge.lost >= 1, "a silence of 10 s must have been noticed"
     assert len(judge.commands) > 50
     assert len(judge.stored) > 10
@@ -135,7 +135,7 @@ def test_a_lost_link_rests_the_wheels_and_the_next_packet_lets_them_go_on() -> N
     pair.run(0.3)
     assert pair.robot.effectors(now=pair.now)[wheel] == (100.0,)
     pair.network.closed = True
-    heard = pair.robot._heard
+    heard = pair.robot.heard
     while not any(isinstance(output, LinkLost) for output in pair.did):
         pair.robot.effectors(now=pair.now)
         pair.step()
@@ -262,7 +262,7 @@ def test_an_event_that_was_told_before_a_newer_one_is_no_news() -> None:
     from interfaces.rsp.outputs import Occurred
 
     pair = Pair(MODEL, Network(Random(1))).opened()
-    bumper, session = MODEL.index("bumper"), pair.robot._claim.session
+    bumper, session = MODEL.index("bumper"), pair.robot.claim.session
     for number in (0, 1, 0, 65_535, 1, 2):
         body = pair.robot.layout.join({bumper: number.to_bytes(2, "big") + b"\1"})
         pair.local.receive(session.make(PacketType.UP, body, pair.now), now=pair.now)

@@ -254,9 +254,9 @@ def test_the_robot_keeps_to_the_local_systems_period() -> None:
     )
     pair.opened()
     pair.run(3.0)
-    before = pair.robot._claim.session.number
+    before = pair.robot.claim.session.number
     pair.run(5.0)
-    assert 45 <= pair.robot._claim.session.number - before <= 55
+    assert 45 <= pair.robot.claim.session.number - before <= 55
 
 
 def test_what_no_acknowledgement_comes_for_is_sent_more_and_more_seldom() -> None:

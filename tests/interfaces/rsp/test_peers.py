@@ -162,7 +162,7 @@ def test_a_session_opens_on_the_way_to_the_moon() -> None:
 def test_who_is_challenged_and_then_never_answered_gives_up() -> None:
     pair = Pair(MODEL, Network(Random(1)))
     pair.local.open(now=0.0)
-    pair.until(lambda: pair.local._asked.cookie != bytes(16), 1.0)
+    pair.until(lambda: pair.local.opening.cookie != bytes(16), 1.0)
     pair.network.closed = True
     pair.network.flight.clear()
     pair.until(lambda: pair.local.state is LocalState.CLOSED, 5.2)
@@ -222,9 +222,9 @@ def test_what_is_longer_than_its_element_is_refused_before_it_stops_all_packets(
 
 def test_a_packet_of_another_model_is_dropped_on_both_sides() -> None:
     pair = joined()
-    down, up = pair.local._session, pair.robot._claim.session
+    down, up = pair.local.numbers, pair.robot.claim.session
     for session in (down, up):
-        session._model += 1
+        session.model += 1
     empty = pair.local.layout.join({})
     pair.robot.receive(down.make(PacketType.DOWN, empty, pair.now), ADDRESS, now=pair.now)
     pair.local.receive(up.make(PacketType.UP, empty, pair.now), now=pair.now)

@@ -40,13 +40,13 @@ def next_down(pair: Pair) -> bytes:
 def state(pair: Pair) -> tuple:
     """What a datagram that doesn't count must leave as it was."""
     robot = pair.robot
-    session = robot._claim.session
+    session = robot.claim.session
     return (
         robot.motion.given(WHEEL),
         session.newest,
         session.number,
         robot.session,
-        robot._heard,
+        robot.heard,
         robot.streams.free,
     )
 
@@ -100,10 +100,10 @@ def test_a_packet_from_before_the_newest_is_late_though_it_never_came() -> None:
 
 def test_a_sealed_packets_number_is_its_counters() -> None:
     pair = pair_of(sealed=True)
-    session, before = pair.local._session, state(pair)
+    session, before = pair.local.numbers, state(pair)
     number = session.number
     head = header.Header(MODEL.id, True, PacketType.DOWN, number, 0, session.id, 0, 0)
-    data = session._sealer.seal(header.encode(head), b"\0\0", number + 1)
+    data = session.sealer.seal(header.encode(head), b"\0\0", number + 1)
     pair.robot.receive(data, ADDRESS, now=pair.now)
     assert pair.robot.dropped[DropReason.MALFORMED] == 1
     assert state(pair) == before
@@ -162,7 +162,7 @@ def test_no_answer_is_longer_than_its_question_and_asking_leaves_nothing(sealed:
             assert len(answer) <= len(asked)
             assert header.decode(answer).type is PacketType.CHALLENGE
     assert robot.session is None
-    assert robot._door.pending is None
+    assert robot.door.pending is None
 
 
 def test_too_many_requests_are_dropped() -> None:
@@ -217,7 +217,7 @@ def test_a_takeover_passes_through_a_stop(sealed: bool) -> None:
     other = second(pair, rank=Rank.ADMIN if sealed else Rank.OPERATOR, keys=KEYS if sealed else None, takeover=True)
     assert other.state is LocalState.OPEN
     assert [o.reason for o in pair.told if isinstance(o, SessionEnded)] == [EndReason.TAKEN]
-    assert pair.robot.session == other._session.id
+    assert pair.robot.session == other.numbers.id
     assert pair.robot.stopping
     assert pair.robot.effectors(now=pair.now)[WHEEL] == (0.0,)
     other.write(WHEEL, b"\0\x0a")
@@ -359,9 +359,9 @@ def test_a_local_system_takes_nothing_of_another_session() -> None:
     pair = pair_of(sealed=False)
     pair.run(0.05)
     (data, _), *_ = pair.robot.to_send(now=pair.now + 1.0)
-    before = pair.local._session.newest
+    before = pair.local.numbers.newest
     pair.local.receive(data[:12] + bytes([data[12] ^ 1]) + data[13:], now=pair.now)
     assert pair.local.dropped[DropReason.SESSION] == 1
-    assert pair.local._session.newest == before
+    assert pair.local.numbers.newest == before
     pair.local.receive(data, now=pair.now)
-    assert pair.local._session.newest > before
+    assert pair.local.numbers.newest > before

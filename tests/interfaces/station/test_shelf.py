@@ -95,11 +95,11 @@ def test_the_list_says_what_is_wrong_and_is_bounded(kept, tmp_path, monkeypatch)
     for time in range(5):
         os.utime(tmp_path / "none.mcap", (2e9 + time, 2e9 + time))
         directory.entries()
-        assert len(directory._known) <= 2
+        assert len(directory.known) <= 2
 
 
 def standing(replay):
-    return json.loads(replay.board._values["standing"][1])
+    return json.loads(replay.board.values["standing"][1])
 
 
 def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.stream.meshcat.committed import SPACING, _thinned
+from interfaces.stream.meshcat.committed import SPACING, thinned
 
 
 @given(st.lists(st.floats(0.01, 0.9), min_size=20, max_size=200), st.integers(0, 2**31))
@@ -14,7 +14,7 @@ def test_a_thinned_line_keeps_its_ends_and_no_points_that_crowd(steps: list[floa
     gone = SPACING * np.cumsum([0.0, *steps])
     way = np.random.default_rng(seed).normal(size=3)
     points = gone[:, None] * way / np.linalg.norm(way)
-    line = _thinned(points)
+    line = thinned(points)
     assert np.array_equal(line[[0, -1]], points[[0, -1]])
     at = np.linalg.norm(line, axis=1)
     assert np.isin(at.round(12), np.linalg.norm(points, axis=1).round(12)).all()
@@ -27,4 +27,4 @@ def test_a_thinned_line_keeps_its_ends_and_no_points_that_crowd(steps: list[floa
 
 
 def test_a_line_that_goes_nowhere_has_no_points() -> None:
-    assert len(_thinned(np.ones((30, 3)))) == 0
+    assert len(thinned(np.ones((30, 3)))) == 0

@@ -73,7 +73,7 @@ def test_a_connection_that_is_cut_is_taken_up_again_and_the_lease_stays():
         robot.acquire()
         viewer = robot.viewer(rate=50)
         assert viewer.wait(lambda v: v.timeline is not None)
-        for client in list(serving.server._clients.values()):
+        for client in list(serving.server.clients.values()):
             serving.loop.call_soon_threadsafe(client.socket.abort)
         issued = [robot.designer.issue(to(k), execute_in=1.0 + k) for k in range(3)]
         found = [robot.designer.answered(one.number, 5.0) for one in issued]

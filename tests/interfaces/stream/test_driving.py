@@ -85,7 +85,7 @@ def said(session: HubSession, *messages: dict[str, Any], now: float = 5.0) -> li
     """What a client hears that says something."""
     for message in messages:
         session.receive(json.dumps(message), now=now)
-    session._desk.advance(now=now)  # type: ignore[attr-defined]
+    session.desk.advance(now=now)  # type: ignore[attr-defined]
     return [json.loads(data) for data in session.advance(now=now)]
 
 

@@ -115,8 +115,8 @@ def test_a_timeline_is_made_and_written_once_for_all_who_ask(monkeypatch: pytest
 def test_a_survey_is_worked_out_now_and_then_and_each_is_answered() -> None:
     hub, _, _ = emulated()
     asked = []
-    network = hub._emulation.network
-    hub._emulation.network = lambda **named: asked.append(0) or network(**named)
+    network = hub.emulation.network
+    hub.emulation.network = lambda **named: asked.append(0) or network(**named)
     peers = [Peer(hub, role=Role.VIEWER) for _ in range(4)]
     answers = [
         m.answers for k in range(100) for peer in peers for m in peer.tell(Survey(k + 1), now=1.0 + k / 1000)

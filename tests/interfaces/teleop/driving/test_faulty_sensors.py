@@ -169,15 +169,15 @@ def test_a_live_robot_halts(name: str, sensor: str) -> None:
         robot = LiveMobileRobot(LiveMobileConfig(place("empty")), Access(free={Role.SITE}))
         try:
             now = robot.clock.now()
-            robot.host.site = robot._site(now)
+            robot.host.site = robot.new_site(now)
             site = robot.host.site
             site.epoch = 1
             for _ in range(3):
-                robot._drive(robot.clock.now())
+                robot.drive_tick(robot.clock.now())
             assert site.halted == ""
             spoil(robot.body, name, math.nan)
             for _ in range(round(0.6 / CONTROL)):
-                robot._drive(robot.clock.now())
+                robot.drive_tick(robot.clock.now())
             assert site.halted == f"the {sensor} reads nan"
             assert np.isfinite(robot.health()["posture"]).all()
         finally:

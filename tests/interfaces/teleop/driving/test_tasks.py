@@ -146,7 +146,7 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
     tasks = rig.operator.tasks
     assert tasks is not None
     assert tasks.progress.stage is (JobStage.ABORTED if stop == "abort" else JobStage.PAUSED)
-    assert rig.autonomy._runner.jobs == jobs
+    assert rig.autonomy.runner.jobs == jobs
     assert not rig.hands.speaker.is_speaking(now=rig.now)
     assert not tasks.says
     # And it goes on under a new drive.
