@@ -135,6 +135,25 @@ def begin(
         playback.set_loop(*span, now=now)
 
 
+def begin_shown(
+    playback: Playback, at: float | None, rate: float | None, span: tuple[float, float] | None, *, now: float
+) -> None:
+    """Begin when the first page looks: where only `at` is given it stands there; what is being written is live.
+
+    Args:
+        playback: Standing at `at`, if that is given.
+        at: As for `begin`.
+        rate: As for `begin`.
+        span: As for `begin`.
+        now: The user's time [s].
+    """
+    if playback.growing and (at, rate, span) == (None, None, None):
+        playback.seek(playback.span[1], now=now)
+        playback.go_live(now=now)
+    elif at is None or rate is not None or span is not None:
+        begin(playback, at, rate, span, now=now)
+
+
 def _print(
     playback: Playback,
     at: float | None,
@@ -197,11 +216,7 @@ def _serve(
         clock = WallClock()
 
         def first(now: float) -> None:
-            if playback.growing and (at, rate, span) == (None, None, None):
-                playback.seek(playback.span[1], now=now)
-                playback.go_live(now=now)
-            elif at is None or rate is not None or span is not None:
-                begin(playback, at, rate, span, now=now)
+            begin_shown(playback, at, rate, span, now=now)
 
         if at is not None:
             playback.seek(at, now=clock.now())

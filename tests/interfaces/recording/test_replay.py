@@ -18,6 +18,9 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
+from interfaces.cli.replay import begin_shown
+from interfaces.recording.playback import Mode, Playback
+from interfaces.recording.recording import open_recording
 from tests.interfaces.recording.made import make
 
 VRS = [sys.executable, "-m", "interfaces.cli", "replay"]
@@ -59,6 +62,43 @@ def test_an_instant(made):
     text = vrs(made[0], "--headless", "--at", 1.75).stdout
     assert text.count("\n") == 1
     assert text.split()[:2] == ["1.750", "s"]
+
+
+@pytest.mark.parametrize(
+    ("at", "rate", "span", "mode", "later"),
+    [
+        (None, None, None, Mode.PLAYING, 1.0),
+        (3.0, None, None, Mode.PAUSED, 3.0),
+        (3.0, 2.0, None, Mode.PLAYING, 5.0),
+        (None, -1.0, None, Mode.PLAYING, 11.0),
+        (3.0, None, (2.0, 3.5), Mode.PLAYING, 2.5),
+        (None, None, (2.0, 3.5), Mode.PLAYING, 3.0),
+    ],
+)
+def test_a_page_begins_as_asked_and_an_instant_alone_stands(made, at, rate, span, mode, later):
+    with open_recording(made[0]) as recording:
+        playback = Playback([recording])
+        if at is not None:
+            playback.seek(at, now=0.0)
+        begin_shown(playback, at, rate, span, now=10.0)
+        assert playback.mode is mode
+        assert playback.place(now=11.0) == pytest.approx(later)
+
+
+@pytest.mark.parametrize(("at", "modes"), [(None, {Mode.LIVE, Mode.CATCHING_UP}), (3.0, {Mode.PAUSED})])
+def test_a_page_of_what_is_being_written_is_live_unless_asked_otherwise(made, tmp_path, at, modes):
+    path = tmp_path / "growing.mcap"
+    data = made[0].read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with open_recording(path) as recording:
+        playback = Playback([recording])
+        path.write_bytes(data[: 3 * len(data) // 4])
+        playback.advance(now=1.0)
+        assert playback.growing
+        if at is not None:
+            playback.seek(at, now=0.0)
+        begin_shown(playback, at, None, None, now=1.0)
+        assert playback.mode in modes
 
 
 def test_to_the_end_and_back_to_the_start(made):
