@@ -47,7 +47,7 @@ class Timer:
     """
 
     def __init__(self, clock: Clock, callback: Callable[[], None], lateness: TimerLateness) -> None:
-        self._clock, self._callback, self._lateness = clock, callback, lateness
+        self._clock, self._callback, self.lateness = clock, callback, lateness
         self._deadline: float | None = None
         self._handle: asyncio.TimerHandle | None = None
 
@@ -70,7 +70,7 @@ class Timer:
         if late < 0:
             self.set(deadline)
             return
-        self._lateness.add(late)
+        self.lateness.add(late)
         self._callback()
 
 

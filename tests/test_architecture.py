@@ -250,10 +250,6 @@ def test_the_door_opens_quickly_and_loads_nothing_heavy(code, most, tmp_path):
     assert best <= most * max(1.0, yardstick / NUMPY)
 
 
-PRIVATE_USES = 35
-"""Uses of our private names in tests: a bar that only goes down."""
-
-
 def private_names(home):
     """Names with a leading underscore that our packages define: functions, classes, attributes and variables."""
     names = set()
@@ -292,9 +288,8 @@ def private_uses(home):
             yield from (f"{path.relative_to(home)}:{node.lineno} {name}" for name in names if name in ours)
 
 
-def test_tests_use_no_more_private_names_than_before():
-    found = list(private_uses(HOME))
-    assert len(found) <= PRIVATE_USES, "\n".join(found)
+def test_tests_use_no_private_names():
+    assert list(private_uses(HOME)) == []
 
 
 @pytest.mark.parametrize(

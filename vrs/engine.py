@@ -130,7 +130,8 @@ class Engine:
         self._model: RobotModel = model
         self._clock = clock
         ledger: Ledger[Timeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
-        self._plan = Scheduler(model, timeline, ledger, lateness_of(lateness))
+        self.scheduler = Scheduler(model, timeline, ledger, lateness_of(lateness))
+        """Plans the commands."""
         self._keeper = Keeper()
 
     @property
@@ -146,25 +147,25 @@ class Engine:
     @property
     def timeline(self) -> Timeline:
         """The timeline as it is now; a value that later commands don't change."""
-        return self._plan.timeline
+        return self.scheduler.timeline
 
     @property
     def limits(self) -> Limits:
         """The limits in force: the model's, as parameter changes left them."""
-        return self._plan.limits
+        return self.scheduler.limits
 
     @property
     def parameters(self) -> Mapping[str, object]:
         """Internal simulation parameters by name, with their values."""
         return {
-            "lateness": self._plan.lateness,
-            **{name: getattr(self._plan.limits, name) for name in self._limit_names},
+            "lateness": self.scheduler.lateness,
+            **{name: getattr(self.scheduler.limits, name) for name in self._limit_names},
         }
 
     @property
     def receipts(self) -> tuple[Receipt, ...]:
         """The current truth of every command of this engine, in the order of their ids."""
-        return self._plan.ledger.all()
+        return self.scheduler.ledger.all()
 
     def receipt(self, command_id: int) -> Receipt:
         """The current truth of a command.
@@ -172,11 +173,11 @@ class Engine:
         Raises:
             UnknownCommandError: If this engine gave no receipt of that id.
         """
-        return self._plan.ledger.receipt(command_id)
+        return self.scheduler.ledger.receipt(command_id)
 
     def now(self) -> float:
         """Present time [s]; offline, the end of the plan."""
-        return self._plan.timeline.end if self._clock is None else self._clock.now()
+        return self.scheduler.timeline.end if self._clock is None else self._clock.now()
 
     def joints(self, t: ArrayLike | None = None) -> Array:
         """g: joints at t, or now, [rad]: (n,), or (k, n) for t of shape (k,). Source: eq. (4).
@@ -184,7 +185,7 @@ class Engine:
         Raises:
             NonFiniteTimeError: If t holds NaN or infinity.
         """
-        return self._plan.timeline.sample(self.now() if t is None else t)
+        return self.scheduler.timeline.sample(self.now() if t is None else t)
 
     def pose(self, t: ArrayLike | None = None) -> Array:
         """Pose of the last link in the base frame at t, or now: (4, 4) or (k, 4, 4)."""
@@ -222,13 +223,13 @@ class Engine:
             return Position(t, q, frozen_array(self._model.forward(q)))
         with self.atomic():
             if isinstance(checked, MotionCommand):
-                return self._plan.move(checked, self._present())
+                return self.scheduler.move(checked, self._present())
             if isinstance(checked, ParameterChange):
                 self._set_parameter(checked)
                 return None
             if isinstance(checked, SteerCommand):
-                return self._plan.steer(checked, self._present())
-            return self._plan.edit(checked, self._present())
+                return self.scheduler.steer(checked, self._present())
+            return self.scheduler.edit(checked, self._present())
 
     def atomic(self) -> AbstractContextManager[None]:
         """Put timeline, receipts and parameters back as they were, if what is done meanwhile raises.
@@ -236,13 +237,13 @@ class Engine:
         Every command and edit is carried out so; a caller that has something to add to one, which may fail, does
         both inside.
         """
-        return self._plan.atomic()
+        return self.scheduler.atomic()
 
     def _present(self) -> float | None:
         if self._clock is None:
             return None
         now = self._clock.now()
-        self._keeper.tidy(self._plan.timeline, now)
+        self._keeper.tidy(self.scheduler.timeline, now)
         return now
 
     def retime(self, command_id: int, t: float, *, issued_at: float | None = None) -> Receipt:
@@ -284,27 +285,27 @@ class Engine:
     @property
     def newest(self) -> int:
         """Highest command id given out; 0 while there's none."""
-        return self._plan.ledger.newest
+        return self.scheduler.ledger.newest
 
     def count_from(self, command_id: int) -> None:
         """Give the next command the id after this one; a replica numbers as the engine that it follows.
 
         An id that was given out before must not come again.
         """
-        self._plan.ledger.newest = command_id
+        self.scheduler.ledger.newest = command_id
 
     def standing(self) -> Standing:
         """What the next commands depend on besides the timeline; see `vrs.ledger.Standing`."""
-        return self._plan.standing(self.now())
+        return self.scheduler.standing(self.now())
 
     def take_up(self, stand: Standing) -> None:
         """Let an engine that was just made on a timeline go on as the one did that stood so."""
-        self._plan.take_up(stand)
+        self.scheduler.take_up(stand)
 
     def refuse(self, command: Command, reason: str) -> Receipt:
         """Answer a command that something outside the engine forbids."""
         issued, asked = getattr(command, "issued_at", None), getattr(command, "execute_at", None)
-        return self._plan.reject(issued, asked, reason)
+        return self.scheduler.reject(issued, asked, reason)
 
     def anchor(self, truth: Timeline) -> Anchored:
         """Go over from now on into a timeline that turned out to be the true one; see `vrs.anchoring.anchored`.
@@ -314,7 +315,7 @@ class Engine:
             PlanningError: If no way to it keeps the limits.
         """
         with self.atomic():
-            return self._plan.anchor(truth, self.now())
+            return self.scheduler.anchor(truth, self.now())
 
     def undo(self) -> Receipt | None:
         """Take back the newest accepted command or edit, as far as it lies in the future.
@@ -327,14 +328,14 @@ class Engine:
             The receipt of the command that was taken back, as it is now; None where there's none.
         """
         with self.atomic():
-            return self._plan.undo(self._present())
+            return self.scheduler.undo(self._present())
 
     def undo_refusal(self) -> str:
         """Why `undo` takes nothing back now; empty where it does, or where nothing was ever commanded."""
-        return self._plan.undo_refusal(self._present())
+        return self.scheduler.undo_refusal(self._present())
 
     def _set_parameter(self, change: ParameterChange) -> None:
-        plan = self._plan
+        plan = self.scheduler
         if change.name == "lateness":
             plan.lateness = lateness_of(change.value)
             return
@@ -347,7 +348,7 @@ class Engine:
 
     def _limit(self, change: ParameterChange) -> Any:
         """A limit as it's to be."""
-        n = self._plan.limits.dof
+        n = self.scheduler.limits.dof
         allowed = f"a positive number, or {n} of them"
         value = finite_array(change.name, change.value, None, allowed)
         if value.ndim > 1 or (value.ndim == 1 and len(value) != n) or not (value > 0).all():
@@ -362,7 +363,7 @@ class MobileEngine(Engine):
     """
 
     _model: MobileModel  # type: ignore[assignment]
-    _plan: DriveScheduler  # type: ignore[assignment]
+    scheduler: DriveScheduler  # type: ignore[assignment]
     _limit_names: ClassVar[tuple[str, ...]] = ("v_max", "w_max", "a_max", "alpha_max")
 
     def __init__(
@@ -407,7 +408,8 @@ class MobileEngine(Engine):
         self._model = model
         self._clock = clock
         ledger: Ledger[ArcTimeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
-        self._plan = DriveScheduler(model, timeline, ledger, lateness_of(lateness))
+        self.scheduler = DriveScheduler(model, timeline, ledger, lateness_of(lateness))
+        """Plans the commands."""
         self._keeper = Keeper()
 
     @property
@@ -418,12 +420,12 @@ class MobileEngine(Engine):
     @property
     def timeline(self) -> ArcTimeline:  # type: ignore[override]
         """The timeline as it is now; a value that later commands don't change."""
-        return self._plan.timeline
+        return self.scheduler.timeline
 
     @property
     def limits(self) -> DriveLimits:  # type: ignore[override]
         """The limits in force: the model's, as parameter changes left them."""
-        return self._plan.limits
+        return self.scheduler.limits
 
     def posture(self, t: ArrayLike | None = None) -> Array:
         """g: (x, y, θ) at t, or now, [m, m, rad]: (3,), or (k, 3) for t of shape (k,). θ isn't wrapped.
@@ -431,7 +433,7 @@ class MobileEngine(Engine):
         Raises:
             NonFiniteTimeError: If t holds NaN or infinity.
         """
-        return self._plan.timeline.sample(self.now() if t is None else t)
+        return self.scheduler.timeline.sample(self.now() if t is None else t)
 
     @overload  # type: ignore[override]
     def execute(self, command: DriveCommand | Stop) -> Receipt: ...
@@ -459,10 +461,10 @@ class MobileEngine(Engine):
         """
         if isinstance(command, DriveCommand):
             with self.atomic():
-                return self._plan.drive(command, self._present())
+                return self.scheduler.drive(command, self._present())
         if isinstance(command, Stop):
             with self.atomic():
-                return self._plan.stop(command, self._present())
+                return self.scheduler.stop(command, self._present())
         if isinstance(command, PositionQuery):
             t = self.now() if command.t is None else command.t
             posture = frozen_array(self.posture(t))

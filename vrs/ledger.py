@@ -146,13 +146,18 @@ class Ledger(Generic[_TimelineT]):
     def __init__(self, newest: int) -> None:
         self.newest = newest
         """Highest id given out."""
-        self._entries: dict[int, Entry] = {}
+        self.entries: dict[int, Entry] = {}
+        """By command id, in the order of the commands."""
         self._restore: list[Callable[[], object]] | None = None
         """Puts back, last first, what was written over since `atomic` began; None outside."""
-        self._changes: list[Change] = []
-        self._versions: list[int] = []
-        self._stills: list[tuple[float, int]] = []
-        self._undo: deque[Undo[_TimelineT]] = deque(maxlen=UNDO_DEPTH)
+        self.changes: list[Change] = []
+        """What each edit changed of the commands before it, in order."""
+        self.versions: list[int] = []
+        """Of the timeline, one a change, ascending."""
+        self.stills: list[tuple[float, int]] = []
+        """Holds: when each ended [s], and its command's id."""
+        self.undo_steps: deque[Undo[_TimelineT]] = deque(maxlen=UNDO_DEPTH)
+        """What takes the last edits back, the newest last."""
         self.settled = ""
         """Why edits before the newest ones can't be taken back any more; empty where all can."""
 
@@ -162,12 +167,12 @@ class Ledger(Generic[_TimelineT]):
         if self._restore is not None:
             yield
             return
-        saved = self.newest, self._stills[:], self._undo.copy(), self.settled
+        saved = self.newest, self.stills[:], self.undo_steps.copy(), self.settled
         self._restore = []
         try:
             yield
         except BaseException:
-            self.newest, self._stills, self._undo, self.settled = saved
+            self.newest, self.stills, self.undo_steps, self.settled = saved
             while self._restore:
                 self._restore.pop()()
             raise
@@ -177,15 +182,15 @@ class Ledger(Generic[_TimelineT]):
     def _set(self, entry: Entry) -> Entry | None:
         """Write an entry down; what it writes over."""
         command_id = entry[0].command_id
-        old = self._entries.get(command_id)
+        old = self.entries.get(command_id)
         if self._restore is not None:
-            absent = partial(self._entries.pop, command_id, None)
-            self._restore.append(absent if old is None else partial(self._entries.update, {command_id: old}))
-        self._entries[command_id] = entry
+            absent = partial(self.entries.pop, command_id, None)
+            self._restore.append(absent if old is None else partial(self.entries.update, {command_id: old}))
+        self.entries[command_id] = entry
         return old
 
     def __contains__(self, command_id: object) -> bool:
-        return command_id in self._entries
+        return command_id in self.entries
 
     def receipt(self, command_id: int) -> Receipt:
         """The current truth of a command.
@@ -194,10 +199,10 @@ class Ledger(Generic[_TimelineT]):
             UnknownCommandError: If there's no receipt of that id.
         """
         try:
-            receipt = self._entries[command_id][0]
+            receipt = self.entries[command_id][0]
         except (KeyError, TypeError):
             raise UnknownCommandError(command_id, self.newest) from None
-        for change in self._changes[bisect_left(self._versions, receipt.version + 1) :]:
+        for change in self.changes[bisect_left(self.versions, receipt.version + 1) :]:
             if not receipt.stands:
                 break
             receipt = _after(receipt, change)
@@ -211,15 +216,15 @@ class Ledger(Generic[_TimelineT]):
             t: A time [s].
             version: As it was before this version of the timeline; as it's now, by default.
         """
-        entry = self._entries.get(command_id)
+        entry = self.entries.get(command_id)
         if entry is None:
             return False
         start, end = entry[0].execute_at, entry[0].end
         if start is None or end is None:
             return True
-        if not self._versions or self._versions[-1] <= entry[0].version:
+        if not self.versions or self.versions[-1] <= entry[0].version:
             return end <= t + ARRIVED
-        for change in self._changes[bisect_left(self._versions, entry[0].version + 1) :]:
+        for change in self.changes[bisect_left(self.versions, entry[0].version + 1) :]:
             if change.version >= version:
                 break
             if end <= change.at + ARRIVED:
@@ -233,28 +238,28 @@ class Ledger(Generic[_TimelineT]):
 
     def before(self, command_id: int, version: int) -> Receipt | None:
         """A receipt as it was before a version of the timeline; None where there's none."""
-        if command_id not in self._entries:
+        if command_id not in self.entries:
             return None
-        receipt = self._entries[command_id][0]
-        for change in self._changes:
+        receipt = self.entries[command_id][0]
+        for change in self.changes:
             if receipt.version < change.version < version and receipt.stands:
                 receipt = _after(receipt, change)
         return receipt
 
     def command(self, command_id: int) -> MotionCommand | None:
         """The motion command of an id; None where it was something else or isn't known."""
-        entry = self._entries.get(command_id)
+        entry = self.entries.get(command_id)
         return None if entry is None else entry[1]
 
     def all(self) -> tuple[Receipt, ...]:
         """Every receipt, in the order of the ids."""
-        receipts = [receipt for receipt, _ in self._entries.values()]
-        if not self._changes:
+        receipts = [receipt for receipt, _ in self.entries.values()]
+        if not self.changes:
             return tuple(receipts)
         # One pass over the changes with all receipts at once: plans and logs may both be long.
         end = np.array([np.nan if not r.stands or r.end is None else r.end for r in receipts])
         version = np.array([r.version for r in receipts])
-        for change in self._changes:
+        for change in self.changes:
             for i in np.flatnonzero((end >= change.at) & (version < change.version)).tolist():
                 receipts[i] = _after(receipts[i], change)
                 now = receipts[i].end
@@ -263,7 +268,7 @@ class Ledger(Generic[_TimelineT]):
 
     def stills_from(self, t: float) -> tuple[int, ...]:
         """Commands from a time [s] on to where the arm stands anyway: no segment is theirs."""
-        return tuple(command_id for _, command_id in self._stills[bisect_left(self._stills, (t, 0)) :])
+        return tuple(command_id for _, command_id in self.stills[bisect_left(self.stills, (t, 0)) :])
 
     def note(self, receipt: Receipt, command: MotionCommand | None) -> None:
         """Write down a command of another ledger, which can't be taken back here."""
@@ -297,21 +302,21 @@ class Ledger(Generic[_TimelineT]):
             The receipt; commands to where the arm stood anyway are added to what it superseded.
         """
         at = change.at if change is not None else receipt.execute_at or before.end
-        first = bisect_left(self._stills, (at, 0))
-        later = tuple(self._stills[first:])
+        first = bisect_left(self.stills, (at, 0))
+        later = tuple(self.stills[first:])
         if change is not None and later:
             if change.stills:
                 again = {other.command_id for other, _ in others}
                 dropped = (*receipt.superseded, *(i for _, i in later if i not in again))
                 receipt = replace(receipt, superseded_names=dropped)
-                del self._stills[first:]
+                del self.stills[first:]
             elif change.moved is not None:
-                self._stills[first:] = [(change.moved(t), i) for t, i in later]
+                self.stills[first:] = [(change.moved(t), i) for t, i in later]
         overwritten = self._write((*others, (receipt, command)))
-        log, stills = (len(self._changes), ()), ((first, later),)
-        self._undo.append(Undo(receipt.command_id, at, before, log, overwritten, stills))
+        log, stills = (len(self.changes), ()), ((first, later),)
+        self.undo_steps.append(Undo(receipt.command_id, at, before, log, overwritten, stills))
         if change is not None:
-            self._write_log(len(self._changes), (change,))
+            self._write_log(len(self.changes), (change,))
         self.newest = max(self.newest, receipt.command_id)
         return receipt
 
@@ -327,24 +332,24 @@ class Ledger(Generic[_TimelineT]):
                 Commands to where the arm stood anyway don't come back.
             others: Receipts of commands that were planned anew.
         """
-        stop = self._undo[-1]
+        stop = self.undo_steps[-1]
         index, _ = stop.changes
-        log = tuple(self._changes[index:])
+        log = tuple(self.changes[index:])
         self._write_log(index, (change,))
         stills = tuple(i for _, there in stop.stills for _, i in there)
         if stills:
             receipt = replace(receipt, superseded_names=(*receipt.superseded, *stills))
         # The stop itself isn't moved.
-        stopped = replace(self._entries[stop.command_id][0], version=change.version), None
+        stopped = replace(self.entries[stop.command_id][0], version=change.version), None
         overwritten = self._write((*others, stopped, (receipt, None)))
         at = receipt.execute_at or change.at
-        self._undo.append(Undo(receipt.command_id, at, before, (index, log), overwritten, ()))
+        self.undo_steps.append(Undo(receipt.command_id, at, before, (index, log), overwritten, ()))
         self.newest = max(self.newest, receipt.command_id)
         return receipt
 
     def _note_still(self, receipt: Receipt) -> None:
         if receipt.is_still and receipt.stands and receipt.end is not None:
-            insort(self._stills, (receipt.end, receipt.command_id))
+            insort(self.stills, (receipt.end, receipt.command_id))
 
     def _write(self, entries: Iterable[Entry]) -> dict[int, Entry | None]:
         """Write entries down, and return what they write over."""
@@ -357,23 +362,23 @@ class Ledger(Generic[_TimelineT]):
     def _write_log(self, index: int, changes: tuple[Change, ...]) -> None:
         """Let the log go on with these changes from an index on."""
         if self._restore is not None:
-            for log in (self._changes, self._versions):
+            for log in (self.changes, self.versions):
                 self._restore.append(partial(log.__setitem__, slice(index, None), log[index:]))
-        self._changes[index:] = changes
-        self._versions[index:] = [change.version for change in changes]
+        self.changes[index:] = changes
+        self.versions[index:] = [change.version for change in changes]
 
     def rewrite(self, receipt: Receipt) -> None:
         """Write over a receipt of a command that goes on, without a way back."""
-        old, command = self._entries[receipt.command_id]
-        if old.is_still and old.end is not None and (old.end, old.command_id) in self._stills:
-            self._stills.remove((old.end, old.command_id))
+        old, command = self.entries[receipt.command_id]
+        if old.is_still and old.end is not None and (old.end, old.command_id) in self.stills:
+            self.stills.remove((old.end, old.command_id))
         self._set((receipt, command))
         self._note_still(receipt)
 
     @property
     def last(self) -> Undo[_TimelineT] | None:
         """The newest edit that can be taken back."""
-        return self._undo[-1] if self._undo else None
+        return self.undo_steps[-1] if self.undo_steps else None
 
     def take_back(self, version: int) -> Receipt:
         """Forget the newest edit; its own command's receipt says that it's undone.
@@ -381,11 +386,11 @@ class Ledger(Generic[_TimelineT]):
         Args:
             version: Version of the timeline that the undoing makes.
         """
-        undo = self._undo.pop()
+        undo = self.undo_steps.pop()
         mine, command = self.receipt(undo.command_id), self.command(undo.command_id)
         self._write_log(*undo.changes)
         for first, stills in undo.stills:
-            self._stills[first:] = stills
+            self.stills[first:] = stills
         for entry in undo.overwritten.values():
             if entry is not None:
                 self._set(entry)
@@ -397,8 +402,8 @@ class Ledger(Generic[_TimelineT]):
 
     def fuse(self) -> None:
         """Make the newest two edits one, to be taken back together."""
-        second, first = self._undo.pop(), self._undo.pop()
-        self._undo.append(
+        second, first = self.undo_steps.pop(), self.undo_steps.pop()
+        self.undo_steps.append(
             first._replace(
                 at=min(first.at, second.at),
                 overwritten={**second.overwritten, **first.overwritten},
@@ -418,13 +423,13 @@ class Ledger(Generic[_TimelineT]):
                 receipt, command = self.receipt(command_id), self.command(command_id)
                 now = replace(receipt, execute_at=start, end=end, version=change.version)
                 self._set((replace(now, superseded_by=None, undone=False), command))
-        self._write_log(len(self._changes), (change,))
-        self._undo.clear()
+        self._write_log(len(self.changes), (change,))
+        self.undo_steps.clear()
         self.settled = (
             f"the plan was put right at {change.at:.6g} s, since the real robot was going elsewhere: what was "
             "commanded before can't be taken back"
         )
-        del self._stills[bisect_left(self._stills, (change.at, 0)) :]
+        del self.stills[bisect_left(self.stills, (change.at, 0)) :]
 
     def break_off(self, change: Change, note: str) -> Receipt:
         """Write down that the newest edit is taken back from `change.at` on, and all that was scheduled with it.
@@ -433,22 +438,22 @@ class Ledger(Generic[_TimelineT]):
             change: What that does to other commands.
             note: What the user must know of it besides.
         """
-        undo = self._undo.pop()
+        undo = self.undo_steps.pop()
         # What came before it can't be taken back any more: its timeline has another past.
-        self._undo.clear()
+        self.undo_steps.clear()
         self.settled = (
             f"command {undo.command_id} was under way when it was taken back, at {change.at:.6g} s: what was "
             "commanded before it can't be taken back"
         )
-        self._write_log(len(self._changes), (change,))
-        del self._stills[bisect_left(self._stills, (change.at, 0)) :]
+        self._write_log(len(self.changes), (change,))
+        del self.stills[bisect_left(self.stills, (change.at, 0)) :]
         mine = replace(
             self.receipt(undo.command_id),
             reason=f"undone from {change.at:.6g} s on" + (f"; {note}" if note else ""),
             version=change.version,
             undone=True,
         )
-        self._set((mine, self._entries[undo.command_id][1]))
+        self._set((mine, self.entries[undo.command_id][1]))
         return mine
 
 

@@ -307,7 +307,7 @@ class Scheduler(BaseScheduler[Timeline]):
         self.paused: Paused | None = None
         self.profiles: dict[int, Profile] = {}
         """Of commands that are no motion commands."""
-        self._session: _Session | None = None
+        self.session: _Session | None = None
 
     def move(self, command: MotionCommand, now: float | None) -> Receipt:
         """Carry out a motion command.
@@ -436,7 +436,7 @@ class Scheduler(BaseScheduler[Timeline]):
             )
         except REFUSALS as error:
             return self.reject(issued, asked, str(error))
-        before, session = self.timeline, self._session
+        before, session = self.timeline, self.session
         rests = not state.qd.any() and not state.qdd.any()
         if session is not None and (
             session.version != before.version or t < session.start or (rests and t < before.end)
@@ -454,7 +454,7 @@ class Scheduler(BaseScheduler[Timeline]):
             return stands
         target = end_position(plan) if len(plan) else state.q
         self.note_profile(command_id, Profile.JERK_LIMITED)
-        self._session = _Session(command_id, after.version, start)
+        self.session = _Session(command_id, after.version, start)
         receipt = Receipt(
             command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
             joined(moment.reason, note), after.version, hindrance=hindrance,
@@ -476,14 +476,14 @@ class Scheduler(BaseScheduler[Timeline]):
     @property
     def steered(self) -> tuple[int, float] | None:
         """The command that the next steering input may go on with, and when it began [s]."""
-        session = self._session
+        session = self.session
         if session is None or session.version != self.timeline.version:
             return None
         return session.command_id, session.start
 
     def go_on_steering(self, command_id: int, start: float) -> None:
         """Let the next steering input go on with a command that began at a time [s]."""
-        self._session = _Session(command_id, self.timeline.version, start)
+        self.session = _Session(command_id, self.timeline.version, start)
 
     def edit(self, command: PlanEdit, now: float | None) -> Receipt:
         """Carry out an edit of what is scheduled.

@@ -73,7 +73,8 @@ class Observer:
         self._port.join(self)
         self._asked: OrderedDict[int, tuple[Ask, float]] = OrderedDict()
         self._open: Resending[Ask] = Resending(resend)
-        self._answers: OrderedDict[int, Observation] = OrderedDict()
+        self.answers: OrderedDict[int, Observation] = OrderedDict()
+        """What was answered lately, by number."""
         self._news: OrderedDict[int, None] = OrderedDict()
         self.confirmed = 0
         """Predicted answers that came true."""
@@ -112,7 +113,7 @@ class Observer:
             return
         frame = message.frame
         ask, asked_at = self._asked[frame.number]
-        known = self._answers.get(frame.number)
+        known = self.answers.get(frame.number)
         if known is None:
             known = Observation(frame, asked_at, now)
             self._keep(known)
@@ -135,9 +136,9 @@ class Observer:
 
     def _keep(self, observation: Observation) -> None:
         number = observation.number
-        self._answers[number] = observation
+        self.answers[number] = observation
         self._news[number] = None
-        for kept in (self._answers, self._news):
+        for kept in (self.answers, self._news):
             if len(kept) > REMEMBERED:
                 kept.popitem(last=False)
 
@@ -147,7 +148,7 @@ class Observer:
             self._own.advance(now=now)
         for ask in self._open.due(now):
             self._port.send(ask, now=now)
-        news = tuple(self._answers[number] for number in self._news if number in self._answers)
+        news = tuple(self.answers[number] for number in self._news if number in self.answers)
         self._news.clear()
         return news
 
@@ -159,7 +160,7 @@ class Observer:
 
     def observation(self, number: int) -> Observation | None:
         """The answer to a question; None while there's none, or where it's forgotten."""
-        return self._answers.get(number)
+        return self.answers.get(number)
 
     def close(self) -> None:
         """Listen no more."""

@@ -89,10 +89,10 @@ class Viewer:
             raise InvalidValueError("lead", lead, "−60 to 60 s for segments, 0 for frames")
         port, self._own = port_to(engine)
         self.form = ViewForm(form)
-        self._segments = SegmentSource(port, lead=lead, resend=resend) if self.form is ViewForm.SEGMENTS else None
-        self._source = self._segments or FrameSource(port, rate=self.rate, resend=resend)
+        self.segments = SegmentSource(port, lead=lead, resend=resend) if self.form is ViewForm.SEGMENTS else None
+        self._source = self.segments or FrameSource(port, rate=self.rate, resend=resend)
         port.join(self)
-        self._port = port
+        self.port = port
         self.head = PlayHead(self._source.live.at, lambda: self._source.span)
         self._begun: float | None = None
         self._beat = 0
@@ -113,7 +113,7 @@ class Viewer:
     @property
     def timeline(self) -> Timeline | None:
         """The timeline as far as it has come; None before that, and in the form of frames."""
-        return None if self._segments is None else self._segments.mirror.timeline
+        return None if self.segments is None else self.segments.mirror.timeline
 
     @property
     def mode(self) -> Mode:
@@ -231,7 +231,7 @@ class Viewer:
 
     def close(self) -> None:
         """Listen no more."""
-        self._port.leave(self)
+        self.port.leave(self)
         self._source.close()
         if self._own is not None:
             self._own.servlet.close()

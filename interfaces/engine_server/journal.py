@@ -195,7 +195,7 @@ class Journal:
         ids = (receipt.command_id for receipt in engine.receipts)
         owners = self._timeline.owners(0, len(self._timeline))
         self._newest = max((*ids, *owners), default=0)
-        self._edits: deque[TimelineEdit] = deque(maxlen=KEPT)
+        self.edits: deque[TimelineEdit] = deque(maxlen=KEPT)
         self._parts: OrderedDict[tuple[int, int], list[History]] = OrderedDict()
         self._done: Receipt | None = None
         """What `execute` did since `look`."""
@@ -249,7 +249,7 @@ class Journal:
 
     def _write(self, timeline: Timeline, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
         edit = TimelineEdit(self.number + 1, self._timeline, timeline, command_id, self._seen, others)
-        self._edits.append(edit)
+        self.edits.append(edit)
         self._timeline, self.number = timeline, edit.number
 
     def parts(self, edit: int, timeline: Timeline, index: int) -> list[History]:
@@ -271,9 +271,9 @@ class Journal:
     def since(self, number: int) -> tuple[TimelineEdit, ...]:
         """The edits after one, oldest first; where they aren't all kept, the newest alone, by nobody known."""
         missing = self.look() - number
-        if missing > len(self._edits):
-            return (replace(self._edits[-1], command_id=None, others=()),)
-        return tuple(islice(self._edits, len(self._edits) - missing, None)) if missing > 0 else ()
+        if missing > len(self.edits):
+            return (replace(self.edits[-1], command_id=None, others=()),)
+        return tuple(islice(self.edits, len(self.edits) - missing, None)) if missing > 0 else ()
 
 
 def portable(receipt: Receipt) -> Receipt:

@@ -71,9 +71,11 @@ class Servlet:
         self.journal = source if isinstance(source, Journal) else Journal(source)
         self.lead = lead
         self._broadcasters = tuple(broadcasters)
-        self._outbox: deque[Reply] = deque(maxlen=OUTBOX)
-        self._orders = OrderBook(self._carry_out, self._outbox.append)
-        self._answers: OrderedDict[int, Frame] = OrderedDict()
+        self.outbox: deque[Reply] = deque(maxlen=OUTBOX)
+        """What is sent next."""
+        self.orders = OrderBook(self._carry_out, self.outbox.append)
+        self.answers: OrderedDict[int, Frame] = OrderedDict()
+        """Frames that were sent lately, by number."""
         self._forecasts = Forecasts(REMEMBERED)
         self._edit = self.journal.look()
         self._follow: Follow | None = None
@@ -94,7 +96,7 @@ class Servlet:
         """
         self._catch_up(now)
         if isinstance(message, Order):
-            self._orders.take(message, now)
+            self.orders.take(message, now)
         elif isinstance(message, Ask):
             self._answer(message, now)
         elif isinstance(message, Follow):
@@ -116,17 +118,17 @@ class Servlet:
         self._catch_up(now)
         if self._beat is not None and now >= self._beat - DUE:
             self._beat = now + PULSE
-            self._outbox.append(Pulse(self._edit, now, self.journal.past))
+            self.outbox.append(Pulse(self._edit, now, self.journal.past))
         message = self._slot.take() if self._slot is not None else None
         if message is not None:
-            self._outbox.append(message)
-        replies = tuple(self._outbox)
-        self._outbox.clear()
+            self.outbox.append(message)
+        replies = tuple(self.outbox)
+        self.outbox.clear()
         return replies
 
     def next_deadline(self) -> float | None:
         """When `advance` has something to send [s], in the engine's time; −∞ for at once."""
-        if self._outbox or self._slot:
+        if self.outbox or self._slot:
             return float("-inf")
         return self._beat
 
@@ -154,17 +156,17 @@ class Servlet:
         return Outcome(order.number, receipt, "", 0, now)
 
     def _answer(self, ask: Ask, now: float) -> None:
-        frame = self._answers.get(ask.number)
+        frame = self.answers.get(ask.number)
         if frame is None:
             engine = self.journal.engine
             t = engine.now() + self.lead if ask.t is None else ask.t
             q = frozen_array(engine.timeline.sample(t))
             status = self._forecasts.add(ask.number, t, q, now=self.journal.past)
             frame = Frame(ask.number, t, now, q, status)
-            self._answers[ask.number] = frame
-            if len(self._answers) > REMEMBERED:
-                self._answers.popitem(last=False)
-        self._outbox.append(Answer(frame, now))
+            self.answers[ask.number] = frame
+            if len(self.answers) > REMEMBERED:
+                self.answers.popitem(last=False)
+        self.outbox.append(Answer(frame, now))
 
     def _begin(self, follow: Follow, now: float) -> None:
         if self._follow is None or self._follow.number != follow.number:
@@ -187,11 +189,11 @@ class Servlet:
         rate = None if self._source is None else self._source.rate
         initial = frozen_array(timeline.initial)
         span = timeline.start, timeline.end, len(timeline)
-        self._outbox.append(Scene(self._follow.number, robot, initial, *span, edit, now, rate))
+        self.outbox.append(Scene(self._follow.number, robot, initial, *span, edit, now, rate))
 
     def _fetch(self, want: Want, now: float) -> None:
         if want.index is not None and want.edit == self._snapshot[0]:
-            self._outbox.extend(self.journal.parts(*self._snapshot, want.index))
+            self.outbox.extend(self.journal.parts(*self._snapshot, want.index))
         elif want.index is None and self._send_changes(want.edit):
             return
         else:
@@ -207,7 +209,7 @@ class Servlet:
         known = [change for change in changes if change is not None and len(change.segments) <= MOST_CHANGED]
         if len(known) < len(changes):
             return False
-        self._outbox.extend(known)
+        self.outbox.extend(known)
         return True
 
     def _catch_up(self, now: float) -> None:
@@ -228,23 +230,23 @@ class Servlet:
 
     def _tell(self, verdicts: Sequence[FrameVerdict], now: float) -> None:
         for verdict in verdicts:
-            frame = self._answers.get(verdict.number)
+            frame = self.answers.get(verdict.number)
             if frame is None:
                 continue
             frame = replace(frame, status=verdict.status, falsified_by=verdict.falsified_by)
-            self._answers[verdict.number] = frame
+            self.answers[verdict.number] = frame
             if verdict.status is FrameStatus.FALSIFIED:
-                self._outbox.append(Answer(frame, now))
+                self.outbox.append(Answer(frame, now))
 
     def _revise(self, now: float) -> None:
         """Send the receipts again that a later command changed."""
-        for number in list(self._orders.outcomes)[-WATCHED:]:
-            outcome = self._orders.outcomes[number]
+        for number in list(self.orders.outcomes)[-WATCHED:]:
+            outcome = self.orders.outcomes[number]
             old = outcome.receipt
             if old is None or not old.stands:
                 continue
             new = self.journal.engine.receipt(old.command_id)
             if new.version != old.version:
                 revised = Outcome(number, portable(new), "", outcome.revision + 1, now)
-                self._orders.outcomes[number] = revised
-                self._outbox.append(revised)
+                self.orders.outcomes[number] = revised
+                self.outbox.append(revised)

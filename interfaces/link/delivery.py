@@ -144,12 +144,12 @@ class OrderBook:
         """Take an order that has come at now [s]."""
         number = order.number
         if number < self._next:
-            self._settle(self.outcomes.get(number) or Outcome(number, None, OVERTAKEN, 0, now))
+            self.settle(self.outcomes.get(number) or Outcome(number, None, OVERTAKEN, 0, now))
             return
         if isinstance(order.command, Stop):
             for early in sorted(n for n in self._early if n < number):
                 del self._early[early]
-                self._settle(Outcome(early, None, OVERTAKEN, 0, now))
+                self.settle(Outcome(early, None, OVERTAKEN, 0, now))
             self._next = number
         if number - self._next <= BACKLOG:
             self._early[number] = order
@@ -161,9 +161,10 @@ class OrderBook:
             except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this order
                 _LOG.exception("an order failed, and changed nothing")
                 outcome = Outcome(due.number, None, f"{FAILED}: {type(error).__name__}", 0, now)
-            self._settle(outcome)
+            self.settle(outcome)
 
-    def _settle(self, outcome: Outcome) -> None:
+    def settle(self, outcome: Outcome) -> None:
+        """Remember an outcome, and send it."""
         self.outcomes[outcome.number] = outcome
         if len(self.outcomes) > REMEMBERED:
             self.outcomes.popitem(last=False)

@@ -63,7 +63,7 @@ class Recorder:
             self._writer.give_up()
             raise
         self._flush, self._room = flush, room
-        self._queue: deque[tuple[int, bytes, float]] = deque()
+        self.queue: deque[tuple[int, bytes, float]] = deque()
         self._lock = Lock()
         self._added = self._taken = 0
         self._counts = [0] * (len(CHANNELS) + 1)
@@ -124,7 +124,7 @@ class Recorder:
                 self._counts[number] += 1
                 return False
             self._added += size
-            self._queue.append((number, data, t))
+            self.queue.append((number, data, t))
         return True
 
     def close(self, end: End | None, *, patience: float = PATIENCE, last: Iterable[Message] = ()) -> bool:
@@ -167,7 +167,7 @@ class Recorder:
 
     def _drain(self) -> None:
         """Write what waits; close the block when it has been open for long."""
-        writer, queue = self._writer, self._queue
+        writer, queue = self._writer, self.queue
         while queue:
             number, data, t = queue.popleft()
             self._busy = self._clock.now()
@@ -213,4 +213,4 @@ class Recorder:
 
     def _give_up(self) -> None:
         self._writer.give_up()
-        self._queue.clear()
+        self.queue.clear()

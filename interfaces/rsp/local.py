@@ -198,7 +198,7 @@ class LocalCore:
         """Datagrams that were dropped, by reason."""
         self.streams = StreamOutbox(model.buffers)
         self.period = PeriodControl(self._config.period)
-        self._outputs: list[LocalOutput] = []
+        self.waiting_outputs: list[LocalOutput] = []
         self.opening = Open(rank, False, bytes(TAG))
         self.numbers: SessionNumbers | None = None
         """Of the session; None where there's none."""
@@ -309,7 +309,7 @@ class LocalCore:
 
     def to_send(self, *, now: float) -> list[bytes]:
         """Datagrams that are due by now [s]."""
-        self._outputs += self.memory_outbox.expire(now)
+        self.waiting_outputs += self.memory_outbox.expire(now)
         if self.state is LocalState.OPEN and now - self._heard >= self._config.lifetime:
             self._close(EndReason.LOST)
         if self.state is LocalState.CLOSED or now < self._next - SLACK:
@@ -338,7 +338,7 @@ class LocalCore:
 
     def take(self) -> list[LocalOutput]:
         """What happened since the last call."""
-        outputs, self._outputs = self._outputs, []
+        outputs, self.waiting_outputs = self.waiting_outputs, []
         return outputs
 
     def _down(self, session: SessionNumbers, now: float) -> bytes:
@@ -389,7 +389,7 @@ class LocalCore:
             nonce, refusal = handshake.decode_refused(body)
             if nonce != self.opening.nonce:
                 raise PacketDropped(DropReason.SESSION)
-            self._outputs.append(Refused(refusal))
+            self.waiting_outputs.append(Refused(refusal))
             self.state, self.numbers = LocalState.CLOSED, None
             return
         answer = handshake.decode_answer(body)
@@ -408,11 +408,11 @@ class LocalCore:
             sealer, opener = Sealer(down), Opener(up)
         self.numbers = SessionNumbers(self.model.id, head.session, sealer, opener)
         self.state, self._heard, self._next = LocalState.OPEN, now, now
-        self._outputs.append(Began(head.session))
+        self.waiting_outputs.append(Began(head.session))
 
     def _acknowledged(self, last: int, head: Header, now: float) -> None:
         """Take what the robot has of ours."""
-        self._outputs += self.command_outbox.acknowledge(last)
+        self.waiting_outputs += self.command_outbox.acknowledge(last)
         self._inbox.heard(last)
         self.streams.report(head.buffers, last)
         for written in self._written.values():
@@ -428,14 +428,14 @@ class LocalCore:
             element = self.model.elements[index]
             match element:
                 case MemoryCommand():
-                    self._outputs += self.memory_outbox.acknowledge(index, payload)
+                    self.waiting_outputs += self.memory_outbox.acknowledge(index, payload)
                 case MemoryEvent():
                     stored.append((index, payload))
                 case Event():
                     self._occurred(index, payload)
                 case _:
-                    self._outputs.append(Told(index, payload))
-        self._outputs += [Stored(*item) for item in self._inbox.receive(stored)] if stored else []
+                    self.waiting_outputs.append(Told(index, payload))
+        self.waiting_outputs += [Stored(*item) for item in self._inbox.receive(stored)] if stored else []
 
     def _occurred(self, index: int, payload: bytes) -> None:
         """An event comes several times; its ID says which it is."""
@@ -443,17 +443,17 @@ class LocalCore:
         ahead = (number - self._events.get(index, MODULUS - 1)) % MODULUS
         if 0 < ahead < MODULUS // 2:
             self._events[index] = number
-            self._outputs.append(Occurred(index, number, payload[ID.size :]))
+            self.waiting_outputs.append(Occurred(index, number, payload[ID.size :]))
 
     def _close(self, reason: EndReason) -> None:
         session = 0 if self.numbers is None else self.numbers.id
-        self._outputs += [
+        self.waiting_outputs += [
             Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self.command_outbox.drain()
         ]
-        self._outputs += [
+        self.waiting_outputs += [
             Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self.memory_outbox.drain()
         ]
-        self._outputs.append(SessionEnded(session, reason))
+        self.waiting_outputs.append(SessionEnded(session, reason))
         self.state, self.numbers = LocalState.CLOSED, None
 
 

@@ -219,7 +219,7 @@ class RobotCore:
         self._formats = {i: e.format for i, e in enumerate(model) if isinstance(e, Effector) and not e.stream}
         self._limits = {i: e.wire_limits for i, e in enumerate(model) if isinstance(e, Effector)}
         self._floats = {i: e for i, e in enumerate(model) if isinstance(e, Command) and e.type is Scalar.F32}
-        self._outputs: list[RobotOutput] = []
+        self.waiting_outputs: list[RobotOutput] = []
         self.claim: SessionClaim | None = None
         """The session that has the robot."""
         self._over: SessionClaim | None = None
@@ -316,7 +316,7 @@ class RobotCore:
         """Datagrams that are due by now [s], each with its address."""
         self._watch(now)
         answers, self._answers = self._answers, []
-        self._outputs += self.memory_outbox.expire(now)
+        self.waiting_outputs += self.memory_outbox.expire(now)
         claim = self.claim
         if claim is None or now < self._next - SLACK:
             return answers
@@ -331,7 +331,7 @@ class RobotCore:
 
     def take(self) -> list[RobotOutput]:
         """What happened since the last call."""
-        outputs, self._outputs = self._outputs, []
+        outputs, self.waiting_outputs = self.waiting_outputs, []
         return outputs
 
     def _receive(self, data: bytes, address: bytes, now: float) -> None:
@@ -385,11 +385,15 @@ class RobotCore:
             self._stopping = True
         self.door.pending, self.claim = None, claim
         self._reset(now)
-        self._outputs.append(Began(claim.session.id))
+        self.waiting_outputs.append(Began(claim.session.id))
 
     def _end(self, reason: EndReason, now: float) -> None:
         assert self.claim is not None
-        self._outputs += [*self.memory_outbox.drain(), SessionEnded(self.claim.session.id, reason), Cleared()]
+        self.waiting_outputs += [
+            *self.memory_outbox.drain(),
+            SessionEnded(self.claim.session.id, reason),
+            Cleared(),
+        ]
         self._over, self.claim = self.claim, None
         self._reset(now)
 
@@ -440,7 +444,7 @@ class RobotCore:
         if head.buffers != self._clears:
             self._clears = head.buffers
             self.streams.clear()
-            self._outputs.append(Cleared())
+            self.waiting_outputs.append(Cleared())
         claim.stamp = unwrapped(head.stamp, claim.stamp, STAMPS)
         self.motion.receive(1e-3 * claim.stamp, told, now=now)
         self._told |= told
@@ -458,12 +462,12 @@ class RobotCore:
                 case MemoryCommand():
                     stored.append((index, payload))
                 case MemoryEvent():
-                    self._outputs += self.memory_outbox.acknowledge(index, payload)
+                    self.waiting_outputs += self.memory_outbox.acknowledge(index, payload)
                 case _:
                     asked.add(index)
         self._execute(commands)
         if stored:
-            self._outputs += [Stored(*item) for item in self._inbox.receive(stored)]
+            self.waiting_outputs += [Stored(*item) for item in self._inbox.receive(stored)]
         self._telling.ask(asked)
 
     def _execute(self, commands: list[tuple[int, int, bytes]]) -> None:
@@ -471,7 +475,7 @@ class RobotCore:
         for number, index, values in sorted(commands):
             if number > self._command:
                 self._command = number
-                self._outputs.append(Commanded(index, number, values))
+                self.waiting_outputs.append(Commanded(index, number, values))
 
     def _up(self, claim: SessionClaim, now: float) -> bytes:
         number = claim.session.number
@@ -499,7 +503,7 @@ class RobotCore:
                     assert isinstance(element, Effector)
                     self.motion.set(index, (element.initial,) * element.count)
                     self._changed.add(index)
-            self._outputs.append(LinkLost())
+            self.waiting_outputs.append(LinkLost())
 
     def _find(self, told: Mapping[int, Values]) -> None:
         """Go on with what was told last: the local system takes it as known; but for what is told anew."""
@@ -508,7 +512,7 @@ class RobotCore:
             if self._rests(index) and index not in told:
                 self.motion.set(index, values)
                 self._changed.add(index)
-        self._outputs.append(LinkRestored())
+        self.waiting_outputs.append(LinkRestored())
 
     def _rests(self, index: int) -> bool:
         element = self.model.elements[index]

@@ -54,7 +54,7 @@ class ClientLimits:
 class Bucket:
     """Tokens that come at a rate, up to so many: who takes one may go on."""
 
-    __slots__ = ("_at", "_most", "_rate", "_tokens")
+    __slots__ = ("_at", "_rate", "_tokens", "most")
 
     def __init__(self, rate: float, most: float, now: float) -> None:
         """Begin full.
@@ -64,12 +64,12 @@ class Bucket:
             most: Most tokens that are kept.
             now: [s].
         """
-        self._rate, self._most, self._tokens, self._at = rate, most, most, now
+        self._rate, self.most, self._tokens, self._at = rate, most, most, now
 
     def take(self, now: float) -> bool:
         """Take a token at now [s]; whether there was one."""
         if now > self._at:
-            self._tokens = min(self._most, self._tokens + self._rate * (now - self._at))
+            self._tokens = min(self.most, self._tokens + self._rate * (now - self._at))
             self._at = now
         if self._tokens < 1.0:
             return False
@@ -175,7 +175,7 @@ class Strangers(Generic[C]):
         Args:
             most: Most strangers at a time, 1 to 100,000.
         """
-        self._most = int(number_in("most", most, 1, 100_000))
+        self.most = int(number_in("most", most, 1, 100_000))
         self._addresses: dict[C, str] = {}
         """Of each stranger, the oldest first."""
         self._each: Counter[str] = Counter()
@@ -197,7 +197,7 @@ class Strangers(Generic[C]):
             address: Where it comes from.
             until: When its next step must be done [s].
         """
-        gives_way = self._oldest(address) if len(self._addresses) >= self._most else None
+        gives_way = self._oldest(address) if len(self._addresses) >= self.most else None
         if gives_way is not None:
             self.gave_way += 1
             self.discard(gives_way)
@@ -207,7 +207,7 @@ class Strangers(Generic[C]):
         return gives_way
 
     def _oldest(self, coming: str) -> C:
-        share = self._most / (len(self._each) + (coming not in self._each))
+        share = self.most / (len(self._each) + (coming not in self._each))
         return next(one for one, address in self._addresses.items() if self._each[address] >= share)
 
     def expect(self, connection: C, *, until: float = math.inf) -> None:

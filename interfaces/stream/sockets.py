@@ -117,14 +117,14 @@ class Turns:
         self._serve()
 
 
-class _State(ServerState):
+class ConnectionState(ServerState):
     """What the connections of a server share."""
 
     def __init__(self, limits: SocketLimits) -> None:
         super().__init__()
         self.limits = limits
         self.turns = Turns()
-        self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, _files() // 4)))
+        self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, files_allowed() // 4)))
 
 
 class _Bounded(asyncio.Protocol):
@@ -142,7 +142,7 @@ class _Bounded(asyncio.Protocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, app_state, _loop)  # type: ignore[call-arg]
-        self._state = cast("_State", server_state)
+        self._state = cast("ConnectionState", server_state)
         self._phase_until = self._sent_until = float("inf")
 
     def _enter(self, seconds: float) -> None:
@@ -478,7 +478,7 @@ async def serve(
         backlog=BACKLOG,
     )
     server = _Server(config)
-    server.server_state = state = _State(SocketLimits() if limits is None else limits)
+    server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
     looking = asyncio.create_task(_cut_off_overdue(state))
     task = asyncio.create_task(server.serve(sockets=[listening]))
     try:
@@ -494,7 +494,7 @@ async def serve(
         _abort_all(connections)
 
 
-async def _cut_off_overdue(state: _State) -> None:
+async def _cut_off_overdue(state: ConnectionState) -> None:
     clock = asyncio.get_running_loop().time
     while True:
         await asyncio.sleep(_LOOK)
@@ -506,7 +506,7 @@ async def _cut_off_overdue(state: _State) -> None:
             await asyncio.sleep(0)
 
 
-def _files() -> int:
+def files_allowed() -> int:
     """How many files this process may open, each connection being one; it may open more if the system lets it."""
     soft, hard = (FILES if most == resource.RLIM_INFINITY else most for most in resource.getrlimit(_FILES))
     if soft < min(FILES, hard):

@@ -237,12 +237,14 @@ class OperatorSite:
         """What the robot's engine answered, by command id."""
         self.entries_sent = 0
         """Journal entries sent since the robot began anew."""
-        self._under_way: OrderedDict[int, tuple[LogEntry, float]] = OrderedDict()
+        self.under_way: OrderedDict[int, tuple[LogEntry, float]] = OrderedDict()
         """Entries that aren't acknowledged, and when they were sent last [s], in that order."""
         self._acknowledged = 0
-        self._new: list[int] = []
+        self.new_entries: list[int] = []
+        """Numbers of those that haven't been sent at all."""
         self._recent: deque[int] = deque(maxlen=self.config.repeat)
-        self._ids: dict[int, int] = {}
+        self.command_ids: dict[int, int] = {}
+        """By entry's number, where its answer hasn't come."""
         self._packets = 0
         self._due = now
         self.round_trip: float | None = None
@@ -284,7 +286,7 @@ class OperatorSite:
             return f"{NOT_FOLLOWING}: {self.gone}"
         if self.halted:
             return f"{NOT_FOLLOWING}: {self.halted}; resume first"
-        if len(self._under_way) >= _UNDER_WAY_MOST:
+        if len(self.under_way) >= _UNDER_WAY_MOST:
             return f"{_UNDER_WAY_MOST} commands wait to be acknowledged"
         return ""
 
@@ -304,13 +306,13 @@ class OperatorSite:
             entry = LogEntry(number, now, command, newest)
             # From here on nothing may raise.
             if command is not None and answer is not None:
-                self._ids[number] = answer.command_id
-            self._under_way[number] = entry, now
-            self._new.append(number)
+                self.command_ids[number] = answer.command_id
+            self.under_way[number] = entry, now
+            self.new_entries.append(number)
             self.entries_sent = number
-        self._inform(lambda listener: listener.commanded(deed))
+        self.inform(lambda listener: listener.commanded(deed))
 
-    def _inform(self, tell: Callable[[SiteObserver], None]) -> None:
+    def inform(self, tell: Callable[[SiteObserver], None]) -> None:
         """Tell who listens, if anybody does; one that fails hears no more, and what it was told of stands."""
         listener = self.listener
         if listener is None:
@@ -323,15 +325,15 @@ class OperatorSite:
 
     def advance(self, *, now: float) -> tuple[Orders, ...]:
         """Do what is due by now [s], and say what is to be sent."""
-        if now < self._due and not self._new:
+        if now < self._due and not self.new_entries:
             return ()
         self._due = now + self.config.beat
         self._packets += 1
-        chosen = self._new + [n for n in self._recent if n in self._under_way]
-        self._recent.extend(self._new)
-        self._new = []
+        chosen = self.new_entries + [n for n in self._recent if n in self.under_way]
+        self._recent.extend(self.new_entries)
+        self.new_entries = []
         # In the order of their sending: what seems to be lost stands in front.
-        patience, under_way = self._patience, self._under_way
+        patience, under_way = self._patience, self.under_way
         lost: list[int] = []
         for number, (_, sent) in under_way.items():
             if now - sent <= patience or len(lost) == self.config.resent:
@@ -350,7 +352,7 @@ class OperatorSite:
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
-        return self.clock.now() if self._new else self._due
+        return self.clock.now() if self.new_entries else self._due
 
     def receive(self, report: Report, *, now: float) -> None:
         """Take in a report of the robot; where it was measured counts whatever the epoch, and however late."""
@@ -358,22 +360,22 @@ class OperatorSite:
         alone = Sample(0, report.measured_at, report.q_at, report.q, report.reference)
         found = self.gathering.take(report.samples if report.oldest else (alone,), report.oldest, now=now)
         if found:
-            self._inform(lambda listener: listener.measured(found, now=now))
+            self.inform(lambda listener: listener.measured(found, now=now))
         if report.epoch != self.epoch:
             self._watch_begin(report, now)
             return
         answered: list[tuple[int, Receipt]] = []
         for number, receipt in report.receipts:
-            known = self._under_way.pop(number, None)
-            if known is not None or number in self._ids:
-                answered.append((self._ids.pop(number, receipt.command_id), receipt))
+            known = self.under_way.pop(number, None)
+            if known is not None or number in self.command_ids:
+                answered.append((self.command_ids.pop(number, receipt.command_id), receipt))
         self.receipts.update(answered)
         for command_id, receipt in answered:
-            self._inform(partial(_tell_answer, command_id=command_id, receipt=receipt, now=now))
+            self.inform(partial(_tell_answer, command_id=command_id, receipt=receipt, now=now))
         if self.report is not None and report.number <= self.report.number:
             return
         self.report = report
-        self._inform(lambda listener: listener.reported(report, now=now))
+        self.inform(lambda listener: listener.reported(report, now=now))
         self._measure(report, now)
         self._watch_progress(report, now)
         new = bool(report.halted) and not self.halted
@@ -404,7 +406,7 @@ class OperatorSite:
         """Count a robot as halted that hears what is sent and yet carries nothing out."""
         progressed = report.executed > self._acknowledged
         for number in range(self._acknowledged + 1, min(report.executed, self.entries_sent) + 1):
-            self._under_way.pop(number, None)
+            self.under_way.pop(number, None)
         self._acknowledged = max(self._acknowledged, report.executed)
         if self.halted or self._acknowledged >= self.entries_sent:
             self._waits = None
@@ -444,8 +446,8 @@ class OperatorSite:
     def _give_up(self, reason: str, *, stuck: bool = True) -> None:
         """Command the robot no more until somebody resumes; it's told so."""
         self.halted, self.stuck = reason, stuck
-        self._under_way.clear()
-        self._new = []
+        self.under_way.clear()
+        self.new_entries = []
         self._waits = None
         self._due = self.clock.now()
 
@@ -457,13 +459,13 @@ class OperatorSite:
     def _follow(self, part: PlanPart, reason: str) -> None:
         """Let the virtual robot follow the real one's plan, and what is still under way to it."""
         now = self.clock.now()
-        compared = part.version, self.entries_sent, len(self._under_way), self.engine.timeline.version
+        compared = part.version, self.entries_sent, len(self.under_way), self.engine.timeline.version
         if compared == self._compared:
             return
         plan = Timeline(part.initial, part.since, part.segments, part.version)
         clock = ManualClock(part.since)
         expected = Engine(self._model, timeline=plan, clock=clock, lateness=self._lateness)
-        for entry, _ in sorted(self._under_way.values(), key=lambda waiting: waiting[0].number):
+        for entry, _ in sorted(self.under_way.values(), key=lambda waiting: waiting[0].number):
             clock.set(max(entry.at, clock.now()))
             try:
                 if entry.command is not None:
@@ -480,7 +482,7 @@ class OperatorSite:
                 # No way keeps the limits from here; the next report finds the arm elsewhere.
                 return
             self.corrections.append(Correction(now, made.end, made.error, reason))
-            self._inform(lambda listener: listener.corrected(self.corrections[-1], truth))
+            self.inform(lambda listener: listener.corrected(self.corrections[-1], truth))
         else:
             self._compared = compared
 
@@ -502,10 +504,10 @@ class OperatorSite:
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"
         self.epoch, self._began, self.halted, self.stuck = self.epoch + 1, now, "", False
         self.entries_sent, self._acknowledged, self._due = 0, 0, now
-        self._new = []
+        self.new_entries = []
         self._recent.clear()
-        self._under_way.clear()
-        self._ids.clear()
+        self.under_way.clear()
+        self.command_ids.clear()
         self._waits = self._of_earlier = None
         return ""
 

@@ -263,7 +263,7 @@ class RobotSite:
         self._samples.ask(orders.wanted)
         self.advance_play(now=now)
         if orders.epoch > self.epoch and self.rests(now=now):
-            self._begin(orders, now)
+            self.begin(orders, now)
         if orders.epoch != self.epoch or not self._counts(orders, now, correction, uncertainty):
             return
         self._uncertainty = uncertainty if math.isfinite(uncertainty) else None
@@ -306,7 +306,7 @@ class RobotSite:
         if self.halted and self.rests(now=now):
             self.watchdog.stopped(self.watchdog.number, now=now)
 
-    def _begin(self, orders: Orders, now: float) -> None:
+    def begin(self, orders: Orders, now: float) -> None:
         """Follow a new epoch, from where the arm rests."""
         if self.watchdog is not None:
             self._watch(now)

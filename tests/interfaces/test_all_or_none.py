@@ -50,8 +50,8 @@ A = np.array([0.0, 0.8, -2.4, 0.0, 0.6, 0.0])
 B = np.array([0.5, 0.6, -2.0, 0.3, 0.4, 0.6])
 ERRORS = {kind.__name__: kind for kind in (PlanningError, UnknownCommandError, UnreachablePoseError)}
 GUARD = {
-    ("operator.py", "_inform"),
-    ("delivery.py", "_settle"),
+    ("operator.py", "inform"),
+    ("delivery.py", "settle"),
     ("receipt.py", "shifted"),
     ("receipt.py", "superseded"),
 }
@@ -118,16 +118,16 @@ class Sites:
 
     def state(self) -> Any:
         """All that a command may change, as values; without the answers to what was refused."""
-        operator, plan = self.operator, self.operator.engine._plan
-        rejected = {i for i, (receipt, _) in plan.ledger._entries.items() if receipt.status == "rejected"}
+        operator, plan = self.operator, self.operator.engine.scheduler
+        rejected = {i for i, (receipt, _) in plan.ledger.entries.items() if receipt.status == "rejected"}
         self.site.journal.look()
         return values((
-            plan.timeline, plan.limits, plan.lateness, plan.paused, plan.profiles, plan._session,
-            [entry for i, entry in plan.ledger._entries.items() if i not in rejected],
-            plan.ledger._changes, plan.ledger._versions, plan.ledger._stills, plan.ledger._undo,
+            plan.timeline, plan.limits, plan.lateness, plan.paused, plan.profiles, plan.session,
+            [entry for i, entry in plan.ledger.entries.items() if i not in rejected],
+            plan.ledger.changes, plan.ledger.versions, plan.ledger.stills, plan.ledger.undo_steps,
             plan.ledger.settled,
-            operator.entries_sent, operator._under_way, operator._new, operator._ids,
-            operator.halted, operator.epoch, self.site.journal.number, list(self.site.journal._edits),
+            operator.entries_sent, operator.under_way, operator.new_entries, operator.command_ids,
+            operator.halted, operator.epoch, self.site.journal.number, list(self.site.journal.edits),
             [deed for deed in self.notes.deeds if deed.receipt is None or deed.receipt.status != "rejected"],
         ))  # fmt: skip
 

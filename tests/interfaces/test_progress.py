@@ -88,12 +88,12 @@ def test_a_robot_that_doesnt_take_up_a_new_epoch_is_halted_again():
     lab.run(2.0)
     lab.robot.halt("for a reason", now=lab.now)
     lab.run(4.0)
-    begin, lab.robot._begin = lab.robot._begin, lambda orders, now: None  # type: ignore[method-assign]
+    begin, lab.robot.begin = lab.robot.begin, lambda orders, now: None  # type: ignore[method-assign]
     assert lab.operator.resume(now=lab.now) == ""
     assert not lab.operator.halted
     lab.run(lab.now + 11.0)
     assert "resumed" in lab.operator.halted
-    lab.robot._begin = begin  # type: ignore[method-assign]
+    lab.robot.begin = begin  # type: ignore[method-assign]
     assert lab.operator.resume(now=lab.now) == ""
     lab.run(lab.now + 3.0)
     assert not lab.operator.halted

@@ -233,7 +233,7 @@ class TestPlayBack:
             joined.engine.execute(to(k, insertion=Insertion.APPEND, speed=0.1))
         rates = list(itertools.islice(itertools.cycle([5, 10, 20, 25, 50]), 100))
         viewers = [joined.add(Viewer(LocalPort(joined.site), rate=rate, form=form)) for rate in rates]
-        ports = [viewer._port for viewer in viewers]
+        ports = [viewer.port for viewer in viewers]
         joined.parts[1:] = [*ports, *viewers]
         joined.run(1.0)
         for k, viewer in enumerate(viewers):
@@ -294,7 +294,7 @@ def test_over_any_link_the_copy_becomes_the_timeline(seed, loss, duplicate, edit
     t = np.linspace(-1, 40, 1500)
     for _ in range(40):
         joined.run(1.0)
-        if viewer.timeline is not None and viewer._segments.mirror.edit == joined.site.journal.number:
+        if viewer.timeline is not None and viewer.segments.mirror.edit == joined.site.journal.number:
             break
     assert np.abs(viewer.timeline.sample(t) - joined.engine.joints(t)).max() < 1e-9
     assert [s.command_id for s in viewer.timeline.segments] == [
@@ -396,9 +396,9 @@ def test_memory_of_clients_is_bounded():
         joined.run(0.1)
     assert viewer.number > 4500
     assert len(viewer.history) == 4096
-    assert len(port.servlet._answers) <= 1024
-    assert len(port.servlet._outbox) <= 1024
-    assert len(supervisor.observer._answers) <= 4096
+    assert len(port.servlet.answers) <= 1024
+    assert len(port.servlet.outbox) <= 1024
+    assert len(supervisor.observer.answers) <= 4096
 
 
 def test_misuse():

@@ -109,7 +109,7 @@ class Proxy:
         self._lateness = TimerLateness()
         self.tcp: TcpProxy | None = None
         """TCP's part, once it has been started and if the settings ask for it."""
-        self._udp: UdpProxy | None = None
+        self.udp: UdpProxy | None = None
         self._ways: tuple[ProxyDirection, ProxyDirection] | None = None
         self._channels: tuple[Channel[Parcel], Channel[Parcel]] | None = None
         self.listening = settings.listen
@@ -131,7 +131,7 @@ class Proxy:
                 for conditions, path in zip(both, self._paths, strict=True)
             )
             self._channels = (there, back)
-            self._udp = UdpProxy(
+            self.udp = UdpProxy(
                 udp,
                 (family, target),
                 self._channels,
@@ -140,7 +140,7 @@ class Proxy:
                 most=settings.most_clients,
                 idle=settings.udp_idle,
             )
-            self._udp.start()
+            self.udp.start()
         if tcp is not None:
             forward, backward = (
                 ProxyDirection(conditions, path, self._spare)
@@ -154,8 +154,8 @@ class Proxy:
         """Stop listening, end every connection, drop what is on its way."""
         if self.tcp is not None:
             self.tcp.close()
-        if self._udp is not None:
-            self._udp.close()
+        if self.udp is not None:
+            self.udp.close()
 
     def statistics(self) -> dict[str, Any]:
         """What happened so far, ready for JSON; times in seconds."""
@@ -176,9 +176,9 @@ class Proxy:
         if self.tcp is not None and self._ways is not None:
             logs = [_totals(way.log.totals()) for way in self._ways]
             value["tcp"] = {**asdict(self.tcp.counts), "forward": logs[0], "backward": logs[1]}
-        if self._udp is not None and self._channels is not None:
+        if self.udp is not None and self._channels is not None:
             logs = [_totals(channel.log.totals()) for channel in self._channels]
-            value["udp"] = {**asdict(self._udp.counts), "forward": logs[0], "backward": logs[1]}
+            value["udp"] = {**asdict(self.udp.counts), "forward": logs[0], "backward": logs[1]}
         return value
 
     async def _bind(self) -> tuple[socket.socket | None, socket.socket | None]:

@@ -86,7 +86,7 @@ class UdpProxy:
         self._clients: dict[SocketAddress, _ProxyClient] = {}
         self._held = {id(channel): 0 for channel in channels}
         self._pump_timer = Timer(clock, self._pump, lateness)
-        self._idle_timer = Timer(clock, self._expire, TimerLateness())
+        self.idle_timer = Timer(clock, self._expire, TimerLateness())
         self.counts = UdpCounts()
 
     def start(self) -> None:
@@ -96,7 +96,7 @@ class UdpProxy:
     def close(self) -> None:
         """Close every socket; what is on its way is dropped."""
         self._pump_timer.set(None)
-        self._idle_timer.set(None)
+        self.idle_timer.set(None)
         asyncio.get_running_loop().remove_reader(self._listener)
         self._listener.close()
         for client in tuple(self._clients.values()):
@@ -142,7 +142,7 @@ class UdpProxy:
         self.counts.clients += 1
         self.counts.most_at_once = max(self.counts.most_at_once, len(self._clients))
         if len(self._clients) == 1:
-            self._idle_timer.set(client.last + self._idle)
+            self.idle_timer.set(client.last + self._idle)
         return client
 
     def _send(self, channel: Channel[Parcel], client: _ProxyClient, data: bytes) -> None:
@@ -184,7 +184,7 @@ class UdpProxy:
         if self._clients:
             # Who is due already has something on its way, whose arrival moves its time on.
             due = (client.last + self._idle for client in self._clients.values())
-            self._idle_timer.set(min((t for t in due if t > now), default=now + self._idle))
+            self.idle_timer.set(min((t for t in due if t > now), default=now + self._idle))
 
     def _drop(self, client: _ProxyClient) -> None:
         asyncio.get_running_loop().remove_reader(client.sock)

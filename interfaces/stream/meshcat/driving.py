@@ -135,8 +135,8 @@ class MobileScene(TwinScene):
             self._move(twin, links)
         self._set(f"{ROOT}/real", "visible", real is not None)
         self._live(t)
-        if now >= self._due:
-            self._due = now + PATH_PERIOD
+        if now >= self.path_due:
+            self.path_due = now + PATH_PERIOD
             self._draw(path)
             for twin, points in (driven or {}).items():
                 self._drive(twin, points)

@@ -86,7 +86,7 @@ class TwinScene:
         self._poses: dict[str, Array] = {}
         self._path: tuple[Timeline | ArcTimeline, CommittedPath] | None = None
         self._drawn: dict[int, CommittedPiece] = {}
-        self._due = float("-inf")
+        self.path_due = float("-inf")
         self._objects: ModuleType
 
     @property
@@ -243,8 +243,8 @@ class MeshcatScene(TwinScene):
         for twin, links in poses.items():
             self._move(twin, links)
         self._set(f"{ROOT}/real", "visible", real is not None)
-        if now >= self._due:
-            self._due = now + PATH_PERIOD
+        if now >= self.path_due:
+            self.path_due = now + PATH_PERIOD
             self._draw(path)
             if self._traced:
                 self._trace(poses, now)

@@ -98,7 +98,7 @@ def test_an_idle_udp_client_is_forgotten_when_its_own_time_has_come():
             clock.set(t)
             client.transport.sendto(b"a")
             await client.inbox.get()
-        idle = proxy._udp._idle_timer._lateness
+        idle = proxy.udp.idle_timer.lateness
         clock.set(0.055)
         await until(lambda: idle.count == 1)
         assert proxy.statistics()["udp"]["expired"] == 0

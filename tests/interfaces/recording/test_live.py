@@ -238,7 +238,7 @@ def test_what_is_written_at_the_end_needs_no_room(tmp_path, monkeypatch):
         goal = JointTarget(READY if k % 2 else NOMINAL)
         line.operator.execute(MotionCommand(goal, insertion=Insertion.APPEND), now=0.1 * k)
         recorder.advance(now=0.1 * k, connected=True)
-        while recorder.recorder._queue:
+        while recorder.recorder.queue:
             time.sleep(0.001)
     recorder.finish(now=2.0)
     assert recorder.health()["dropped"] == 0

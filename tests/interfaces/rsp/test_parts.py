@@ -317,8 +317,8 @@ def test_what_nobody_fetches_goes_oldest_first() -> None:
     core = LocalCore(example(), bytes)
     middleware = Middleware(core, ManualClock())
     bumper, fire = core.model.index("bumper"), core.model.index("ir_fire")
-    core._outputs += [Occurred(bumper, k, k.to_bytes(2, "big")) for k in range(300)]
-    core._outputs += [Settled(fire, k, DeliveryOutcome.DONE) for k in range(9000)]
+    core.waiting_outputs += [Occurred(bumper, k, k.to_bytes(2, "big")) for k in range(300)]
+    core.waiting_outputs += [Settled(fire, k, DeliveryOutcome.DONE) for k in range(9000)]
     middleware.advance((), now=0.0)
     fetched = []
     while (payload := middleware.came(bumper)) is not None:

@@ -252,7 +252,7 @@ def test_some_pings_and_a_message_in_parts_are_taken() -> None:
 
 
 def test_a_server_asks_for_files_and_leaves_room_for_others() -> None:
-    assert sockets._State(SocketLimits(strangers=100_000)).strangers._most <= sockets._files() // 4
+    assert sockets.ConnectionState(SocketLimits(strangers=100_000)).strangers.most <= sockets.files_allowed() // 4
 
 
 @pytest.mark.parametrize("first", [b"", SMALL, BODY, b"GET /small"], ids=["silent", "asks", "half", "begins"])

@@ -49,7 +49,7 @@ def made() -> MeshcatScene:
 @pytest.fixture
 def scene(made: MeshcatScene) -> MeshcatScene:
     """The one scene of this file, with both robots at the nominal pose and nothing planned."""
-    made._due = -np.inf
+    made.path_due = -np.inf
     show(made, NOMINAL, now=0.0)
     return made
 

@@ -50,7 +50,7 @@ def server(made: MeshcatScene) -> Iterator[Serving]:
 
 def show(server: Serving, scene: MeshcatScene, virtual: Array, real: Array | None, **named: Any) -> None:
     """Show both robots, and the path without its usual pauses."""
-    scene._due = -np.inf
+    scene.path_due = -np.inf
     links = None if real is None else MODEL.links(real)
     server.call(scene.show, virtual=MODEL.links(virtual), real=links, now=0.0, **named)
 
