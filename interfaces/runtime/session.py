@@ -324,18 +324,18 @@ class _Puma:
     """The PyBullet PUMA 560 behind the driver's interface."""
 
     def __init__(self, arm: RealArm) -> None:
-        self._arm = arm
+        self.arm = arm
 
     def follow(self, reference: JointReference) -> Array:
-        return self._arm.run(*reference).q
+        return self.arm.run(*reference).q
 
     def attach(self, mass: float) -> None:
         from robots.bullet import Payload
 
-        self._arm.attach(Payload(mass=mass))
+        self.arm.attach(Payload(mass=mass))
 
     def release(self) -> None:
-        self._arm.release()
+        self.arm.release()
 
 
 @contextmanager
