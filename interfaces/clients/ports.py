@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import Any, Protocol
 
+from typing_extensions import override
+
 from interfaces.engine_server.site import Site, earliest
 from interfaces.messages import Reply, Request
 from vrs.engine import Engine
@@ -39,7 +41,7 @@ class EnginePort(Protocol):
         """Put a request on its way at the user's time now [s]."""
 
 
-class RemotePort:
+class RemotePort(EnginePort):
     """The client's end of a connection; a transport takes what it sends, and brings what arrives."""
 
     def __init__(self) -> None:
@@ -65,7 +67,8 @@ class RemotePort:
         self._order_number += 1
         return self._order_number
 
-    def send(self, message: Request, *, now: float) -> None:  # noqa: ARG002 - the transport asks for it
+    @override
+    def send(self, message: Request, *, now: float) -> None:
         """Put a request into the outbox."""
         self._outbox.append(message)
 

@@ -9,6 +9,8 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import Protocol, TypeAlias, TypeVar
 
+from typing_extensions import override
+
 from interfaces.clients.observer import Observer
 from interfaces.clients.playhead import LiveEdge
 from interfaces.clients.ports import EnginePort
@@ -239,7 +241,7 @@ class ViewerSource(Protocol):
         """Listen no more."""
 
 
-class SegmentSource:
+class SegmentSource(ViewerSource):
     """Evaluates a copy of the timeline: any time, at any rate, without asking."""
 
     def __init__(self, port: EnginePort, *, lead: float, resend: float) -> None:
@@ -287,15 +289,16 @@ class SegmentSource:
         for timeline, command_id in self._mirror.edited():
             self._settled += self._forecasts.edited(timeline, lambda _, by=command_id: by)  # type: ignore[misc]
 
+    @override
     def frame(
         self,
         number: int,
         t: float,
         *,
-        now: float,  # noqa: ARG002 - what a copy shows depends on t alone
-        live: bool,  # noqa: ARG002
-        ahead: Ahead,  # noqa: ARG002
-        floor: float,  # noqa: ARG002
+        now: float,
+        live: bool,
+        ahead: Ahead,
+        floor: float,
     ) -> Frame | None:
         """The frame for a time; None before the timeline has come."""
         timeline = self._mirror.timeline

@@ -13,6 +13,7 @@ from operator import itemgetter
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.engine_server.journal import difference
 from interfaces.link import PacketRecord
@@ -32,6 +33,7 @@ from interfaces.recording.messages import (
 )
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
 from interfaces.teleop import CommandRecord, Correction, OperatorSite, Report, Sample
+from interfaces.teleop.operator import SiteObserver
 from interfaces.wire.commands import command_wire
 from interfaces.wire.fields import text
 from vrs.commands import Profile
@@ -70,7 +72,7 @@ class _Happened(NamedTuple):
     after: Timeline
 
 
-class Capture:
+class Capture(SiteObserver):
     """Writes down an operator's site: it listens, and writes what is due when it's told the time.
 
     While it listens it only takes notes: commands don't wait for it.
@@ -137,7 +139,8 @@ class Capture:
         """Note a correction."""
         self._note((correction, truth))
 
-    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:  # noqa: ARG002 - ids are the same
+    @override
+    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
         """Note an answer of the robot's."""
         self.add(now, ReceiptEntry(now, "real", FullReceipt.of(self._named(receipt))))
 

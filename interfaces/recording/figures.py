@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from interfaces.recording.history import arm_timeline
 from interfaces.recording.messages import COLLISION, OWN, Anchor, CommandEntry
@@ -51,7 +52,17 @@ def matchable(postures: Array) -> bool:
     return bool(steps.sum() <= FARTHEST)
 
 
-class Pursuit:
+class Follower(Protocol):
+    """Says of a real robot how it follows the virtual one."""
+
+    def play(self, t: float) -> float | None:
+        """The time of the timeline at which the real robot is at a time [s]; None where nobody knows."""
+
+    def error(self, t: float, q_real: Array, play: float) -> float | None:
+        """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
+
+
+class Pursuit(Follower):
     """A recording's match, made when it's first asked for."""
 
     def __init__(self, recording: Recording) -> None:
@@ -104,7 +115,8 @@ class Pursuit:
         left = self._moments[before] + max(float(share), 0.0) * (self._moments[after] - self._moments[before])
         return min(t, float(left))
 
-    def error(self, t: float, q_real: Array, play: float) -> float | None:  # noqa: ARG002 - the match knows them
+    @override
+    def error(self, t: float, q_real: Array, play: float) -> float | None:
         """How far the real robot is beside the virtual one's path at a time [m]."""
         self.prepare()
         return None if self._match is None else float(np.interp(t, *self._beside))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
@@ -96,7 +97,8 @@ class _LiveCapture(Capture):
             self.tell(now, "followed", "the real robot follows the operator")
         self._halted, self._followed = halted, self._followed or not halted
 
-    def measured(self, samples: Sequence[Sample], *, now: float) -> None:  # noqa: ARG002 - they have times of their own
+    @override
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
         # What was measured before the recording began is compared with nothing in it.
         self._samples += [one for one in samples if one.t >= self._since][: _SAMPLES - len(self._samples)]
 

@@ -6,13 +6,13 @@ import enum
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 from typing_extensions import override
 
 from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
-from interfaces.recording.figures import Pursuit
+from interfaces.recording.figures import Follower, Pursuit
 from interfaces.recording.marks import Mark, MarkReader
 from interfaces.recording.recording import ARM, Recording, check_alike
 from interfaces.stream.meshcat.committed import Committed
@@ -83,16 +83,6 @@ class PlaybackMoment:
     """One for each recording."""
 
 
-class Follower(Protocol):
-    """Says of a real robot how it follows the virtual one."""
-
-    def play(self, t: float) -> float | None:
-        """The time of the timeline at which the real robot is at a time [s]; None where nobody knows."""
-
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
-
-
 class _AtEqualTime(Follower):
     """Compares with the virtual robot at equal timeline time."""
 
@@ -103,7 +93,8 @@ class _AtEqualTime(Follower):
     def play(self, t: float) -> float | None:
         return float(self._recording.play(t))
 
-    def error(self, t: float, q_real: Array, play: float) -> float | None:  # noqa: ARG002 - play says it all
+    @override
+    def error(self, t: float, q_real: Array, play: float) -> float | None:
         """See `Follower`: the largest difference of a joint [rad]."""
         q = self._recording.virtual(play)
         return float(np.abs(q_real - q).max()) if np.isfinite(q).all() else None

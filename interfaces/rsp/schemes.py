@@ -121,7 +121,8 @@ class PlainLocal(LocalEnd):
         self._fires.append(self._count)
         self._count += 1
 
-    def receive(self, data: bytes, *, now: float) -> None:  # noqa: ARG002 - as other ends
+    @override
+    def receive(self, data: bytes, *, now: float) -> None:
         """See `LocalEnd`; what is older than the newest is of no use."""
         number, x, y, theta = _UP.unpack_from(data)
         if number > self._newest:
@@ -234,7 +235,8 @@ class RspLocal(LocalEnd):
         for index, rim in zip((self._left, self._right), rims, strict=True):
             self.core.write(index, rim.to_bytes(2, "big", signed=True))
 
-    def fire(self, *, now: float) -> None:  # noqa: ARG002 - as other ends
+    @override
+    def fire(self, *, now: float) -> None:
         """See `LocalEnd`; before there's a session it waits."""
         self._waiting.append(bytes([self._number % 256]))
         self._number += 1

@@ -16,6 +16,7 @@ from itertools import chain, islice
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.engine_server.site import engine_time
 from interfaces.link.delays import share_of
@@ -540,7 +541,8 @@ class RobotHost(Host[RobotSite, Orders, Report]):
         reported = max(0, math.floor(1000.0 * t))
         return RobotSite(self._model, self._q, now=t, config=config, reported=reported)
 
-    def _left(self, site: RobotSite, now: float) -> None:  # noqa: ARG002 - it's this site's
+    @override
+    def _left(self, site: RobotSite, now: float) -> None:
         self._q = self.reference(np.array([now])).q[0]
 
     def reference(self, t: Array) -> JointReference:

@@ -50,12 +50,12 @@ class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type")
     """A message, or a part that has a type; `of` and `read` go between the wire and the value it stands for."""
 
     @classmethod
-    def of(cls, value: Any, packed: bool) -> Message:  # noqa: ARG003 - most messages look the same in both encodings
+    def of(cls, value: Any, _packed: bool) -> Message:
         """The wire form of a value whose fields have the same names.
 
         Args:
             value: The value.
-            packed: Whether it's for msgpack, where coefficients are bytes.
+            _packed: Whether it's for msgpack, where coefficients are bytes; most messages look the same in both.
         """
         fields = [getattr(value, name) for name in cls.__struct_fields__]
         return cls(*[field.tolist() if isinstance(field, np.ndarray) else field for field in fields])

@@ -38,7 +38,7 @@ class Office:
         self.rig.run(seconds, lambda _: self.desk.turn())
 
     def order(self, wanted: Go | Load | ListCommand | Trial) -> str:
-        return self.desk.order(wanted, now=self.rig.now)
+        return self.desk.order(wanted)
 
     @property
     def tasks(self) -> Tasks:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from starlette.routing import BaseRoute
+from typing_extensions import override
 
 from interfaces.jobs import ArmJob, JobFile, OperatorLoss
 from interfaces.link import LinkConditions
@@ -24,7 +25,8 @@ from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached, Role
 from interfaces.stream.driving import DriveSite
-from interfaces.stream.hub import Hub, HubConfig
+from interfaces.stream.hub import Hub, HubConfig, Workers
+from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.mobile import Postures, Tasks, Wanted
 from interfaces.stream.server import HubServer
@@ -73,7 +75,7 @@ class LiveMobileOperatorConfig:
     """Says of a program of the list how long it takes [s], why it'd fail, or None where nobody knows."""
 
 
-class LiveMobileOperator:
+class LiveMobileOperator(LeasedRobot, Workers):
     """The virtual robot and all that joins it to people and to the real one. Enter `running` in its loop."""
 
     def __init__(self, config: LiveMobileOperatorConfig, access: Access) -> None:
@@ -187,12 +189,14 @@ class LiveMobileOperator:
             self.server.kick()
         return self.line.next_deadline()
 
-    def began(self, grant: Grant, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+    @override
+    def began(self, grant: Grant, *, now: float) -> None:
         """A lease has begun: a drive may begin."""
         self._wants_resume = True
         self._turning.soon()
 
-    def ended(self, ended: Ended, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+    @override
+    def ended(self, ended: Ended, *, now: float) -> None:
         """A lease has ended: the robots stop on their way."""
         self._ending, self._wants_resume = now, False
         if not self._carries_on:
@@ -205,16 +209,18 @@ class LiveMobileOperator:
         tasks, doing = self.operator.tasks, self.operator.doing
         return doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
 
+    @override
     def order(self, wanted: Wanted, *, now: float) -> str:
         """Let the robot do something by itself; why it doesn't, empty if it does."""
         self._turning.soon()
-        return self.desk.order(wanted, now=now)
+        return self.desk.order(wanted)
 
     def tasks(self, answers: int | None = None) -> Tasks:
         """How that is."""
         return self.desk.tasks(answers)
 
-    def resume(self, epoch: int, *, now: float) -> str:  # noqa: ARG002 - the hub says it
+    @override
+    def resume(self, epoch: int, *, now: float) -> str:
         """Let a robot go on that stopped by itself; why it can't, empty if it does."""
         return self.operator.resume(now=now)
 

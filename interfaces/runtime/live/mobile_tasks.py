@@ -109,7 +109,7 @@ class TaskDesk:
         robot = outline.front, outline.rear, 2 * outline.half_width
         return Plan((room.length, room.width), rings, room.via, robot)
 
-    def order(self, wanted: Wanted, *, now: float) -> str:  # noqa: ARG002 - it's a hub's
+    def order(self, wanted: Wanted) -> str:
         """Do what somebody wants; why not, empty if it's done."""
         match wanted:
             case Go():

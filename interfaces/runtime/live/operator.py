@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from starlette.routing import BaseRoute
+from typing_extensions import override
 
 from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
@@ -24,6 +25,7 @@ from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.access import Access
 from interfaces.stream.control import Attached, Role, State
 from interfaces.stream.hub import Hub, HubConfig
+from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
@@ -76,7 +78,7 @@ class LiveOperatorConfig:
     """What the robot is to do when the link is lost; None leaves it to the robot."""
 
 
-class LiveOperator:
+class LiveOperator(LeasedRobot):
     """The virtual robot and all that joins it to people and to the real one. Enter `running` in its loop."""
 
     def __init__(self, config: LiveOperatorConfig, access: Access) -> None:
@@ -218,19 +220,22 @@ class LiveOperator:
             self.server.kick()
         return self.line.next_deadline()
 
-    def began(self, grant: Grant, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+    @override
+    def began(self, grant: Grant, *, now: float) -> None:
         """A lease has begun: a robot that had stopped by itself may go on."""
         self._wants_resume = True
         self._turning.soon()
 
-    def ended(self, ended: Ended, *, now: float) -> None:  # noqa: ARG002 - the hub says it
+    @override
+    def ended(self, ended: Ended, *, now: float) -> None:
         """A lease has ended: the robots stop on their way."""
         self._ending, self._wants_resume = True, False
         with contextlib.suppress(VrsError):
             self.operator.execute(Stop(), now=now)
         self._turning.soon()
 
-    def resume(self, epoch: int, *, now: float) -> str:  # noqa: ARG002 - the hub says it
+    @override
+    def resume(self, epoch: int, *, now: float) -> str:
         """Let a robot go on that stopped by itself; why it can't, empty if it does."""
         return self.operator.resume(now=now)
 

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
+from typing_extensions import override
+
 from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
-from interfaces.teleop.connection import LOST, Host, HostConfig, lost
+from interfaces.teleop.connection import LOST, Host, HostConfig, OrderExecutor, lost
 from interfaces.teleop.driving.autonomy import Autonomy
 from interfaces.teleop.driving.messages import (
     Doing,
@@ -52,7 +54,7 @@ class DrivenConfig:
     """Without a watchdog, the operator is lost to what the robot does by itself after so long [s], in [0.1, 60]."""
 
 
-class DrivenRobot:
+class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
     """Follows the epochs of one operator's site. Times are by its clock, as the robot takes it to be [s]."""
 
     def __init__(
@@ -259,7 +261,8 @@ class DrivenRobot:
         steps = braking(self._drive, period, limits)
         return Drive(*steps[0]) if steps else STAND
 
-    def rests(self, *, now: float) -> bool:  # noqa: ARG002 - a follower's
+    @override
+    def rests(self, *, now: float) -> bool:
         """Whether the robot is at rest."""
         return is_still(self._drive)
 
