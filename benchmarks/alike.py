@@ -13,6 +13,7 @@ import numpy as np
 
 from interfaces.lab.statistics import bootstrap, interval_name
 from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.messages.control import Role
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
@@ -20,7 +21,6 @@ from interfaces.runtime.plan import PlannedMotion, RunPlan
 from interfaces.runtime.session import SETTLE, run_twins, simulated_puma
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
-from interfaces.stream.control import Role
 from interfaces.stream.server import application
 from robots import puma560
 from vrs import JointTarget, MotionCommand

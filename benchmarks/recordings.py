@@ -23,6 +23,7 @@ import numpy as np
 import uvloop
 
 from interfaces import connect
+from interfaces.messages.control import Role
 from interfaces.recording.recording import open_recording
 from interfaces.recording.track import REAL
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
@@ -31,7 +32,6 @@ from interfaces.runtime.physics import TICK, Feeder, ProcessEnded, Silent
 from interfaces.runtime.physics_messages import Fault, Measurement, PhysicsReady
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
-from interfaces.stream.control import Role
 from interfaces.stream.server import application
 from interfaces.system import module_process
 from interfaces.teleop import RobotHostConfig, RobotSiteConfig

@@ -31,9 +31,9 @@ def connect(
         UnreachableError: If there's no answer, or the server refuses; it's a ConnectionError.
         ValueError: If role or encoding is none of those.
     """
+    from interfaces.messages.control import Role
     from interfaces.stream.codec import Encoding
     from interfaces.stream.connection import Connection
-    from interfaces.stream.control import Role
 
     return Connection(url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout)
 
@@ -48,9 +48,9 @@ def connect_mobile(
     timeout: float = 5.0,
 ) -> MobileConnection:
     """Reach a mobile robot that `vrs serve --robot ipr` serves; see `connect`."""
+    from interfaces.messages.control import Role
     from interfaces.stream.codec import Encoding
     from interfaces.stream.connection import MobileConnection
-    from interfaces.stream.control import Role
 
     return MobileConnection(
         url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout

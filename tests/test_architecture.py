@@ -24,7 +24,7 @@ ORDER = (
     "robots.solids", "robots.bullet", "robots.onboard",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
-    "interfaces.system", "interfaces.timer", "interfaces.messages", "interfaces.wire",
+    "interfaces.system", "interfaces.timer", "interfaces.messages",
     # The network; what is asked of a personal robot.
     "interfaces.link", "interfaces.middleware", "interfaces.jobs",
     # What serves an engine, and its clients; both sites; what a run is.

@@ -88,8 +88,8 @@ def _alone(files: Path) -> None:
 
 def _connected(url: str, token_file: Path | None, files: Path) -> None:
     from interfaces import connect
+    from interfaces.messages.control import Role
     from interfaces.stream.access import read_tokens
-    from interfaces.stream.control import Role
     from interfaces.val2.monitor.control import LeaseControl
     from interfaces.val2.motion import arm_for
 

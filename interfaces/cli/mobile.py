@@ -252,8 +252,8 @@ def run_mobile(
     from interfaces.jobs import OperatorLoss, RunnerConfig
     from interfaces.link.proxy import parse_address
     from interfaces.media import Aloud
+    from interfaces.messages.control import Role
     from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
-    from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes
     from interfaces.teleop.architectures.compositions import CONTROL
     from interfaces.teleop.driving import DrivenConfig, Hands

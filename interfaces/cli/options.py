@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from contextlib import AsyncExitStack
 
     from interfaces.link import LinkConditions
+    from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
-    from interfaces.stream.control import Attached, Role
     from robots.onboard import LossPolicy
 
 PROFILES = (

@@ -203,9 +203,9 @@ def _serve(
     import asyncio
 
     from interfaces.link.proxy import Address
+    from interfaces.messages.control import Role
     from interfaces.recording.page import ReplayPage
     from interfaces.stream import sockets
-    from interfaces.stream.control import Role
     from interfaces.stream.server import application
     from vrs.clock import WallClock
 

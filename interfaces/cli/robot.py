@@ -213,9 +213,9 @@ def robot(
     import uvloop
 
     from interfaces.link.proxy import parse_address
+    from interfaces.messages.control import Role
     from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
     from interfaces.runtime.physics_messages import BodyKind
-    from interfaces.stream.control import Role
     from interfaces.teleop import RobotHostConfig, RobotSiteConfig
     from robots import puma560
     from robots.onboard import LossPolicy, WatchdogConfig

@@ -155,6 +155,7 @@ def serve(
     from interfaces.jobs import OperatorLoss
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
+    from interfaces.messages.control import Role
     from interfaces.recording.live import RATE, LiveRecording
     from interfaces.recording.mcap_file import Sink
     from interfaces.recording.messages import OWN
@@ -162,7 +163,6 @@ def serve(
     from interfaces.runtime.live.emulation import late_often, too_slow
     from interfaces.runtime.physics_messages import BodyKind
     from interfaces.stream.access import OPEN, read_tokens
-    from interfaces.stream.control import Role
     from interfaces.teleop.architectures import architecture as makes
     from robots.onboard import LossPolicy
 
@@ -315,13 +315,13 @@ async def _serve(
         stack.push_async_callback(abandon, robot)
         await asyncio.to_thread(_load)
 
+        from interfaces.messages.control import Role
         from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
         from interfaces.station.chain import described
         from interfaces.station.page import Station
         from interfaces.station.record import RecordingFacts, Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
-        from interfaces.stream.control import Role
         from interfaces.stream.server import application
         from interfaces.val2.pages import PageTerminalServer
         from interfaces.val2.served import HOST, ServedVal

@@ -16,7 +16,7 @@ from interfaces.link.delays import (
 from interfaces.link.delivery import Bundle, Repeater, RepeatReceiver
 from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, LinkTotals, Stream, direction
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
-from interfaces.link.packets import Gauge, LinkFigures, LossReason, PacketLog, PacketRecord, Totals
+from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord, Totals
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.link.round_trip import (
     DelayStatistics,
@@ -57,7 +57,6 @@ __all__ = [
     "Lane",
     "Link",
     "LinkConditions",
-    "LinkFigures",
     "LinkPath",
     "LinkStatistics",
     "LinkTotals",

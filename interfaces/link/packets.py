@@ -8,6 +8,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from interfaces.messages.control import LinkFigures
+
 MAX_RECORDS = 10_000
 """Records kept until they are taken; the oldest are dropped first."""
 
@@ -155,22 +157,6 @@ WINDOW = 30.0
 """How far back is measured [s]."""
 MOST = 4096
 """Packets that are kept, at most."""
-
-
-@dataclass(frozen=True, slots=True)
-class LinkFigures:
-    """Sums over the newest packets."""
-
-    packets: int
-    """So many were sent, those that are still under way among them."""
-    lost: float | None
-    """Share of them that was lost; None of none."""
-    median: float | None
-    """Of the time between sending and delivery of those that arrived [s]; None where none did."""
-    p95: float | None
-    """Delay that 95 % of those kept within [s]."""
-    span: float | None = None
-    """Over how long they were sent, up to now [s]; None where that isn't known."""
 
 
 class Gauge:

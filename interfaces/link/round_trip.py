@@ -10,7 +10,7 @@ import enum
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from interfaces.link.quantiles import LARGEST, MAX_CAPACITY, SlidingQuantiles
 from vrs.checks import finite, validated, within
@@ -19,32 +19,6 @@ from vrs.errors import InvalidValueError
 SEQUENCE_NUMBERS = 1 << 16
 """Sequence numbers run from 0 to one less than this, and begin again."""
 SESSIONS = 1 << 32
-
-
-@dataclass(frozen=True, slots=True)
-class Ping:
-    """Either side: an answer at once, please; it also measures the round trip."""
-
-    kind: ClassVar[str] = "ping"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
-    """When it left, by the sender's clock [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pong:
-    """Either side: the answer to a `Ping`."""
-
-    kind: ClassVar[str] = "pong"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
-    """The ping's."""
-    received: float
-    """When that arrived, by the answerer's clock [s]."""
-    answered: float
-    """When this left, by the answerer's clock [s]."""
 
 
 @dataclass(frozen=True, slots=True)

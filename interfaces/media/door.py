@@ -25,8 +25,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.media.camera import CameraError
 from interfaces.media.live import LiveMedia
+from interfaces.messages.control import Role
 from interfaces.stream.access import Access, bearer
-from interfaces.stream.control import Role
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.page import (
     PATIENCE,

@@ -17,6 +17,9 @@ from typing_extensions import override
 
 from interfaces.engine_server.journal import difference
 from interfaces.link import PacketRecord
+from interfaces.messages.commands import command_wire
+from interfaces.messages.fields import text
+from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
 from interfaces.recording.messages import (
     Anchor,
@@ -32,10 +35,8 @@ from interfaces.recording.messages import (
     segment_entries,
 )
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.teleop import CommandRecord, Correction, OperatorSite, Report, Sample
+from interfaces.teleop import CommandRecord, Correction, OperatorSite
 from interfaces.teleop.operator import SiteObserver
-from interfaces.wire.commands import command_wire
-from interfaces.wire.fields import text
 from vrs.commands import Profile
 from vrs.ledger import Receipt, Standing, Status
 from vrs.model import Array, RobotModel

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
+from interfaces.messages import fields
+from interfaces.messages.sites import Report, Sample
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import Sink
@@ -20,9 +22,8 @@ from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transfo
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
-from interfaces.teleop import CommandRecord, Correction, Report, RobotLine, Sample
+from interfaces.teleop import CommandRecord, Correction, RobotLine
 from interfaces.teleop.samples import PERIOD
-from interfaces.wire import fields
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline

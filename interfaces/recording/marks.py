@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from interfaces.messages.commands import DriveWire, MoveWire
 from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
 from interfaces.runs.twin_run import correction_text
-from interfaces.wire.commands import DriveWire, MoveWire
 from vrs.commands import Motion
 from vrs.ledger import Status
 from vrs.model import Array

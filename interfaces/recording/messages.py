@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 from msgspec import Meta, field
 
-from interfaces.stream.wire.segments import MOST_POWERS
-from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
-from interfaces.wire.fields import (
+from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.messages.fields import (
     MOST_JOINTS,
     CommandId,
     Count,
@@ -29,6 +28,7 @@ from interfaces.wire.fields import (
     Wire,
     Word,
 )
+from interfaces.messages.segments import MOST_POWERS
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from interfaces.wire.fields import Wire
+from interfaces.messages.fields import Wire
 from vrs.model import Array
 
 BASE = "base"

@@ -16,6 +16,7 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link import PacketRecord
+from interfaces.messages.fields import text
 from interfaces.recording import messages as d
 from interfaces.recording.capture import Capture
 from interfaces.recording.channels import Message
@@ -43,7 +44,6 @@ from interfaces.system import software
 from interfaces.teleop import CommandRecord, OperatorSite
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
-from interfaces.wire.fields import text
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from interfaces.link.proxy.proxy import parse_address
+from interfaces.messages.control import Role
 from interfaces.rsp.errors import DeadlineError, NoSessionError
 from interfaces.rsp.header import LONGEST
 from interfaces.rsp.host import RspHost
@@ -24,7 +25,6 @@ from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model.elements import RobotModel
 from interfaces.rsp.session import Keyring, Rank
 from interfaces.stream.access import read_tokens
-from interfaces.stream.control import Role
 from interfaces.timer import Turning
 from vrs.checks import finite
 from vrs.clock import Clock, WallClock

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link import Lane, Link, LinkConditions
-from interfaces.teleop.messages import Orders, Report
+from interfaces.messages.sites import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import JointReference, RobotSite
 from robots.onboard.playout import PlayState

@@ -14,7 +14,8 @@ from typing import Annotated, Protocol, Self, TypeAlias
 
 import numpy as np
 
-from interfaces.link.round_trip import Ping
+from interfaces.messages.control import Ping
+from interfaces.messages.sites import Report
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     ROWS_MOST,
@@ -33,7 +34,7 @@ from interfaces.runtime.physics_messages import (
     encode,
 )
 from interfaces.system import module_process
-from interfaces.teleop import JointReference, Report, RobotHost
+from interfaces.teleop import JointReference, RobotHost
 from vrs.checks import number_in, validated, within
 from vrs.clock import WallClock
 from vrs.commands import finite_array

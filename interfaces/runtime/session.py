@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link import Conditions, ConstantDelay, DelayProfile, LinkConditions, PacketRecord, Service
+from interfaces.messages.fields import text
 from interfaces.runs.summary import OffsetOutcome, measures
 from interfaces.runs.twin_run import (
     QUANTILE,
@@ -35,7 +36,6 @@ from interfaces.runs.twin_run import (
 from interfaces.runtime.laboratory import Laboratory, RobotBody
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
 from interfaces.teleop import JointReference, OperatorSite, RobotSite, RobotSiteConfig
-from interfaces.wire.fields import text
 from vrs import Lateness, Receipt, Status
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline

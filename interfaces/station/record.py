@@ -18,12 +18,12 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
+from interfaces.messages.control import Role
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import LiveRecording
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
 from interfaces.stream.access import Access, bearer
-from interfaces.stream.control import Role
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import Viewers

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from interfaces.link.proxy import Address
-from interfaces.stream.control import Role
+from interfaces.messages.control import Role
 from vrs.errors import FormatError, InvalidValueError
 
 TOKEN_BYTES = 32

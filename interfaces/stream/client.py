@@ -12,11 +12,10 @@ from typing import Any, ClassVar, TypeAlias
 from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.site import earliest
 from interfaces.link.clock_sync import ClockSync
-from interfaces.link.round_trip import Ping, Pong, RoundTrip
-from interfaces.messages import Order, Outcome, Reply, Request
-from interfaces.stream import control
+from interfaces.link.round_trip import RoundTrip
+from interfaces.messages import Order, Outcome, Reply, Request, control
+from interfaces.messages.control import Impair, Network, Notice, Ping, Pong, ProblemCode, Role, Survey
 from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
-from interfaces.stream.control import Impair, Network, Notice, ProblemCode, Role, Survey
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 
 FROM_SERVER = 4 * LARGEST

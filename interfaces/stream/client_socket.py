@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Protocol
 
 from interfaces.engine_server.site import earliest
+from interfaces.messages.control import Problem, ProtocolError
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
-from interfaces.stream.control import Problem, ProtocolError
 from vrs.clock import Clock
 from vrs.errors import VrsError
 

@@ -12,19 +12,18 @@ from typing import Any, Generic, TypeAlias, TypeVar, get_args
 import msgspec
 
 from interfaces import messages
-from interfaces.link.round_trip import Ping, Pong
-from interfaces.messages import Reply, Request
-from interfaces.stream import control, mobile
-from interfaces.stream.control import Notice, ProblemCode, ProtocolError, Question
+from interfaces.messages import Reply, Request, control
+from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, ProtocolError, Question
+from interfaces.messages.fields import Message as Wire
+from interfaces.messages.fields import check_normal, plain
+from interfaces.messages.segments import Packed, Plain
+from interfaces.messages.sites import Orders, Report
+from interfaces.stream import mobile
 from interfaces.stream.wire import control as control_wires
 from interfaces.stream.wire import messages as message_wires
 from interfaces.stream.wire import mobile as mobile_wires
 from interfaces.stream.wire import sites
-from interfaces.stream.wire.segments import Packed, Plain
 from interfaces.teleop.driving.messages import DriveOrders, DriveReport
-from interfaces.teleop.messages import Orders, Report
-from interfaces.wire.fields import Message as Wire
-from interfaces.wire.fields import check_normal, plain
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536

@@ -13,12 +13,8 @@ from interfaces.clients.ports import EnginePort
 from interfaces.clients.viewer import ShownFrame
 from interfaces.jobs import Forecast, JobList, ListCommand, Load
 from interfaces.link.clock_sync import ClockEstimate
-from interfaces.messages import ViewForm
-from interfaces.stream import control
-from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
-from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
-from interfaces.stream.codec import Encoding
-from interfaces.stream.control import (
+from interfaces.messages import ViewForm, control
+from interfaces.messages.control import (
     DirectionConditions,
     Impair,
     Lease,
@@ -30,6 +26,9 @@ from interfaces.stream.control import (
     Survey,
     Welcome,
 )
+from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
+from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
+from interfaces.stream.codec import Encoding
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
 from interfaces.teleop.driving.messages import Doing, Go

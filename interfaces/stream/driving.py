@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from interfaces.link.delivery import OrderBook
 from interfaces.messages import Order, Outcome, Request
+from interfaces.messages.control import Problem, ProblemCode
 from interfaces.stream.codec import Value
-from interfaces.stream.control import Problem, ProblemCode
 from interfaces.stream.hosted import Greeting
 from interfaces.stream.mobile import MobileWelcome
 from interfaces.teleop.driving import DrivingOperator

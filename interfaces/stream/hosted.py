@@ -7,8 +7,7 @@ from typing import NamedTuple, Protocol
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.site import Site
-from interfaces.messages import Order
-from interfaces.stream import control
+from interfaces.messages import Order, control
 from interfaces.stream.session import Served, Welcome
 
 

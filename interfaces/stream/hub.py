@@ -10,10 +10,10 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from interfaces.engine_server.site import earliest
-from interfaces.stream import control
+from interfaces.messages import control
+from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
-from interfaces.stream.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import LeasedRobot, Leasing
 from interfaces.stream.limits import Allowances, Bucket, ClientLimits

@@ -5,9 +5,8 @@ from __future__ import annotations
 import hmac
 from typing import Protocol
 
-from interfaces.messages import Order
-from interfaces.stream import control
-from interfaces.stream.control import OVERRULED, Problem, ProblemCode, Role
+from interfaces.messages import Order, control
+from interfaces.messages.control import OVERRULED, Problem, ProblemCode, Role
 from interfaces.stream.session import SessionState, Wish
 from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
 

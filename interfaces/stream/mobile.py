@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
 from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
-from interfaces.stream.control import PROTOCOL, Lease, Role
+from interfaces.messages.control import PROTOCOL, Lease, Role
 from interfaces.teleop.driving.messages import Doing, Go, Point
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState

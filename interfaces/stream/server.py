@@ -20,9 +20,9 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from websockets.frames import Opcode
 
+from interfaces.messages.control import Role
 from interfaces.stream.access import check_host, check_origin
 from interfaces.stream.codec import Encoding
-from interfaces.stream.control import Role
 from interfaces.stream.hub import Hub
 from interfaces.stream.session import HubSession
 from interfaces.stream.sockets import BoundedWebSocket

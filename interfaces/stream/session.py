@@ -5,11 +5,19 @@ from __future__ import annotations
 import logging
 from typing import Protocol, TypeAlias
 
-from interfaces.link.round_trip import Ping, Pong
-from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want
-from interfaces.stream import control
+from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want, control
+from interfaces.messages.control import (
+    Impair,
+    Network,
+    Ping,
+    Pong,
+    Problem,
+    ProblemCode,
+    ProtocolError,
+    Role,
+    Survey,
+)
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
-from interfaces.stream.control import Impair, Network, Problem, ProblemCode, ProtocolError, Role, Survey
 from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 

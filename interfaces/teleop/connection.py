@@ -22,7 +22,8 @@ from interfaces.engine_server.site import earliest
 from interfaces.link import Gauge, Link, LinkConditions
 from interfaces.link.clock_sync import ClockSync
 from interfaces.link.packets import PacketRecord
-from interfaces.link.round_trip import Echo, Ping, Pong, ProbeConfig, RoundTrip, RoundTripEstimator
+from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
+from interfaces.messages.control import Ping, Pong
 from robots.onboard import LossPolicy, Verdict, WatchdogConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError

@@ -11,10 +11,10 @@ from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
+from interfaces.messages.commands import check_crosses
+from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.teleop.connection import SiteLine
-from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.samples import Gathering, Sample
-from interfaces.wire.commands import check_crosses
+from interfaces.teleop.samples import Gathering
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
 from vrs.commands import (

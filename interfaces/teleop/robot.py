@@ -21,8 +21,8 @@ from typing_extensions import override
 from interfaces.engine_server.site import engine_time
 from interfaces.link.delays import share_of
 from interfaces.link.round_trip import RelativeDelays, WindowConfig
+from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.connection import Host, HostConfig, lost
-from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.samples import SampleLog
 from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of

@@ -10,22 +10,17 @@ from collections import OrderedDict, deque
 from collections.abc import Iterable
 from itertools import islice
 from operator import attrgetter
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
+from interfaces.messages.sites import AGAIN, NEW, RANGES, Ranges, Sample
 from vrs.model import Array, frozen_array
 
 PERIOD: Final = 0.01
 """Time between two samples [s], as between two measurements of the body."""
 KEPT: Final = 600.0
 """For so long the robot's site keeps samples [s]: an outage as long as that leaves no gap."""
-NEW: Final = 128
-"""New samples in one report, at most; the older ones are asked for."""
-AGAIN: Final = 32
-"""Samples in one report that were asked for, at most."""
-RANGES: Final = 32
-"""Ranges of samples that are asked for in one message, at most."""
 WANTED: Final = 128
 """Samples that are asked for in one message, at most."""
 LATE: Final = 128
@@ -33,24 +28,6 @@ LATE: Final = 128
 _MOST: Final = round(KEPT / PERIOD)
 _ASKED: Final = 4096
 """Samples that wait to be sent again, at most."""
-
-Ranges = tuple[tuple[int, int], ...]
-"""First and last number of each range."""
-
-
-class Sample(NamedTuple):
-    """Where the robot was measured once."""
-
-    number: int
-    """Counts the samples of a robot's site, without gaps; 0 of a robot that doesn't number them."""
-    t: float
-    """When, by the robot's clock [s]."""
-    play: float
-    """Time on the robot's timeline that it played then [s]."""
-    q: Array
-    """Measured joints [rad], (n,)."""
-    reference: Array | None = None
-    """What the robot's own timeline asked for at `play` [rad], (n,); None of a robot that doesn't say."""
 
 
 class SampleLog:

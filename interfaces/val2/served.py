@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from interfaces.stream.control import Role
+from interfaces.messages.control import Role
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.control import LeaseControl, SharedController, SharedOperator
 from interfaces.val2.monitor.files import Files

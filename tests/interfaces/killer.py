@@ -8,7 +8,7 @@ import sys
 import time
 
 from interfaces import connect
-from interfaces.stream.control import Lease
+from interfaces.messages.control import Lease
 from robots.puma560.parameters import POSES
 from vrs import Insertion, JointTarget, MotionCommand
 

@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.messages.control import Role
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.physics_messages import BodyKind
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
-from interfaces.stream.control import Role
 from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
 from robots import puma560

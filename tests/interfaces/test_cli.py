@@ -283,8 +283,8 @@ def test_an_address_that_isnt_one_is_refused(capsys, text):
 
 def test_a_token_file_is_made_for_its_owner_alone(tmp_path):
     from interfaces.cli.options import access_for
+    from interfaces.messages.control import Role
     from interfaces.stream.access import read_tokens
-    from interfaces.stream.control import Role
 
     path = tmp_path / "tokens"
     access = access_for("192.0.2.1", path, free={Role.SITE})

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.messages.sites import Report
 from interfaces.runtime.physics_messages import FaultKind, Measurement
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import JointReference, RobotSiteConfig
-from interfaces.teleop.messages import Report
 from robots.onboard import FollowingAbort, SensorFault, StopReason, WatchdogConfig, WatchdogState
 from tests.interfaces.test_host import READY, STEP, Ends, to
 from tests.interfaces.test_tick_loop import Bench, rows

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.link.round_trip import Pong
+from interfaces.messages.control import Pong
+from interfaces.messages.sites import Orders
 from interfaces.runtime.physics import Feeder
 from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import TickLoop
-from interfaces.teleop import JointReference, OperatorSite, Orders, RobotHost, RobotHostConfig, RobotLine
+from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
 from vrs import JointTarget, MotionCommand
 

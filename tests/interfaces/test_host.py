@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.teleop import OperatorSite, Orders, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
+from interfaces.messages.sites import Orders
+from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
 from robots import puma560
 from robots.onboard import LossPolicy, WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from websockets.sync.client import connect
 
+from interfaces.messages.control import Hello, Role
 from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.stream.control import Hello, Role
 from interfaces.teleop import RobotSiteConfig
 from robots.onboard import LossPolicy, WatchdogConfig
 from tests.interfaces.live_rig import Child, child

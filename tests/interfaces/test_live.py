@@ -14,9 +14,9 @@ import pytest
 
 from interfaces import connect
 from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.messages.control import Lease
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.stream.connection import Connection
-from interfaces.stream.control import Lease
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from tests.interfaces.live_rig import (
     HALT,

@@ -23,6 +23,7 @@ from interfaces.jobs import (
     WaitJob,
 )
 from interfaces.link import LinkConditions
+from interfaces.messages.control import Lease, Problem, Role
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
 from interfaces.runtime.live.robot_server import LARGEST
@@ -30,7 +31,6 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.connection import MobileConnection
-from interfaces.stream.control import Lease, Problem, Role
 from interfaces.stream.mobile import Tasks
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
+from interfaces.messages.sites import Orders
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, Orders, RobotSite, RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from interfaces import connect
+from interfaces.messages.control import Role
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
 from interfaces.runtime.physics_messages import PhysicsSetup
 from interfaces.runtime.physics_process import tick_body
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.stream.access import Access
-from interfaces.stream.control import Role
 from interfaces.teleop import RobotSiteConfig
 from interfaces.teleop.driving import DrivenConfig
 from robots import onboard

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from interfaces import Supervisor
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
+from interfaces.messages.sites import LogEntry, Orders
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import LogEntry, OperatorSite, Orders, RobotSite, RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from interfaces.teleop.robot import ReceivedLog
 from robots import puma560
 from robots.onboard import WatchdogConfig

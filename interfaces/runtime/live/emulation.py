@@ -8,10 +8,9 @@ from typing import Any
 
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile, loss_model, spelled_loss
 from interfaces.link.delays import ALLOWED, DelayProfile
-from interfaces.link.packets import LinkFigures
+from interfaces.messages.control import DirectionConditions, Impair, LinkFigures, Network
 from interfaces.runs.twin_run import QUANTILE
 from interfaces.runtime.live.robot_client import RobotClient
-from interfaces.stream.control import DirectionConditions, Impair, Network
 from interfaces.teleop.connection import SiteLine
 from vrs.errors import InvalidValueError
 

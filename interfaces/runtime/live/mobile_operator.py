@@ -17,13 +17,13 @@ from typing_extensions import override
 from interfaces.jobs import ArmJob, JobFile, OperatorLoss
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
+from interfaces.messages.control import Attached, Role
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
 from interfaces.runtime.live.mobile_tasks import TaskDesk
 from interfaces.runtime.live.operator import GONE, SHOW, UNHEARD
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.access import Access
-from interfaces.stream.control import Attached, Role
 from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot

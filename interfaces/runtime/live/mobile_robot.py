@@ -21,9 +21,9 @@ from typing_extensions import override
 
 from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.messages.control import Attached
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
-from interfaces.stream.control import Attached
 from interfaces.teleop.architectures import (
     ArchitectureRobotSite,
     Constants,

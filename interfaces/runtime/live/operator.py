@@ -16,6 +16,8 @@ from typing_extensions import override
 
 from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
+from interfaces.messages.control import Attached, Role, State
+from interfaces.messages.sites import Report
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN as RECORD
 from interfaces.recording.live import LiveRecorder, LiveRecording
@@ -23,14 +25,13 @@ from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.process import warm
 from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.access import Access
-from interfaces.stream.control import Attached, Role, State
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
-from interfaces.teleop import OperatorSite, OperatorSiteConfig, Report, RobotLine
+from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine
 from interfaces.timer import Turning
 from robots.onboard import LossPolicy
 from robots.onboard.lease import Ended, Grant, Lease

@@ -15,6 +15,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
+from interfaces.messages.control import Attached, Role
 from interfaces.runtime.live.process import warm
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.runtime.physics import (
@@ -27,7 +28,6 @@ from interfaces.runtime.physics import (
 )
 from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, PhysicsReady
 from interfaces.stream.access import Access, bearer
-from interfaces.stream.control import Attached, Role
 from interfaces.teleop import RobotHost, RobotHostConfig
 from interfaces.timer import Turning
 from vrs.clock import WallClock

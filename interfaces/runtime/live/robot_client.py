@@ -13,11 +13,10 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
 
-from interfaces.link.round_trip import Ping
+from interfaces.messages.control import Attached, Hello, Ping, Problem, ProtocolError, Role
+from interfaces.messages.sites import Report
 from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
-from interfaces.stream.control import Attached, Hello, Problem, ProtocolError, Role
-from interfaces.teleop import Report
 from interfaces.teleop.connection import SiteLine
 from robots.onboard import LossPolicy
 from vrs.clock import Clock

@@ -12,13 +12,12 @@ from typing import Any
 from starlette.routing import BaseRoute, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
-from interfaces.link.round_trip import Pong
+from interfaces.messages.control import PROTOCOL, Attached, Hello, Pong, Problem, ProblemCode, ProtocolError, Role
+from interfaces.messages.sites import Orders
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, Value, decode, encode
-from interfaces.stream.control import PROTOCOL, Attached, Hello, Problem, ProblemCode, ProtocolError, Role
 from interfaces.stream.server import Endpoint
 from interfaces.stream.sockets import let_stay
-from interfaces.teleop import Orders
 from interfaces.teleop.connection import Host
 from robots.onboard import LossPolicy
 from vrs.checks import one_of

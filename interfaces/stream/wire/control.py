@@ -1,4 +1,4 @@
-"""Control messages on the wire: `interfaces.stream.control`."""
+"""Control messages on the wire: `interfaces.messages.control`."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from typing import Annotated
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.link.packets import LinkFigures
-from interfaces.link.round_trip import Ping, Pong
-from interfaces.stream import control
-from interfaces.stream.control import ProblemCode, Role
-from interfaces.stream.wire.messages import Rate
-from interfaces.wire.fields import (
+from interfaces.messages import control
+from interfaces.messages.control import LinkFigures, Ping, Pong, ProblemCode, Role
+from interfaces.messages.fields import (
     Count,
     Epoch,
     Joints,
@@ -31,6 +28,7 @@ from interfaces.wire.fields import (
     numbers,
     text,
 )
+from interfaces.stream.wire.messages import Rate
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import InvalidValueError
 from vrs.model import Limits

@@ -25,9 +25,8 @@ from interfaces.messages import (
     ViewForm,
     Want,
 )
-from interfaces.stream.wire.segments import C, Dof, Segments, rows, segments_of
-from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
-from interfaces.wire.fields import (
+from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.messages.fields import (
     CommandId,
     Count,
     Epoch,
@@ -43,6 +42,7 @@ from interfaces.wire.fields import (
     numbers,
     text,
 )
+from interfaces.messages.segments import C, Dof, Segments, rows, segments_of
 
 Rate = Annotated[float, Meta(gt=0, le=1e4)]
 

@@ -10,24 +10,8 @@ from typing_extensions import override
 from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.file import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
-from interfaces.stream import mobile
-from interfaces.stream.control import Role
-from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
-from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
-from interfaces.teleop.architectures.sites import MOST_REPEATED
-from interfaces.teleop.driving.messages import (
-    MOST_POINTS,
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    Go,
-    Halt,
-    SensedPoints,
-    Task,
-    TaskReport,
-)
-from interfaces.wire.fields import (
+from interfaces.messages.control import Role
+from interfaces.messages.fields import (
     Count,
     Epoch,
     Message,
@@ -42,6 +26,22 @@ from interfaces.wire.fields import (
     digits,
     epoch,
     text,
+)
+from interfaces.stream import mobile
+from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
+from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
+from interfaces.teleop.architectures.sites import MOST_REPEATED
+from interfaces.teleop.driving.messages import (
+    MOST_POINTS,
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    Task,
+    TaskReport,
 )
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import JourneyState

@@ -7,11 +7,8 @@ from typing import Annotated, Generic
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.stream.wire.segments import C, Dof, Planned, rows, segments_of
-from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.samples import AGAIN, NEW, RANGES, Sample
-from interfaces.wire.commands import CommandWire, ReceiptWire, command_wire
-from interfaces.wire.fields import (
+from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
+from interfaces.messages.fields import (
     Count,
     Epoch,
     Joints,
@@ -27,6 +24,8 @@ from interfaces.wire.fields import (
     numbers,
     text,
 )
+from interfaces.messages.segments import C, Dof, Planned, rows, segments_of
+from interfaces.messages.sites import AGAIN, NEW, RANGES, LogEntry, Orders, PlanPart, Report, Sample
 
 MOST_ENTRIES = 4096
 """Entries or receipts in one message, at most."""

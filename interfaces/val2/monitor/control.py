@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Protocol, TypeAlias
 
 from typing_extensions import override
 
-from interfaces.stream.control import Lease, Problem
+from interfaces.messages.control import Lease, Problem
 from interfaces.val2.context import Event
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import TAKEN, ValError, robot_halted

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from interfaces.stream.control import OVERRULED
+from interfaces.messages.control import OVERRULED
 from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand

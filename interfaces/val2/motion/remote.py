@@ -16,8 +16,8 @@ from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
+    from interfaces.messages.control import State
     from interfaces.stream.connection import Connection
-    from interfaces.stream.control import State
 
 _PATIENCE: Final = 2.0
 """How long an answer waits for the edit that it speaks of to come, too [s]: a motion's from its end on."""

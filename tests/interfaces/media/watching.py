@@ -13,9 +13,9 @@ import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
+from interfaces.messages.control import Role
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
-from interfaces.stream.control import Role
 from interfaces.stream.server import application
 from robots.bullet.rooms import read_room
 from robots.ipr.camera import Lens

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from interfaces.link import Service, delay_profile
+from interfaces.messages.sites import PlanPart, Report
 from interfaces.recording.capture import Capture
 from interfaces.recording.messages import Begin, End
 from interfaces.recording.run_recorders import RunRecorder
@@ -16,7 +17,7 @@ from interfaces.runs.twin_run import TwinRun, fixed_offset
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.system import software
-from interfaces.teleop import OperatorSite, PlanPart, Report
+from interfaces.teleop import OperatorSite
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 from vrs.errors import VrsError

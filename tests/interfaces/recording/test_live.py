@@ -15,6 +15,8 @@ import pytest
 from interfaces import connect
 from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, TraceDelay, delay_profile
+from interfaces.messages.control import DirectionConditions, Impair
+from interfaces.messages.sites import Report
 from interfaces.recording import Recorder
 from interfaces.recording.figures import figures, summary
 from interfaces.recording.live import LiveRecorder, LiveRecording
@@ -26,9 +28,8 @@ from interfaces.recording.track import REAL
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
-from interfaces.stream.control import DirectionConditions, Impair
 from interfaces.stream.server import application
-from interfaces.teleop import OperatorSite, Report, RobotLine
+from interfaces.teleop import OperatorSite, RobotLine
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until
 from tests.interfaces.recording import shown
 from vrs import Insertion, JointTarget, MotionCommand, Status, SteerCommand

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from interfaces.messages.control import Role
 from interfaces.stream.access import make_tokens
-from interfaces.stream.control import Role
 from tests.interfaces.live_rig import child
 from tests.interfaces.station.opened import SERVE, Page, paged, station
 

@@ -14,7 +14,7 @@ import pytest
 from axe_core_python.sync_playwright import Axe
 
 from interfaces import connect
-from interfaces.stream.control import State
+from interfaces.messages.control import State
 from robots import puma560
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import SERVE, Page, paged, station, until

@@ -17,10 +17,10 @@ import pytest
 from axe_core_python.sync_playwright import Axe
 
 from interfaces.cli.main import exit_status
+from interfaces.messages.control import Role
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.stream.access import make_tokens
-from interfaces.stream.control import Role
 from robots import puma560
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import SERVE, Page, paged, station, until

@@ -13,8 +13,8 @@ from axe_core_python.sync_playwright import Axe
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from interfaces.messages.control import Role
 from interfaces.stream.access import make_tokens
-from interfaces.stream.control import Role
 from interfaces.val2.pages import LARGEST
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import PATIENCE, SERVE, Page, paged, station

@@ -24,9 +24,9 @@ from interfaces.jobs import (
     VoiceJob,
     WaitJob,
 )
-from interfaces.link import LinkFigures
-from interfaces.link.round_trip import Ping, Pong
-from interfaces.stream import control as c
+from interfaces.messages import control as c
+from interfaces.messages.control import LinkFigures, Ping, Pong
+from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
 from interfaces.stream import mobile as b
 from interfaces.teleop.architectures import ArchitectureReport as Followed
 from interfaces.teleop.architectures import ArcPacket, CellChanges
@@ -40,7 +40,6 @@ from interfaces.teleop.driving.messages import (
     SensedPoints,
     TaskReport,
 )
-from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState

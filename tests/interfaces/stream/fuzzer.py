@@ -15,11 +15,12 @@ import msgspec
 import numpy as np
 
 from interfaces.messages import Pulse
-from interfaces.stream import Encoding, ProtocolError, decode, encode
+from interfaces.messages.control import ProtocolError
+from interfaces.stream import Encoding, decode, encode
 from tests.interfaces.stream.same import same
 from vrs.commands import MotionCommand
 
-TRACED = ("/interfaces/stream/", "<planted>")
+TRACED = ("/interfaces/stream/", "/interfaces/messages/", "<planted>")
 MARKS: tuple[Any, ...] = (
     None, True, False, 0, 1, 2, 3, 5, 6, 7, 64, 65, 256, -1, 2**31, 2**53 + 1, 2**63 - 1, 2**63, 2**64 - 1,
     0.0, -0.0, 0.5, 1.0, 1e-300, 1e9, 1.1e9, 1e300, -1e300, math.inf, -math.inf, math.nan,

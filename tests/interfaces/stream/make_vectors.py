@@ -31,10 +31,11 @@ from interfaces.jobs import (
     WaitJob,
     digest,
 )
-from interfaces.link import ClockSync, LinkFigures, RoundTrip
-from interfaces.link.round_trip import Ping, Pong
+from interfaces.link import ClockSync, RoundTrip
+from interfaces.messages import control as c
+from interfaces.messages.control import LinkFigures, Ping, Pong
+from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.stream import Encoding, encode
-from interfaces.stream import control as c
 from interfaces.stream import mobile as b
 from interfaces.teleop.architectures import ArchitectureReport as Followed
 from interfaces.teleop.architectures import ArcPacket, CellChanges
@@ -48,8 +49,6 @@ from interfaces.teleop.driving.messages import (
     SensedPoints,
     TaskReport,
 )
-from interfaces.teleop.messages import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.samples import Sample
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState

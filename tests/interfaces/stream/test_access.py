@@ -5,8 +5,8 @@ import stat
 
 import pytest
 
+from interfaces.messages.control import Role
 from interfaces.stream.access import Access, bearer, check_host, check_origin, hosts, make_tokens, read_tokens
-from interfaces.stream.control import Role
 from vrs.errors import FormatError, InvalidValueError
 
 TOKENS = {Role.VIEWER: "v" * 43, Role.OPERATOR: "o" * 43, Role.ADMIN: "a" * 43, Role.SITE: "s" * 43}

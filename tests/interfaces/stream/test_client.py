@@ -6,12 +6,10 @@ import pytest
 from interfaces.clients.designer import Designer
 from interfaces.clients.observer import Observer
 from interfaces.clients.viewer import Viewer
-from interfaces.link.round_trip import Pong
-from interfaces.messages import Order, ViewForm
-from interfaces.stream import control
+from interfaces.messages import Order, ViewForm, control
+from interfaces.messages.control import Pong, ProblemCode, Role
 from interfaces.stream.client import FIRST_PONGS, KEPT, UNKNOWN, ClientCore, Phase
 from interfaces.stream.codec import Encoding, encode
-from interfaces.stream.control import ProblemCode, Role
 from tests.interfaces.joined import to
 from tests.interfaces.stream.joined import Joined
 from tests.interfaces.stream.served import ADMIN

@@ -16,14 +16,15 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from interfaces import messages as m
-from interfaces.stream import LARGEST, Encoding, ProblemCode, ProtocolError, SharedEncoder, decode, encode
-from interfaces.stream import control as c
+from interfaces.messages import control as c
+from interfaces.messages.commands import ReceiptWire
+from interfaces.messages.control import ProblemCode, ProtocolError
+from interfaces.messages.fields import MOST_NAMES
+from interfaces.messages.sites import Orders, Report
+from interfaces.stream import LARGEST, Encoding, SharedEncoder, decode, encode
 from interfaces.stream.codec import TYPES, WIRES
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.teleop.driving.messages import DriveOrders, DriveReport
-from interfaces.teleop.messages import Orders, Report
-from interfaces.wire.commands import ReceiptWire
-from interfaces.wire.fields import MOST_NAMES
 from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
 from vrs import JointTarget, MotionCommand, PolynomialSegment

@@ -8,8 +8,8 @@ import pytest
 
 from interfaces import connect
 from interfaces.messages import ViewForm
+from interfaces.messages.control import ProblemCode
 from interfaces.stream.client_socket import UnreachableError
-from interfaces.stream.control import ProblemCode
 from tests.interfaces.joined import to
 from tests.interfaces.stream.served import ADMIN, HOME, served
 

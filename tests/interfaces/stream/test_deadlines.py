@@ -19,9 +19,9 @@ from starlette.routing import Route
 from websockets.server import ServerProtocol
 from websockets.sync.client import connect
 
+from interfaces.messages.control import Hello, Role
 from interfaces.stream import sockets
 from interfaces.stream.codec import Encoding, encode
-from interfaces.stream.control import Hello, Role
 from interfaces.stream.limits import ClientLimits
 from interfaces.stream.sockets import SocketLimits
 from tests.interfaces.stream import serving

@@ -9,10 +9,10 @@ import pytest
 
 from interfaces.jobs import Load
 from interfaces.messages import Order, Outcome
+from interfaces.messages.control import Problem
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
-from interfaces.stream.control import Problem
 from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.mobile import Postures, Seen, Tasks, Wanted

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
+from interfaces.messages import segments
 from interfaces.stream import Encoding
 from interfaces.stream.codec import WIRES
-from interfaces.stream.wire import control, messages, segments, sites
+from interfaces.stream.wire import control, messages, sites
 from tests.interfaces.stream.fuzzer import Fuzzer
 from tests.interfaces.stream.make_vectors import PATH
 

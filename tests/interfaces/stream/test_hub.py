@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from interfaces.messages import Follow, Order, ViewForm
-from interfaces.stream import control
+from interfaces.messages import Follow, Order, ViewForm, control
+from interfaces.messages.control import ProblemCode, Role
 from interfaces.stream.codec import encode
-from interfaces.stream.control import ProblemCode, Role
 from interfaces.stream.limits import ClientLimits
 from tests.interfaces.joined import to
 from tests.interfaces.stream.served import ADMIN, make_hub

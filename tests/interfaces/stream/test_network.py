@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.link.round_trip import Ping
+from interfaces.messages import control
+from interfaces.messages.control import Attached, DirectionConditions, Impair, Ping, ProblemCode, Role, Survey
 from interfaces.recording.marks import OF_EVENTS, MarkKind
 from interfaces.runtime.live.emulation import LiveEmulation, late_often
-from interfaces.stream import control
-from interfaces.stream.control import Attached, DirectionConditions, Impair, ProblemCode, Role, Survey
 from interfaces.teleop import OperatorSite, RobotLine
 from tests.interfaces.stream.served import HOME, MODEL, make_hub
 from tests.interfaces.stream.test_session import Peer, holder

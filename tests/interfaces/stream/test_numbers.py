@@ -12,9 +12,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from interfaces.stream import Encoding, ProtocolError, decode
+from interfaces.messages.control import ProblemCode, ProtocolError, Role
+from interfaces.stream import Encoding, decode
 from interfaces.stream.codec import TYPES
-from interfaces.stream.control import ProblemCode, Role
 from interfaces.stream.limits import ClientLimits
 from tests.interfaces.stream.served import make_hub
 from tests.interfaces.stream.test_session import Peer

@@ -14,11 +14,9 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from interfaces.link.round_trip import Ping
-from interfaces.messages import Follow, ViewForm
-from interfaces.stream import control
+from interfaces.messages import Follow, ViewForm, control
+from interfaces.messages.control import Ping, Role
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
-from interfaces.stream.control import Role
 from interfaces.stream.session import HubSession
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.test_session import COMING

@@ -5,11 +5,9 @@ import random
 import msgspec
 import pytest
 
-from interfaces.link.round_trip import Ping, Pong
-from interfaces.messages import Ask, Follow, Order, Pulse, Reply, ViewForm, Want
-from interfaces.stream import control
+from interfaces.messages import Ask, Follow, Order, Pulse, Reply, ViewForm, Want, control
+from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, Role
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
-from interfaces.stream.control import Notice, ProblemCode, Role
 from interfaces.stream.limits import ClientLimits
 from tests.interfaces.joined import to
 from tests.interfaces.stream.served import ADMIN, HOME, make_hub

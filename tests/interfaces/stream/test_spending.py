@@ -11,14 +11,12 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from interfaces.link import LinkConditions
-from interfaces.link.round_trip import Ping
-from interfaces.messages import Follow, Order, ViewForm, Want
-from interfaces.stream import control
+from interfaces.messages import Follow, Order, ViewForm, Want, control
+from interfaces.messages.control import DirectionConditions, Impair, Network, Ping, ProblemCode, Role, Survey
+from interfaces.messages.sites import Report
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
-from interfaces.stream.control import DirectionConditions, Impair, Network, ProblemCode, Role, Survey
 from interfaces.stream.limits import Allowance, Allowances, ClientLimits
 from interfaces.stream.server import Slices
-from interfaces.teleop import Report
 from tests.interfaces.stream.served import HOME, make_hub, served
 from tests.interfaces.stream.test_network import emulated
 from tests.interfaces.stream.test_session import Peer, holder, to

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 from interfaces.clients.designer import Designer
 from interfaces.clients.viewer import Viewer
-from interfaces.stream import control
+from interfaces.messages import control
+from interfaces.messages.control import Role
 from interfaces.stream.client import Phase
-from interfaces.stream.control import Role
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.control import LeaseControl, SharedController
 from interfaces.val2.monitor.files import Files

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from interfaces.stream.control import Lease, Problem, ProblemCode
+from interfaces.messages.control import Lease, Problem, ProblemCode
 from interfaces.val2.monitor.control import FOLLOW_TIMEOUT, LEASE_TIMEOUT, ControlState, LeaseControl
 from robots.onboard.lease import LeaseState
 

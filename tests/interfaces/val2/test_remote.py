@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from interfaces import Designer, Viewer, connect
-from interfaces.stream.control import Lease
+from interfaces.messages.control import Lease
 from interfaces.teleop import OperatorSite, RobotSiteConfig
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot, arm_for

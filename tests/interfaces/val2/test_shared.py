@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.stream import control
+from interfaces.messages import control
 from tests.interfaces.joined import to
 from tests.interfaces.val2.shared import Pair
 from vrs.commands import SteerCommand, Stop

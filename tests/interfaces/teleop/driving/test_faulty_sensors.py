@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.messages.control import Role
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.stream.control import Role
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving.messages import DriveReport
 from robots.ipr.chassis import Senses

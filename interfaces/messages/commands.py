@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.wire.fields import (
+from interfaces.messages.fields import (
     MOST_NAMES,
     Count,
     Joints,

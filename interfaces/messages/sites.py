@@ -3,12 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final, NamedTuple
 
-from interfaces.teleop.samples import Ranges, Sample
 from vrs.commands import Command
 from vrs.ledger import Receipt
 from vrs.model import Array
 from vrs.segment import PolynomialSegment
+
+NEW: Final = 128
+"""New samples in one report, at most; the older ones are asked for."""
+AGAIN: Final = 32
+"""Samples in one report that were asked for, at most."""
+RANGES: Final = 32
+"""Ranges of samples that are asked for in one message, at most."""
+
+Ranges = tuple[tuple[int, int], ...]
+"""First and last number of each range."""
+
+
+class Sample(NamedTuple):
+    """Where the robot was measured once."""
+
+    number: int
+    """Counts the samples of a robot's site, without gaps; 0 of a robot that doesn't number them."""
+    t: float
+    """When, by the robot's clock [s]."""
+    play: float
+    """Time on the robot's timeline that it played then [s]."""
+    q: Array
+    """Measured joints [rad], (n,)."""
+    reference: Array | None = None
+    """What the robot's own timeline asked for at `play` [rad], (n,); None of a robot that doesn't say."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from interfaces.wire.fields import MOST_JOINTS, CommandId, Finite, Seconds, Time
+from interfaces.messages.fields import MOST_JOINTS, CommandId, Finite, Seconds, Time
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 from vrs.segment import PolynomialSegment, known_segment

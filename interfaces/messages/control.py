@@ -11,11 +11,51 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, TypeAlias
 
-from interfaces.link.packets import LinkFigures
-from interfaces.link.round_trip import Ping, Pong
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import FormatError
 from vrs.model import Array, Limits
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """Either side: an answer at once, please; it also measures the round trip."""
+
+    kind: ClassVar[str] = "ping"
+    version: ClassVar[int] = 1
+    number: int
+    t: float
+    """When it left, by the sender's clock [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pong:
+    """Either side: the answer to a `Ping`."""
+
+    kind: ClassVar[str] = "pong"
+    version: ClassVar[int] = 1
+    number: int
+    t: float
+    """The ping's."""
+    received: float
+    """When that arrived, by the answerer's clock [s]."""
+    answered: float
+    """When this left, by the answerer's clock [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFigures:
+    """Sums over the newest packets."""
+
+    packets: int
+    """So many were sent, those that are still under way among them."""
+    lost: float | None
+    """Share of them that was lost; None of none."""
+    median: float | None
+    """Of the time between sending and delivery of those that arrived [s]; None where none did."""
+    p95: float | None
+    """Delay that 95 % of those kept within [s]."""
+    span: float | None = None
+    """Over how long they were sent, up to now [s]; None where that isn't known."""
 
 
 @dataclass(frozen=True, slots=True)
