@@ -6,99 +6,100 @@ Frozen values, like those of `interfaces.messages`. Times are session times: the
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
+from msgspec import Meta
+
+from interfaces.messages import fields
+from interfaces.messages.fields import (
+    MOST_JOINTS,
+    Count,
+    Epoch,
+    Leased,
+    Message,
+    Name,
+    Number,
+    Rate,
+    Span,
+    Stamp,
+    Text,
+    Time,
+    Timeout,
+    Value,
+    Wire,
+    Word,
+)
 from robots.onboard.lease import LeaseEnd, LeaseState
-from vrs.errors import FormatError
+from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, Limits
 
 
-@dataclass(frozen=True, slots=True)
-class Ping:
+class Ping(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
     """Either side: an answer at once, please; it also measures the round trip."""
 
-    kind: ClassVar[str] = "ping"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
+    number: Number
+    t: Stamp
     """When it left, by the sender's clock [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Pong:
+class Pong(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
     """Either side: the answer to a `Ping`."""
 
-    kind: ClassVar[str] = "pong"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
+    number: Number
+    t: Stamp
     """The ping's."""
-    received: float
+    received: Stamp
     """When that arrived, by the answerer's clock [s]."""
-    answered: float
+    answered: Stamp
     """When this left, by the answerer's clock [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class LinkFigures:
+class LinkFigures(Wire, frozen=True, omit_defaults=True, gc=False):
     """Sums over the newest packets."""
 
-    packets: int
+    packets: Count = 0
     """So many were sent, those that are still under way among them."""
-    lost: float | None
+    lost: fields.Share | None = None
     """Share of them that was lost; None of none."""
-    median: float | None
+    median: Span | None = None
     """Of the time between sending and delivery of those that arrived [s]; None where none did."""
-    p95: float | None
+    p95: Span | None = None
     """Delay that 95 % of those kept within [s]."""
-    span: float | None = None
+    span: Span | None = None
     """Over how long they were sent, up to now [s]; None where that isn't known."""
 
 
-@dataclass(frozen=True, slots=True)
-class DirectionConditions:
+class DirectionConditions(Wire, frozen=True, omit_defaults=True, gc=False):
     """What is emulated in one direction, as the command line spells it."""
 
-    delay: str
+    delay: Word
     """A delay profile: `interfaces.link.delay_profile`."""
-    loss: str = "0"
+    loss: Word = "0"
     """A loss model: `interfaces.link.loss_model`."""
-    service: str = "datagram"
+    service: Word = "datagram"
     """`datagram` or `in-order`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Survey:
+class Survey(Message, frozen=True, omit_defaults=True, gc=False, tag="survey"):
     """Client: how is the way to the robot? Changes of it are told from then on."""
 
-    kind: ClassVar[str] = "survey"
-    version: ClassVar[int] = 1
-    number: int
+    number: Number
 
 
-@dataclass(frozen=True, slots=True)
-class Impair:
+class Impair(Leased, frozen=True, omit_defaults=True, gc=False, tag="impair"):
     """Holder: other conditions of the emulated way to the robot, from now on."""
 
-    kind: ClassVar[str] = "impair"
-    version: ClassVar[int] = 1
-    number: int
-    epoch: int
+    number: Number
+    epoch: Epoch
     forward: DirectionConditions | None = None
     """To the robot; None leaves them as they are."""
     backward: DirectionConditions | None = None
     """Back."""
 
 
-@dataclass(frozen=True, slots=True)
-class Network:
+class Network(Message, frozen=True, omit_defaults=True, gc=False, tag="network"):
     """Server: how the way to the robot is."""
 
-    kind: ClassVar[str] = "network"
-    version: ClassVar[int] = 1
     forward: DirectionConditions
     """What is emulated to the robot."""
     backward: DirectionConditions
@@ -109,32 +110,37 @@ class Network:
     """The same of the way back."""
     round_trip: LinkFigures
     """Of whole round trips between the sites, with the network beneath; nothing is known of losses."""
-    seed: int = 0
+    seed: Count = 0
     """Of what is random in the emulation."""
-    changed_at: float | None = None
+    changed_at: Time | None = None
     """Session time when the conditions changed last [s]; None if they never did."""
-    changed_by: str = ""
+    changed_by: Word = ""
     """Name of who changed them."""
-    robot: str = ""
+    robot: Word = ""
     """Where the robot's site is."""
-    problem: str = ""
+    problem: Text = ""
     """Why there's no connection to it; empty while there is one."""
-    clock: float | None = None
+    clock: Span | None = None
     """Bound on the error of what the robot takes for session time [s]."""
-    link_loss: str = ""
+    link_loss: Word = ""
     """What the robot does when nothing is heard, `halt` or `hold`; empty while that isn't known."""
-    timeout: float | None = None
+    timeout: Span | None = None
     """So long after the last message that counts it does that [s]."""
-    max_age: float | None = None
+    max_age: Span | None = None
     """Older messages don't count under `halt` [s]."""
-    offset: float | None = None
+    offset: Time | None = None
     """D, where it's fixed [s]; None where it adapts, or isn't known."""
-    advice: str = ""
+    advice: Text = ""
     """What is likely to go wrong under these conditions, for people."""
-    answers: int | None = None
+    answers: Number | None = None
     """Number of the receiver's request that this answers."""
 
 
+Poses = Annotated[dict[Name, Array], Meta(max_length=100)]
+MOST_MESSAGES = 64
+"""Messages to the robot that a state tells of, at most."""
+MOST_LATE = 128
+"""Measurements that a state tells late, at most."""
 PROTOCOL = 1
 """Version of the protocol."""
 OVERRULED = "no lease: another session of it has given a command since; share it again"
@@ -189,38 +195,35 @@ class ProblemCode(enum.StrEnum):
     """The server failed at this client's message; nobody else is affected."""
 
 
-@dataclass(frozen=True, slots=True)
-class Hello:
+class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     """Client: who it is; its first message."""
 
-    kind: ClassVar[str] = "hello"
-    version: ClassVar[int] = 1
+    secrets: ClassVar[tuple[str, ...]] = ("token", "session")
+    protocol: Number
+    """Highest version that it speaks."""
+
     role: Role
-    name: str
+    name: Name
     """For people, 1 to 100 characters."""
-    token: str | None = field(default=None, repr=False)
-    session: str | None = field(default=None, repr=False)
+    token: Word | None = None
+    session: Word | None = None
     """An earlier session of this client, to go on with."""
-    protocol: int = PROTOCOL
-    link_loss: str | None = None
+    link_loss: Word | None = None
     """Of an operator's site: what the robot is to do when nothing is heard, `halt` or `hold`; None leaves it to the
     robot."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lease:
+class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
     """Server: who may command; sent when it changes."""
 
-    kind: ClassVar[str] = "lease"
-    version: ClassVar[int] = 1
     state: LeaseState
-    epoch: int | None = None
+    epoch: Epoch | None = None
     """Of the lease in force; told to its holder only, and to those who share it."""
-    holder: str | None = None
+    holder: Name | None = None
     """Name of who has it."""
     yours: bool = False
     """Whether the receiver has it, and keeps it."""
-    answers: int | None = None
+    answers: Number | None = None
     """Number of the receiver's request that this answers."""
     ended: LeaseEnd | None = None
     """How the lease before ended; None if there was none."""
@@ -233,176 +236,157 @@ class Lease:
         return self.state is LeaseState.HELD and (self.yours or self.shared)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Welcome:
+class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="welcome"):
     """Server: the client may go on; what there is."""
 
-    kind: ClassVar[str] = "welcome"
-    version: ClassVar[int] = 1
-    session: str = field(repr=False)
+    secrets: ClassVar[tuple[str, ...]] = ("session",)
+    protocol: Number
+    """Version of the protocol that is spoken."""
+
+    session: Word
     """Names this session, for a later `Hello`; nobody else may know it."""
     role: Role
-    robot: str
+    robot: Word
     """Name of the robot's model."""
+    dof: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    """Its joints, n."""
     limits: Limits
-    poses: Mapping[str, Array]
+    poses: Poses
     """Named poses, joints [rad], (n,)."""
-    now: float
+    now: Time
     """Session time [s]."""
     lease: Lease
-    rates: tuple[float, ...] = ()
+    lease_timeout: Timeout
+    """A lease expires so long after the last beat [s]."""
+    rates: Annotated[tuple[Rate, ...], Meta(max_length=100)] = ()
     """Rates of the broadcasters [1/s]."""
     resumed: bool = False
     """Whether the session that was asked for goes on."""
-    instance: str = ""
+    instance: Word = ""
     """Names this run of the server; with another one, there's another timeline."""
-    server: str = ""
+    server: Word = ""
     """Name and version of the program."""
-    lease_timeout: float = 2.0
-    """A lease expires so long after the last beat [s]."""
-    protocol: int = PROTOCOL
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "poses", MappingProxyType(dict(self.poses)))
+        widths = {len(q) for q in self.poses.values()} | {self.limits.dof}
+        if widths != {self.dof}:
+            raise InvalidValueError("dof", self.dof, f"as wide as limits and poses, {sorted(widths)}")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Attached:
+class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="attached"):
     """Robot: follows the operator's site that said hello; what it is and how it behaves."""
 
-    kind: ClassVar[str] = "attached"
-    version: ClassVar[int] = 1
-    robot: str
+    protocol: Number
+    """Version of the protocol that is spoken."""
+
+    robot: Word
     """Name of the robot's model."""
     q: Array
     """Measured joints [rad], (n,); of a mobile robot its posture, x, y, θ [m, m, rad]."""
-    link_loss: str
+    link_loss: Word
     """What it does when nothing is heard: `halt` or `hold`."""
-    timeout: float
+    timeout: Timeout
     """So long after the last message that counts it begins to stop under `halt` [s]."""
-    offset: float | None = None
+    offset: Time | None = None
     """The robot's timeline less the session's time, where it's fixed [s]; None where it adapts."""
-    instance: str = ""
+    instance: Word = ""
     """Names this run of the robot's site."""
-    server: str = ""
+    server: Word = ""
     """Name and version of the program."""
-    protocol: int = PROTOCOL
-    max_age: float | None = None
+    max_age: Timeout | None = None
     """Older messages don't count under `halt` [s]; None where that isn't known, or under `hold`."""
-    architecture: str = ""
+    architecture: Word = ""
     """Of a mobile robot: what it does with the operator's path, by name."""
-    room: str = ""
+    room: Word = ""
     """Of a mobile robot: name of the room that it drives in."""
 
 
-@dataclass(frozen=True, slots=True)
-class Acquire:
+class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):
     """Client: the lease, please, if it's free."""
 
-    kind: ClassVar[str] = "acquire"
-    version: ClassVar[int] = 1
-    number: int
+    number: Number
 
 
-@dataclass(frozen=True, slots=True)
-class TakeOver:
+class TakeOver(Message, frozen=True, omit_defaults=True, gc=False, tag="take-over"):
     """Admin: the lease, please, whoever has it. The robot stops in between."""
 
-    kind: ClassVar[str] = "take-over"
-    version: ClassVar[int] = 1
-    number: int
+    number: Number
 
 
-@dataclass(frozen=True, slots=True)
-class Release:
+class Release(Leased, frozen=True, omit_defaults=True, gc=False, tag="release"):
     """Holder: gives the lease back."""
 
-    kind: ClassVar[str] = "release"
-    version: ClassVar[int] = 1
-    number: int
-    epoch: int
+    number: Number
+    epoch: Epoch
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
+class Share(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
     """Client: the epoch of the lease that a session of the same person has, please."""
 
-    kind: ClassVar[str] = "share"
-    version: ClassVar[int] = 1
-    number: int
-    session: str = field(repr=False)
+    secrets: ClassVar[tuple[str, ...]] = ("session",)
+
+    number: Number
+    session: Word
     """The holder's, from its `Welcome`: whoever knows it was told by the holder."""
 
 
-@dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(Leased, frozen=True, omit_defaults=True, gc=False, tag="resume"):
     """Holder: the robot may go on after it stopped by itself."""
 
-    kind: ClassVar[str] = "resume"
-    version: ClassVar[int] = 1
-    number: int
-    epoch: int
+    number: Number
+    epoch: Epoch
 
 
-@dataclass(frozen=True, slots=True)
-class Beat:
+class Beat(Leased, frozen=True, omit_defaults=True, gc=False, tag="beat"):
     """Holder: is still there."""
 
-    kind: ClassVar[str] = "beat"
-    version: ClassVar[int] = 1
-    epoch: int
+    epoch: Epoch
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(Message, frozen=True, omit_defaults=True, gc=False, tag="problem"):
     """Either side: what can't be taken, to its sender."""
 
-    kind: ClassVar[str] = "problem"
-    version: ClassVar[int] = 1
     code: ProblemCode
-    text: str
+    text: Text
     """For people."""
-    number: int | None = None
+    number: Number | None = None
     """Number of what it's about, where that's known."""
     fatal: bool = False
     """Whether the connection ends."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
+class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):
     """Server: the real robot as it was last heard of; the newest one counts."""
 
-    kind: ClassVar[str] = "state"
-    version: ClassVar[int] = 1
-    number: int
-    t: float
+    number: Number
+    t: Time
     """Session time when it was measured [s]."""
     q: Array
     """Measured joints [rad], (n,)."""
-    play: float
+    play: Time
     """Time on the robot's timeline that it plays [s]."""
-    pace: float
+    pace: Value
     """How fast it plays; 1 is as planned."""
-    D: float
+    D: Time
     """The robot's timeline less session time [s]."""
-    following_error: float
+    following_error: Value
     """Largest difference of a joint from its reference [rad]."""
-    epoch: int = 0
-    """Epoch that it follows; 0 for none."""
+    epoch: Epoch | None = None
+    """That it follows; None for none."""
     connected: bool = True
     """Whether the robot's site is heard of."""
-    halted: str = ""
+    halted: Text = ""
     """Why it stopped by itself; empty while it follows."""
-    corrections: int = 0
+    corrections: Count = 0
     """How often the virtual robot was put where the real one goes."""
     reference: Array | None = None
     """What the robot's own timeline asked for at t [rad], (n,); None where it hasn't said."""
-    round_trip: float | None = None
+    round_trip: Value | None = None
     """Newest time that a message to the robot and the answer were under way [s]; None before the first."""
-    messages: tuple[tuple[float, float | None], ...] = ()
+    messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
     """Messages to the robot of which the emulated link told since the state before: when each was sent, and when it
     arrived [s]; None for one that was lost."""
-    late: tuple[tuple[float, Array], ...] = ()
+    late: Annotated[tuple[tuple[Time, Array], ...], Meta(max_length=MOST_LATE)] = ()
     """Measurements that came late: session time [s], and joints [rad], (n,). Some are told twice."""
 
 

@@ -9,12 +9,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias
 
+import msgspec
+
 from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.site import earliest
 from interfaces.link.clock_sync import ClockSync
 from interfaces.link.round_trip import RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request, control
 from interfaces.messages.control import Impair, Network, Notice, Ping, Pong, ProblemCode, Role, Survey
+from interfaces.messages.fields import Epoch
 from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
 from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 
@@ -46,8 +49,8 @@ Asked: TypeAlias = (
     | Impair
     | TaskOrder
 )
-Ask: TypeAlias = Callable[[int, int], Asked]
-"""Makes a wish of its number and the epoch."""
+Ask: TypeAlias = Callable[[int], Asked]
+"""Makes a wish of its number."""
 Replied: TypeAlias = control.Lease | control.Problem | Network | Tasks
 """What answers one."""
 
@@ -93,7 +96,7 @@ class ClientCore:
             token: What the role needs.
             encoding: How its messages are written.
         """
-        self._hello = control.Hello(Role(role), name, token)
+        self._hello = control.Hello(control.PROTOCOL, Role(role), name, token)
         self.encoding = Encoding(encoding)
         self.port = RemotePort()
         self.sync = ClockSync()
@@ -136,7 +139,7 @@ class ClientCore:
         session = None if self.welcome is None else self.welcome.session
         self.phase = Phase.GREETING
         self._heard = now
-        self._out = [encode(replace(self._hello, session=session), self.encoding)]
+        self._out = [encode(msgspec.structs.replace(self._hello, session=session), self.encoding)]
 
     def disconnected(self) -> None:
         """The connection is gone; who waits for the answer to a wish isn't told any more."""
@@ -146,18 +149,19 @@ class ClientCore:
         self._ping_due = math.inf
         lost = control.Problem(ProblemCode.STOPPING, "the connection was lost before an answer came")
         for number, answer in self._answers.items():
-            self._answers[number] = answer or replace(lost, number=number)
+            self._answers[number] = answer or msgspec.structs.replace(lost, number=number)
 
     def is_silent(self, now: float) -> bool:
         """Whether the server wasn't heard for too long; the connection is then to be given up."""
         return self.phase in {Phase.GREETING, Phase.OPEN} and now >= self._heard + SILENCE
 
-    def wish(self, ask: Ask, *, now: float) -> int:
+    def wish(self, ask: Ask, *, now: float, leased: bool = False) -> int:
         """Ask something of the lease, or of the way to the robot.
 
         Args:
-            ask: Makes the message.
+            ask: Makes the message, of the wish's number.
             now: Local time [s].
+            leased: Whether only who has the lease may ask that.
 
         Returns:
             Number of the wish, for `answer`.
@@ -167,15 +171,14 @@ class ClientCore:
         self._answers[number] = None
         if len(self._answers) > KEPT:
             self._answers.popitem(last=False)
-        wish = ask(number, self.epoch)
         if self.phase is not Phase.OPEN:
             text = "there's no connection"
             self._answers[number] = control.Problem(ProblemCode.STOPPING, text, number)
-        elif isinstance(wish, control.Release | control.Resume | Impair | TaskOrder) and not self.epoch:
+        elif leased and not self.epoch:
             text = "this client has no lease"
             self._answers[number] = control.Problem(ProblemCode.STALE_EPOCH, text, number)
         else:
-            self._send(wish)
+            self._send(ask(number))
         if self._beat_due < math.inf:
             self._beat_due = min(self._beat_due, now)
         return number
@@ -291,7 +294,7 @@ class ClientCore:
             for request in requests:
                 self._pass(request)
             if now >= self._beat_due and self.epoch and self.welcome is not None:
-                self._send(control.Beat(self.epoch))
+                self._send(control.Beat(Epoch(self.epoch)))
                 self._beat_due = now + self.welcome.lease_timeout / BEATS
         else:
             for request in requests:

@@ -14,12 +14,11 @@ import msgspec
 from interfaces import messages
 from interfaces.messages import Reply, Request, control
 from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, ProtocolError, Question
+from interfaces.messages.fields import LONGEST_TEXT, check_normal, cut, plain, rich
 from interfaces.messages.fields import Message as Wire
-from interfaces.messages.fields import check_normal, plain
 from interfaces.messages.segments import Packed, Plain
 from interfaces.messages.sites import Orders, Report
 from interfaces.stream import mobile
-from interfaces.stream.wire import control as control_wires
 from interfaces.stream.wire import messages as message_wires
 from interfaces.stream.wire import mobile as mobile_wires
 from interfaces.stream.wire import sites
@@ -60,23 +59,23 @@ WIRES: dict[type, type[Wire]] = {
     messages.History: message_wires.HistoryWire,
     messages.Change: message_wires.ChangeWire,
     messages.Pulse: message_wires.PulseWire,
-    control.Hello: control_wires.HelloWire,
-    control.Welcome: control_wires.WelcomeWire,
-    control.Attached: control_wires.AttachedWire,
-    Ping: control_wires.PingWire,
-    Pong: control_wires.PongWire,
-    control.Acquire: control_wires.AcquireWire,
-    control.TakeOver: control_wires.TakeOverWire,
-    control.Share: control_wires.ShareWire,
-    control.Release: control_wires.ReleaseWire,
-    control.Resume: control_wires.ResumeWire,
-    control.Beat: control_wires.BeatWire,
-    control.Lease: control_wires.LeaseWire,
-    control.Problem: control_wires.ProblemWire,
-    control.State: control_wires.StateWire,
-    control.Survey: control_wires.SurveyWire,
-    control.Impair: control_wires.ImpairWire,
-    control.Network: control_wires.NetworkWire,
+    control.Hello: control.Hello,
+    control.Welcome: control.Welcome,
+    control.Attached: control.Attached,
+    Ping: Ping,
+    Pong: Pong,
+    control.Acquire: control.Acquire,
+    control.TakeOver: control.TakeOver,
+    control.Share: control.Share,
+    control.Release: control.Release,
+    control.Resume: control.Resume,
+    control.Beat: control.Beat,
+    control.Lease: control.Lease,
+    control.Problem: control.Problem,
+    control.State: control.State,
+    control.Survey: control.Survey,
+    control.Impair: control.Impair,
+    control.Network: control.Network,
     Orders: sites.OrdersWire,
     Report: sites.ReportWire,
     mobile.MobileWelcome: mobile_wires.MobileWelcomeWire,
@@ -131,7 +130,13 @@ def encode(message: Value, encoding: Encoding) -> bytes:
     kind = WIRES.get(type(message))
     if kind is None:
         raise InvalidValueError("message", message, f"one of {', '.join(known.__name__ for known in WIRES)}")
-    return _WRITERS[encoding](kind.of(message, encoding is Encoding.MSGPACK))
+    wire: Any = message if kind is type(message) else kind.of(message, encoding is Encoding.MSGPACK)
+    write = _WRITERS[encoding]
+    try:
+        data = write(wire)
+    except UnicodeEncodeError:
+        return write(cut(wire))
+    return data if len(data) <= LONGEST_TEXT else write(cut(wire))
 
 
 def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARGEST) -> Any:
@@ -152,7 +157,7 @@ def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARG
         wire = _reader(encoding, allowed)(data)
         if type(wire) in ASKED:
             check_normal(wire, str(wire.__struct_config__.tag))
-        return wire.read()
+        return wire if type(wire) in WIRES else wire.read()
     except msgspec.ValidationError as error:
         raise _invalid(data, encoding, allowed, str(error)) from None
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
@@ -186,7 +191,9 @@ def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
         if issubclass(kind, Generic):
             kind = kind[Packed if packed else Plain]
         union = kind if union is None else union | kind
-    reader: Callable[[bytes], Wire] = (msgspec.msgpack if packed else msgspec.json).Decoder(union).decode
+    reader: Callable[[bytes], Wire] = (
+        (msgspec.msgpack if packed else msgspec.json).Decoder(union, dec_hook=rich).decode
+    )
     return reader
 
 

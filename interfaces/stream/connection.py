@@ -26,6 +26,7 @@ from interfaces.messages.control import (
     Survey,
     Welcome,
 )
+from interfaces.messages.fields import Epoch
 from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
 from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
 from interfaces.stream.codec import Encoding
@@ -164,7 +165,7 @@ class RobotConnection(Generic[C]):
         Returns:
             The lease, `yours` if it was given; or why not.
         """
-        return _of_lease(self._wish(lambda number, _: control.Acquire(number), wait))
+        return _of_lease(self._wish(control.Acquire, wait))
 
     def take_over(self, *, wait: float = 5.0) -> Lease | Problem:
         """Take the lease from whoever has it: for an admin. Waits until the robot has stopped.
@@ -175,7 +176,7 @@ class RobotConnection(Generic[C]):
         Returns:
             The lease as it's then, `yours` if it was given; or why not.
         """
-        answer = _of_lease(self._wish(lambda number, _: control.TakeOver(number), wait))
+        answer = _of_lease(self._wish(control.TakeOver, wait))
         if isinstance(answer, Lease) and not answer.yours:
             self._session.wait(lambda: self._session.core.epoch > 0, wait)
             return self.lease or answer
@@ -193,13 +194,13 @@ class RobotConnection(Generic[C]):
         Returns:
             The lease, `shared` if it is; or why not.
         """
-        return _of_lease(self._wish(lambda number, _: control.Share(number, session), wait))
+        return _of_lease(self._wish(lambda number: control.Share(number, session), wait))
 
     def ask_to_share(self, session: str) -> int:
         """As `share`, without waiting; the number for `answer`."""
         core = self._session.core
         return self._session.do(
-            lambda _: core.wish(lambda number, _: control.Share(number, session), now=self._clock.now())
+            lambda _: core.wish(lambda number: control.Share(number, session), now=self._clock.now())
         )
 
     def answer(self, number: int) -> Lease | Problem | None:
@@ -209,15 +210,15 @@ class RobotConnection(Generic[C]):
 
     def release(self, *, wait: float = 5.0) -> Lease | Problem:
         """Give the lease back, and the robot stops; or the share, without a stop."""
-        return _of_lease(self._wish(control.Release, wait))
+        return _of_lease(self._wish(lambda number: control.Release(number, self._epoch), wait, leased=True))
 
     def resume(self, *, wait: float = 5.0) -> Lease | Problem:
         """Let the robot go on after it stopped by itself."""
-        return _of_lease(self._wish(control.Resume, wait))
+        return _of_lease(self._wish(lambda number: control.Resume(number, self._epoch), wait, leased=True))
 
     def survey(self, *, wait: float = 5.0) -> Network | Problem:
         """Ask how the emulated way to the robot is, and what was measured of it."""
-        return _of_network(self._wish(lambda number, _: Survey(number), wait))
+        return _of_network(self._wish(Survey, wait))
 
     def impair(
         self, forward: DirectionConditions | None, backward: DirectionConditions | None, *, wait: float = 5.0
@@ -232,11 +233,17 @@ class RobotConnection(Generic[C]):
         Returns:
             The way as it is then; or why not.
         """
-        return _of_network(self._wish(lambda number, epoch: Impair(number, epoch, forward, backward), wait))
+        return _of_network(
+            self._wish(lambda number: Impair(number, self._epoch, forward, backward), wait, leased=True)
+        )
 
-    def _wish(self, ask: Ask, wait: float) -> Replied:
+    @property
+    def _epoch(self) -> Epoch:
+        return Epoch(self._session.core.epoch)
+
+    def _wish(self, ask: Ask, wait: float, *, leased: bool = False) -> Replied:
         core = self._session.core
-        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now()))
+        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
         self._session.wait(lambda: core.answer(number) is not None, wait)
         missing = Problem(ProblemCode.STOPPING, f"no answer within {wait:g} s", number)
         return core.answer(number) or missing
@@ -424,7 +431,7 @@ class MobileConnection(RobotConnection[MobileCore]):
         return self.wait(lambda _: self.tasks is not None and self.tasks.doing is Doing.NOTHING, timeout)
 
     def _ask(self, wanted: Wanted, wait: float) -> Tasks | Problem:
-        answer: Replied = self._wish(lambda number, epoch: TaskOrder(number, epoch, wanted), wait)
+        answer: Replied = self._wish(lambda number: TaskOrder(number, self._epoch, wanted), wait, leased=True)
         return answer if isinstance(answer, Tasks | Problem) else ELSE
 
     @property

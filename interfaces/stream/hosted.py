@@ -72,9 +72,11 @@ def arms(site: Hosted) -> Greeter:
 
     def welcome(greeting: Greeting) -> control.Welcome:
         return control.Welcome(
+            protocol=control.PROTOCOL,
             robot=model.name,
+            dof=model.limits.dof,
             limits=model.limits,
-            poses=model.poses,
+            poses=dict(model.poses),
             rates=tuple(broadcaster.rate for broadcaster in site.broadcasters),
             **greeting._asdict(),
         )

@@ -6,8 +6,10 @@ import base64
 import math
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol
+
+import msgspec
 
 from interfaces.engine_server.site import earliest
 from interfaces.messages import control
@@ -342,7 +344,7 @@ class Hub:
         if found is None or version != self.network_version or now >= at + SURVEYED:
             found = self.emulation.network(now=now)
             self._surveyed = now, self.network_version, found
-        return found if found is None or answers is None else replace(found, answers=answers)
+        return found if found is None or answers is None else msgspec.structs.replace(found, answers=answers)
 
     def impair(self, seat: SessionState, wish: Impair, now: float) -> Problem | None:
         """Let the holder of the lease change the way to the robot; why not, None where it's done."""

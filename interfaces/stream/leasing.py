@@ -7,6 +7,7 @@ from typing import Protocol
 
 from interfaces.messages import Order, control
 from interfaces.messages.control import OVERRULED, Problem, ProblemCode, Role
+from interfaces.messages.fields import Epoch
 from interfaces.stream.session import SessionState, Wish
 from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
 
@@ -192,5 +193,5 @@ class Leasing:
     def seen_by(self, seat: SessionState, answers: int | None = None) -> control.Lease:
         """The lease as a client sees it: its epoch is told to its holder only, and to who shares it."""
         lease, yours, shared = self._lease, seat is self.holder, self._shares.get(seat, False)
-        epoch = lease.epoch if yours or shared else None
+        epoch = Epoch(lease.epoch) if lease.epoch and (yours or shared) else None
         return control.Lease(lease.state, epoch, lease.holder, yours, answers, self._ended, shared)

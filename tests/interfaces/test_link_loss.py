@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from websockets.sync.client import connect
 
-from interfaces.messages.control import Hello, Role
+from interfaces.messages.control import PROTOCOL, Hello, Role
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import RobotSiteConfig
 from robots.onboard import LossPolicy, WatchdogConfig
@@ -153,10 +153,10 @@ def test_a_mobile_robot_that_halts_names_what_mends_it():
 
 def test_the_wish_is_optional_on_the_wire():
     for loss in (None, "hold"):
-        hello = Hello(Role.SITE, "vrs serve", None, "life", link_loss=loss)
+        hello = Hello(PROTOCOL, Role.SITE, "vrs serve", None, "life", link_loss=loss)
         for encoding in Encoding:
             assert decode(encode(hello, encoding), encoding, allowed=Hello) == hello
-    plain = json.loads(encode(Hello(Role.SITE, "vrs serve", None, "life"), Encoding.JSON))
+    plain = json.loads(encode(Hello(PROTOCOL, Role.SITE, "vrs serve", None, "life"), Encoding.JSON))
     assert "link_loss" not in plain
 
 

@@ -21,7 +21,7 @@ from typing_extensions import override
 
 from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
-from interfaces.messages.control import Attached
+from interfaces.messages.control import PROTOCOL, Attached
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.teleop.architectures import (
@@ -316,7 +316,7 @@ class LiveMobileRobot:
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         posture = np.array(self._position.posture())
         return Attached(
-            "ipr", posture, loss, timeout, None, self.instance, config.server, max_age=age,
+            PROTOCOL, "ipr", posture, loss, timeout, None, self.instance, config.server, max_age=age,
             architecture=config.architecture, room=config.room.name,
         )  # fmt: skip
 

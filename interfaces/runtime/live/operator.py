@@ -16,7 +16,8 @@ from typing_extensions import override
 
 from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
-from interfaces.messages.control import Attached, Role, State
+from interfaces.messages.control import MOST_MESSAGES, Attached, Role, State
+from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import Report
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN as RECORD
@@ -296,13 +297,13 @@ class LiveOperator(LeasedRobot):
                 pace=report.pace,
                 D=report.q_at - report.measured_at,
                 following_error=float(np.abs(expected - report.q).max()),
-                epoch=report.epoch,
+                epoch=Epoch(report.epoch) if report.epoch else None,
                 connected=self.connected,
                 halted=halted,
                 corrections=len(self.operator.corrections),
                 reference=report.reference,
                 round_trip=self.operator.round_trip,
-                messages=self.line.messages(),
+                messages=self.line.messages()[-MOST_MESSAGES:],
                 late=tuple((one.t, one.q) for one in self.operator.gathering.late(since=now - TOLD_AGAIN)),
             )
         )

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
-from interfaces.messages.control import Attached, Role
+from interfaces.messages.control import PROTOCOL, Attached, Role
 from interfaces.runtime.live.process import warm
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.runtime.physics import (
@@ -179,7 +179,7 @@ class LiveRobot:
         q = np.array(self._measured.q) if self._measured is not None else self.config.q
         name = self.config.model.name
         offset, server = site.fixed_offset, self.config.server
-        return Attached(name, q, loss, timeout, offset, self.instance, server, max_age=age)
+        return Attached(PROTOCOL, name, q, loss, timeout, offset, self.instance, server, max_age=age)
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""

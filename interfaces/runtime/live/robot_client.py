@@ -13,7 +13,7 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
 
-from interfaces.messages.control import Attached, Hello, Ping, Problem, ProtocolError, Role
+from interfaces.messages.control import PROTOCOL, Attached, Hello, Ping, Problem, ProtocolError, Role
 from interfaces.messages.sites import Report
 from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
@@ -138,7 +138,7 @@ class RobotClient:
 
     async def _once(self) -> None:
         async with dial(self.url, Encoding.MSGPACK, largest=LARGEST, opening=OPENING, closing=0.5) as socket:
-            hello = Hello(Role.SITE, "vrs serve", self._token, self._session, link_loss=self._link_loss)
+            hello = Hello(PROTOCOL, Role.SITE, "vrs serve", self._token, self._session, link_loss=self._link_loss)
             await socket.send(encode(hello, Encoding.MSGPACK))
             async with asyncio.timeout(OPENING):
                 answer = decode(_bytes(await socket.recv()), Encoding.MSGPACK, allowed=Attached | Problem)

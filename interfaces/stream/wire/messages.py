@@ -29,10 +29,11 @@ from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.messages.fields import (
     CommandId,
     Count,
-    Epoch,
+    Digits,
     Joints,
     Message,
     Number,
+    Rate,
     Text,
     Time,
     Word,
@@ -44,15 +45,13 @@ from interfaces.messages.fields import (
 )
 from interfaces.messages.segments import C, Dof, Segments, rows, segments_of
 
-Rate = Annotated[float, Meta(gt=0, le=1e4)]
-
 
 class OrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="order"):
     """`Order`."""
 
     number: Number
     command: CommandWire | None = None
-    epoch: Epoch | None = None
+    epoch: Digits | None = None
 
     @override
     @classmethod

@@ -10,10 +10,10 @@ from typing_extensions import override
 from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.file import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
-from interfaces.messages.control import Role
+from interfaces.messages.control import MOST_MESSAGES, Lease, Role
 from interfaces.messages.fields import (
     Count,
-    Epoch,
+    Digits,
     Message,
     Number,
     Seconds,
@@ -28,7 +28,6 @@ from interfaces.messages.fields import (
     text,
 )
 from interfaces.stream import mobile
-from interfaces.stream.wire.control import MOST_MESSAGES, LeaseWire
 from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
 from interfaces.teleop.architectures.sites import MOST_REPEATED
 from interfaces.teleop.driving.messages import (
@@ -188,7 +187,7 @@ class TaskOrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="tas
 
     number: Number
     task: TaskForm
-    epoch: Epoch | None = None
+    epoch: Digits | None = None
 
     @override
     @classmethod
@@ -336,7 +335,7 @@ class MobileWelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag=
     period: Positive
     holds: Positive
     now: Time
-    lease: LeaseWire
+    lease: Lease
     lease_timeout: Annotated[float, Meta(gt=0, le=3600)]
     resumed: bool = False
     instance: Word = ""
@@ -348,7 +347,7 @@ class MobileWelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag=
     def of(cls, value: mobile.MobileWelcome, packed: bool) -> MobileWelcomeWire:
         return cls(
             value.protocol, value.session, value.role, value.robot, DriveLimitsWire.of(value.limits), value.period,
-            value.holds, value.now, LeaseWire.of(value.lease, packed), value.lease_timeout, value.resumed,
+            value.holds, value.now, value.lease, value.lease_timeout, value.resumed,
             value.instance, value.server, value.room,
         )  # fmt: skip
 
@@ -356,7 +355,7 @@ class MobileWelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag=
         """What there is."""
         return mobile.MobileWelcome(
             self.session, self.role, self.robot, self.limits.read(), self.period, self.holds, self.now,
-            self.lease.read(), self.resumed, self.instance, self.server, self.lease_timeout, self.room,
+            self.lease, self.resumed, self.instance, self.server, self.lease_timeout, self.room,
             self.protocol,
         )  # fmt: skip
 
@@ -376,7 +375,7 @@ class PosturesWire(Message, frozen=True, omit_defaults=True, gc=False, tag="post
     starved: bool = False
     path_error: Annotated[float, Meta(ge=0, le=1e9)] | None = None
     time_difference: Annotated[float, Meta(ge=0, le=1e9)] | None = None
-    epoch: Epoch | None = None
+    epoch: Digits | None = None
     connected: bool = True
     halted: Text = ""
     drives: Count = 0
@@ -406,7 +405,7 @@ class PosturesWire(Message, frozen=True, omit_defaults=True, gc=False, tag="post
 class DriveOrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="drive-orders"):
     """`DriveOrders`."""
 
-    epoch: Epoch
+    epoch: Digits
     number: Number
     sent_at: Stamp
     began: Time
@@ -463,7 +462,7 @@ class FollowedWire(Wire, frozen=True, omit_defaults=True, gc=False):
 class DriveReportWire(Message, frozen=True, omit_defaults=True, gc=False, tag="drive-report"):
     """`DriveReport`."""
 
-    epoch: Epoch | None
+    epoch: Digits | None
     number: Number
     sent_at: Stamp
     measured_at: Stamp

@@ -10,7 +10,7 @@ from typing_extensions import override
 from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.messages.fields import (
     Count,
-    Epoch,
+    Digits,
     Joints,
     Message,
     Number,
@@ -54,7 +54,7 @@ class EntryWire(Wire, frozen=True, omit_defaults=True, gc=False):
 class OrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="orders"):
     """`Orders`."""
 
-    epoch: Epoch
+    epoch: Digits
     number: Number
     sent_at: Stamp
     newest: Count
@@ -126,7 +126,7 @@ class SampleWire(Wire, frozen=True, array_like=True, gc=False):
 class ReportWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False, tag="report"):
     """`Report`."""
 
-    epoch: Epoch
+    epoch: Digits
     number: Number
     sent_at: Stamp
     executed: Count

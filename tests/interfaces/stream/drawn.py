@@ -146,8 +146,16 @@ def welcomes(draw):
     limits = Limits(*[np.full(n, x) for x in (low, low + 1, 2.0, 3.0, 4.0)])
     named = draw(st.dictionaries(names, array_of(n), max_size=3))
     role, rates = draw(st.sampled_from(c.Role)), draw(st.lists(floats(0.1, 1e3), max_size=3))
-    known = draw(times), draw(leases), tuple(rates), draw(st.booleans()), draw(words), draw(words)
-    return c.Welcome(draw(words), role, draw(words), limits, named, *known, draw(floats(0.1, 60)))
+    known = (
+        draw(times),
+        draw(leases),
+        draw(floats(0.1, 60)),
+        tuple(rates),
+        draw(st.booleans()),
+        draw(words),
+        draw(words),
+    )
+    return c.Welcome(c.PROTOCOL, draw(words), role, draw(words), n, limits, named, *known)
 
 
 ways = st.builds(c.DirectionConditions, words, words, words)
@@ -228,10 +236,10 @@ messages = {
     m.History: st.builds(m.History, counts, counts, runs()),
     m.Change: st.builds(m.Change, counts, numbers, ids, counts, runs(), st.none() | counts, times, times),
     m.Pulse: st.builds(m.Pulse, counts, times, times | st.just(-math.inf)),
-    c.Hello: st.builds(c.Hello, st.sampled_from(c.Role), names, st.none() | words, st.none() | words, numbers),
+    c.Hello: st.builds(c.Hello, numbers, st.sampled_from(c.Role), names, st.none() | words, st.none() | words),
     c.Welcome: welcomes(),
     c.Attached: st.builds(
-        c.Attached, words, arrays, words, floats(0.1, 60), stamps, words, words, numbers,
+        c.Attached, numbers, words, arrays, words, floats(0.1, 60), stamps, words, words,
         st.none() | floats(0.01, 2), words, words,
     ),
     Ping: st.builds(Ping, numbers, times),

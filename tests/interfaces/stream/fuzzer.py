@@ -188,6 +188,8 @@ def sound(value: Any) -> bool:
         return all(map(sound, value))
     if isinstance(value, MotionCommand) and value.deviation == math.inf:
         return sound(replace(value, deviation=0.0))
+    if isinstance(value, msgspec.Struct):
+        return all(sound(getattr(value, name)) for name in value.__struct_fields__)
     if is_dataclass(value):
         names = {f.name for f in fields(value)} - ({"past"} if isinstance(value, Pulse) else set())
         return all(sound(getattr(value, name)) for name in names)

@@ -72,9 +72,11 @@ class Joined:
     def wish(self, core: ClientCore, kind, *, epoch=None):
         """Ask something of the lease; the answer after a while."""
 
-        def make(number, held):
-            return kind(number) if epoch is None and not hasattr(kind, "epoch") else kind(number, epoch or held)
+        leased = epoch is None and hasattr(kind, "epoch")
 
-        number = core.wish(make, now=self.now + self.ahead[core])
+        def make(number):
+            return kind(number, epoch or core.epoch) if epoch or leased else kind(number)
+
+        number = core.wish(make, now=self.now + self.ahead[core], leased=leased)
         self.run(0.05)
         return core.answer(number)

@@ -128,16 +128,19 @@ def values() -> dict[str, Any]:
         for number, (name, order) in enumerate(ordered().items(), 1)
     }
     return {
-        "hello": c.Hello(c.Role.OPERATOR, "Ada"),
-        "hello with a token and a session": c.Hello(c.Role.ADMIN, "Ada", "s3cret", "abc"),
+        "hello": c.Hello(c.PROTOCOL, c.Role.OPERATOR, "Ada"),
+        "hello with a token and a session": c.Hello(c.PROTOCOL, c.Role.ADMIN, "Ada", "s3cret", "abc"),
         "welcome": c.Welcome(
-            "abc", c.Role.OPERATOR, "puma560", limits, {"ready": Q}, 2.5, held, (60.0, 10.0), True,
+            c.PROTOCOL, "abc", c.Role.OPERATOR, "puma560", 3, limits, {"ready": Q}, 2.5, held, 2.0,
+            (60.0, 10.0), True,
             "xyz", "vrs 0.1.0",
         ),
-        "attached": c.Attached("puma560", Q, "halt", 0.5, None, "xyz", "vrs 0.1.0"),
-        "attached, with an age": c.Attached("puma560", Q, "halt", 0.5, -0.5, "xyz", "vrs 0.1.0", max_age=0.4),
+        "attached": c.Attached(c.PROTOCOL, "puma560", Q, "halt", 0.5, None, "xyz", "vrs 0.1.0"),
+        "attached, with an age": c.Attached(
+            c.PROTOCOL, "puma560", Q, "halt", 0.5, -0.5, "xyz", "vrs 0.1.0", max_age=0.4
+        ),
         "attached, of a mobile robot": c.Attached(
-            "ipr", frozen_array([1.5, 3.0, 0.25]), "halt", 0.5, None, "xyz", "vrs 0.1.0", max_age=0.5,
+            c.PROTOCOL, "ipr", frozen_array([1.5, 3.0, 0.25]), "halt", 0.5, None, "xyz", "vrs 0.1.0", max_age=0.5,
             architecture="timeline", room="Empty room",
         ),
         "mobile welcome": b.MobileWelcome(

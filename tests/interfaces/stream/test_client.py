@@ -262,11 +262,11 @@ def test_another_server_is_another_timeline():
 def test_wishes_are_answered_when_the_connection_is_lost():
     joined = Joined()
     core, _ = operator(joined)
-    number = core.wish(lambda number, _: control.Acquire(number), now=joined.now + 100.0)
+    number = core.wish(control.Acquire, now=joined.now + 100.0)
     assert core.answer(number) is None
     joined.cut(core)
     assert core.answer(number).code is ProblemCode.STOPPING
-    again = core.wish(lambda number, _: control.Acquire(number), now=joined.now + 100.0)
+    again = core.wish(control.Acquire, now=joined.now + 100.0)
     assert core.answer(again).code is ProblemCode.STOPPING
 
 

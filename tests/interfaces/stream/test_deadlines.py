@@ -19,7 +19,7 @@ from starlette.routing import Route
 from websockets.server import ServerProtocol
 from websockets.sync.client import connect
 
-from interfaces.messages.control import Hello, Role
+from interfaces.messages.control import PROTOCOL, Hello, Role
 from interfaces.stream import sockets
 from interfaces.stream.codec import Encoding, encode
 from interfaces.stream.limits import ClientLimits
@@ -132,7 +132,7 @@ def test_requests_that_come_in_time_are_answered_for_as_long_as_they_come() -> N
             time.sleep(0.1)
 
 
-HELLO = frame(Hello(Role.OPERATOR, "Ada"), Encoding.JSON)
+HELLO = frame(Hello(PROTOCOL, Role.OPERATOR, "Ada"), Encoding.JSON)
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_frames_that_are_no_messages_close_the_connection(first: bytes, flood: b
     with served(sockets=limits, limits=ClientLimits(hello=60.0)) as server, dialled(server.port) as connection:
         connection.sendall(handshake(server, Encoding.JSON))
         if greets:
-            connection.sendall(frame(Hello(Role.VIEWER, "floods"), Encoding.JSON))
+            connection.sendall(frame(Hello(PROTOCOL, Role.VIEWER, "floods"), Encoding.JSON))
         heard = connection.recv(65536)
         with suppress(OSError):
             connection.sendall(first + flood * 2000)
@@ -244,7 +244,7 @@ def test_frames_that_are_no_messages_close_the_connection(first: bytes, flood: b
 
 def test_some_pings_and_a_message_in_parts_are_taken() -> None:
     with served() as server, connect(f"ws://127.0.0.1:{server.port}/ws", subprotocols=["vrs.1.json"]) as connection:
-        text = encode(Hello(Role.VIEWER, "fragments"), Encoding.JSON).decode()
+        text = encode(Hello(PROTOCOL, Role.VIEWER, "fragments"), Encoding.JSON).decode()
         connection.send(text[k : k + 1] for k in range(len(text)))
         assert json.loads(connection.recv(5.0))["type"] == "welcome"
         for _ in range(20):

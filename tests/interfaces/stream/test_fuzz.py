@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from interfaces.messages import segments
-from interfaces.stream import Encoding
+from interfaces.messages import fields, segments
+from interfaces.stream import Encoding, codec
 from interfaces.stream.codec import WIRES
-from interfaces.stream.wire import control, messages, sites
+from interfaces.stream.wire import messages, sites
 from tests.interfaces.stream.fuzzer import Fuzzer
 from tests.interfaces.stream.make_vectors import PATH
 
@@ -47,7 +47,7 @@ PLANTED: dict[str, tuple[Any, str, str, str]] = {
     "no joints": (segments, "coefficients_from_bytes", "not row or ", ""),
     "NaN comes in": (segments, "segments_of", "if found and not", "if False and not"),
     "rows of other lengths": (segments, "coefficients_from_lists", "if any(", "if False and any("),
-    "epochs of 65 bits": (control, "epoch", "2**64:", "2**70:"),
+    "epochs of 65 bits": (fields, "epoch_of", "return Epoch(int(digits))", "return int.__new__(Epoch, digits)"),
     "a corner of a corner": (
         segments,
         "coefficients_from_bytes",
@@ -65,7 +65,7 @@ def test_a_planted_fault_is_found(name: str, monkeypatch: pytest.MonkeyPatch) ->
     assert source.count(sound) == 1
     space = dict(vars(inspect.getmodule(getattr(module, function))))
     exec(compile(source.replace(sound, faulty), "<planted>", "exec", dont_inherit=True, flags=1 << 24), space)
-    for user in (segments, control, messages, sites):
+    for user in (segments, fields, codec, messages, sites):
         if hasattr(user, function):
             monkeypatch.setattr(user, function, space[function])
     plain = function == "coefficients_from_lists"

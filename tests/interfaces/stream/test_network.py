@@ -7,7 +7,16 @@ import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
 from interfaces.messages import control
-from interfaces.messages.control import Attached, DirectionConditions, Impair, Ping, ProblemCode, Role, Survey
+from interfaces.messages.control import (
+    PROTOCOL,
+    Attached,
+    DirectionConditions,
+    Impair,
+    Ping,
+    ProblemCode,
+    Role,
+    Survey,
+)
 from interfaces.recording.marks import OF_EVENTS, MarkKind
 from interfaces.runtime.live.emulation import LiveEmulation, late_often
 from interfaces.teleop import OperatorSite, RobotLine
@@ -23,7 +32,7 @@ class Robot:
     url, problem = "ws://there/site", ""
 
     def __init__(self, link_loss: str = "halt") -> None:
-        self.attached = Attached("puma560", HOME, link_loss, 0.5, -0.3, max_age=0.5)
+        self.attached = Attached(PROTOCOL, "puma560", HOME, link_loss, 0.5, -0.3, max_age=0.5)
 
 
 def emulated(**options):

@@ -49,7 +49,7 @@ async def ended(connection, data):
 
 async def greeted(serving, *, encoding=Encoding.MSGPACK, role=Role.VIEWER):
     connection = await connect(url(serving), subprotocols=[str(encoding)], compression=None, proxy=None)
-    hello = encode(control.Hello(role, "peer"), encoding)
+    hello = encode(control.Hello(control.PROTOCOL, role, "peer"), encoding)
     await connection.send(hello.decode() if encoding is Encoding.JSON else hello)
     await wait(connection, "welcome")
     return connection
@@ -135,7 +135,7 @@ def stuck(serving):
     connection.sendall(handshake(serving, Encoding.JSON))
     while b"\r\n\r\n" not in connection.recv(4096, socket.MSG_PEEK):
         time.sleep(0.01)
-    for message in (control.Hello(Role.VIEWER, "stuck"), Follow(1, ViewForm.FRAMES, 1000.0)):
+    for message in (control.Hello(control.PROTOCOL, Role.VIEWER, "stuck"), Follow(1, ViewForm.FRAMES, 1000.0)):
         connection.sendall(frame(message, Encoding.JSON))
     return connection
 
@@ -165,7 +165,7 @@ def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
         reader, writer = await asyncio.open_connection("127.0.0.1", serving.port)
         writer.write(handshake(serving, Encoding.MSGPACK))
         await reader.readuntil(b"\r\n\r\n")
-        writer.write(frame(control.Hello(Role.VIEWER, "peer"), Encoding.MSGPACK))
+        writer.write(frame(control.Hello(control.PROTOCOL, Role.VIEWER, "peer"), Encoding.MSGPACK))
         writer.write(frame(Follow(1, ViewForm.FRAMES, 60.0), Encoding.MSGPACK))
         await reader.readuntil(b"welcome")
         if k % 2:

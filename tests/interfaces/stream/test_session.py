@@ -24,7 +24,7 @@ class Peer:
         self.hub, self.encoding = hub, encoding
         self.session = hub.open(encoding, now=now)
         if greet:
-            self.first = self.tell(control.Hello(role, "peer", **hello), now=now)
+            self.first = self.tell(control.Hello(control.PROTOCOL, role, "peer", **hello), now=now)
             self.welcome = self.first[0]
 
     def raw(self, data, *, now):
@@ -79,10 +79,10 @@ def test_hello_must_come_in_time():
     [
         (Ping(1, 0.0), ProblemCode.HELLO_EXPECTED),
         (Order(1, to(1)), ProblemCode.HELLO_EXPECTED),
-        (control.Hello(Role.ADMIN, "x"), ProblemCode.REFUSED),
-        (control.Hello(Role.ADMIN, "x", "b" * 43), ProblemCode.REFUSED),
-        (control.Hello(Role.SITE, "x"), ProblemCode.REFUSED),
-        (control.Hello(Role.VIEWER, "x", protocol=2), ProblemCode.VERSION),
+        (control.Hello(control.PROTOCOL, Role.ADMIN, "x"), ProblemCode.REFUSED),
+        (control.Hello(control.PROTOCOL, Role.ADMIN, "x", "b" * 43), ProblemCode.REFUSED),
+        (control.Hello(control.PROTOCOL, Role.SITE, "x"), ProblemCode.REFUSED),
+        (control.Hello(2, Role.VIEWER, "x"), ProblemCode.VERSION),
     ],
 )
 def test_who_is_not_let_in(message, problem):
@@ -90,7 +90,7 @@ def test_who_is_not_let_in(message, problem):
     peer = Peer(hub, greet=False)
     peer.session.receive(encode(message, Encoding.MSGPACK), now=0.5)
     closed(peer, 1008, problem, now=0.5)
-    peer.session.receive(encode(control.Hello(Role.VIEWER, "x"), Encoding.MSGPACK), now=0.6)
+    peer.session.receive(encode(control.Hello(control.PROTOCOL, Role.VIEWER, "x"), Encoding.MSGPACK), now=0.6)
     assert peer.session.seat is None
     assert hub.seats == 0
 
@@ -211,7 +211,7 @@ def test_a_viewer_commands_nothing():
 
 def test_a_server_s_messages_are_not_taken_from_a_client():
     peer = Peer(make_hub())
-    for message in (control.Hello(Role.VIEWER, "again"), peer.welcome.lease, Pulse(1, 0.0, 0.0)):
+    for message in (control.Hello(control.PROTOCOL, Role.VIEWER, "again"), peer.welcome.lease, Pulse(1, 0.0, 0.0)):
         assert [problem.code for problem in peer.tell(message, now=0.1)] == [ProblemCode.NOT_ALLOWED]
 
 

@@ -201,7 +201,7 @@ def test_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
     async def viewer(url: str, stop: asyncio.Event, edit: int) -> int:
         async with connect(url, subprotocols=[Subprotocol(Encoding.JSON)], max_size=None) as socket:
             reader = asyncio.create_task(_passed_over(socket))
-            await socket.send(encode(control.Hello(Role.VIEWER, "viewer"), Encoding.JSON).decode())
+            await socket.send(encode(control.Hello(1, Role.VIEWER, "viewer"), Encoding.JSON).decode())
             await socket.send(encode(Follow(1, ViewForm.SEGMENTS), Encoding.JSON).decode())
             sent = 0
             while not stop.is_set():
@@ -216,7 +216,7 @@ def test_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
         trips: list[float] = []
         stop = asyncio.Event()
         async with connect(url, subprotocols=[Subprotocol(Encoding.JSON)], max_size=None) as socket:
-            await socket.send(encode(control.Hello(Role.OPERATOR, "operator"), Encoding.JSON).decode())
+            await socket.send(encode(control.Hello(1, Role.OPERATOR, "operator"), Encoding.JSON).decode())
             await socket.send(encode(control.Acquire(1), Encoding.JSON).decode())
             crowd = [asyncio.create_task(viewer(url, stop, edit)) for _ in range(5)]
             for number in range(1, 101):

@@ -56,17 +56,17 @@ class Line:
     def issued(self, number):
         return self._designer.issued(number)
 
-    def wish(self, make):
-        return self.core.wish(make, now=self.joined.now + self.joined.ahead[self.core])
+    def wish(self, make, **how):
+        return self.core.wish(make, now=self.joined.now + self.joined.ahead[self.core], **how)
 
     def acquire(self, *, wait):
-        self.wish(lambda number, _: control.Acquire(number))
+        self.wish(control.Acquire)
 
     def release(self, *, wait):
-        self.wish(control.Release)
+        self.wish(lambda number: control.Release(number, self.core.epoch), leased=True)
 
     def ask_to_share(self, session):
-        return self.wish(lambda number, _: control.Share(number, session))
+        return self.wish(lambda number: control.Share(number, session))
 
     def answer(self, number):
         return self.core.answer(number)
