@@ -10,6 +10,7 @@ import enum
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
+from interfaces.messages.fields import Count, Message, Number, Rate, Time, Word
 from vrs.commands import Command, finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
@@ -86,14 +87,11 @@ class Order:
             raise InvalidValueError("epoch", self.epoch, "an integer from 0 to 2**64 - 1")
 
 
-@dataclass(frozen=True, slots=True)
-class Ask:
+class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
     """Client: g(t), please. Sent again, it asks what has become of the frame."""
 
-    kind: ClassVar[str] = "ask"
-    version: ClassVar[int] = 1
-    number: int
-    t: float | None
+    number: Number
+    t: Time | None = None
     """[s]; None for the engine's present, plus the servlet's lead."""
 
     def __post_init__(self) -> None:
@@ -102,15 +100,12 @@ class Ask:
             finite("t", self.t, "None or finite seconds")
 
 
-@dataclass(frozen=True, slots=True)
-class Follow:
+class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
     """Client: the scene, please, and from now on what changes in it."""
 
-    kind: ClassVar[str] = "follow"
-    version: ClassVar[int] = 1
-    number: int
+    number: Number
     form: ViewForm
-    rate: float | None = None
+    rate: Rate | None = None
     """Wished rate of frames [1/s]; the broadcaster with the nearest one is taken."""
 
     def __post_init__(self) -> None:
@@ -119,15 +114,12 @@ class Follow:
             finite("rate", self.rate, "None or frames a second")
 
 
-@dataclass(frozen=True, slots=True)
-class Want:
+class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
     """Client: segments that it lacks."""
 
-    kind: ClassVar[str] = "want"
-    version: ClassVar[int] = 1
-    edit: int
+    edit: Count
     """Number of the newest edit in what it has, or of that which a `Scene` began with."""
-    index: int | None
+    index: Count | None = None
     """First segment that it lacks of a history; None when it has that and lacks later edits."""
 
 
@@ -183,29 +175,26 @@ class Broadcast:
     verdicts: Verdicts
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
     """Servlet: what there is to see, for one who has just come."""
 
-    kind: ClassVar[str] = "scene"
-    version: ClassVar[int] = 1
-    number: int
+    number: Number
     """Number of the `Follow` that it answers."""
-    robot: str
+    robot: Word
     """Name of the robot's model."""
     initial: Array
     """Joints before the start of the timeline [rad], (n,)."""
-    start: float
+    start: Time
     """Origin of the timeline [s]."""
-    end: float
+    end: Time
     """End of what is planned [s]."""
-    segments: int
+    segments: Count
     """How many segments the timeline has; `Want` fetches them."""
-    edit: int
+    edit: Count
     """Number of the newest edit in it."""
-    now: float
+    now: Time
     """The engine's time [s]."""
-    rate: float | None = None
+    rate: Rate | None = None
     """Rate of the frames that follow [1/s]; None where segments do."""
 
 

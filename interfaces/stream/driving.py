@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from interfaces.link.delivery import OrderBook
 from interfaces.messages import Order, Outcome, Request
-from interfaces.messages.control import Problem, ProblemCode
+from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
 from interfaces.stream.codec import Value
 from interfaces.stream.hosted import Greeting
 from interfaces.stream.mobile import MobileWelcome
@@ -74,6 +74,7 @@ class DriveSite:
         """What a client is told that is let in, beside what every client is told."""
         model = self._model
         return MobileWelcome(
+            protocol=PROTOCOL,
             robot=model.name,
             limits=model.limits,
             period=model.period,

@@ -4,47 +4,64 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
+
+import msgspec
+from msgspec import Meta
 
 from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
-from interfaces.messages.control import PROTOCOL, Lease, Role
-from interfaces.teleop.driving.messages import Doing, Go, Point
+from interfaces.messages.control import Lease, Role
+from interfaces.messages.fields import Message, Number, Stamp, Time, Timeout, Word
+from interfaces.teleop.driving.messages import MOST_POINTS, Doing, Go, Point
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from vrs.mobile import DriveLimits
 
+MOST_THINGS = 1000
+"""Outlines of a map."""
+MOST_CORNERS = 64
+"""Of an outline."""
+Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]
+PointRow = tuple[Coordinate, Coordinate]
+Points = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_POINTS)]
+Outline = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_CORNERS)]
+Distance = Annotated[float, Meta(ge=0, le=1e9)]
+Positive = Annotated[float, Meta(gt=0, le=1e9)]
+Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
+Doubt = tuple[Variance, Variance, Variance]
 
-@dataclass(frozen=True, slots=True)
-class MobileWelcome:
+
+class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
     """Server: the client may go on; what there is."""
 
-    kind: ClassVar[str] = "mobile-welcome"
-    version: ClassVar[int] = 1
-    session: str = field(repr=False)
+    secrets: ClassVar[tuple[str, ...]] = ("session",)
+    protocol: Number
+    """Version of the protocol that is spoken."""
+
+    session: Word
     """Names this session, for a later `Hello`; nobody else may know it."""
     role: Role
-    robot: str
+    robot: Word
     """Name of the robot's model."""
     limits: DriveLimits
     """Of what it may be asked."""
-    period: float
+    period: Positive
     """T: time between two commands of the virtual robot [s]."""
-    holds: float
+    holds: Positive
     """A drive order counts for so long after it was issued [s]."""
-    now: float
+    now: Time
     """Session time [s]."""
     lease: Lease
+    lease_timeout: Timeout
+    """A lease expires so long after the last beat [s]."""
     resumed: bool = False
     """Whether the session that was asked for goes on."""
-    instance: str = ""
+    instance: Word = ""
     """Names this run of the server."""
-    server: str = ""
+    server: Word = ""
     """Name and version of the program."""
-    lease_timeout: float = 2.0
-    """A lease expires so long after the last beat [s]."""
-    room: str = ""
+    room: Word = ""
     """Where it drives, for people."""
-    protocol: int = PROTOCOL
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,31 +162,25 @@ class Tasks:
     """Number of the receiver's order that this answers."""
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
+class Seen(Message, frozen=True, omit_defaults=True, gc=False, tag="seen"):
     """Server: what the robot sees of its surroundings; the newest one counts."""
 
-    kind: ClassVar[str] = "seen"
-    version: ClassVar[int] = 1
-    time: float
+    time: Stamp
     """By the robot's own clock [s]."""
-    points: tuple[Point, ...]
+    points: Points = ()
     """Where its laser's beams ended, on the map [m]."""
-    doubt: tuple[float, float, float] | None = None
+    doubt: Doubt | None = None
     """Of its place: variance of x, covariance, variance of y [m²]; None where nobody knows."""
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
     """Server: the known map of where the robot drives."""
 
-    kind: ClassVar[str] = "plan"
-    version: ClassVar[int] = 1
-    size: Point
+    size: PointRow
     """Of the floor, 0 ≤ x ≤ length and 0 ≤ y ≤ width [m]."""
-    things: tuple[tuple[Point, ...], ...] = ()
+    things: Annotated[tuple[Outline, ...], Meta(max_length=MOST_THINGS)] = ()
     """Outlines of what stands there [m]."""
-    via: tuple[Point, ...] = ()
+    via: Points = ()
     """Via points [m]."""
-    robot: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    robot: tuple[Distance, Distance, Distance] = msgspec.field(default_factory=lambda: (0.0, 0.0, 0.0))
     """What the robot's rectangle reaches ahead and back from its driving axle, and its width [m]."""

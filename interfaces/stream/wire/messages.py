@@ -10,20 +10,15 @@ from typing_extensions import override
 
 from interfaces.messages import (
     Answer,
-    Ask,
     Broadcast,
     Change,
-    Follow,
     Frame,
     FrameStatus,
     History,
     Order,
     Outcome,
     Pulse,
-    Scene,
     Verdicts,
-    ViewForm,
-    Want,
 )
 from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.messages.fields import (
@@ -33,10 +28,8 @@ from interfaces.messages.fields import (
     Joints,
     Message,
     Number,
-    Rate,
     Text,
     Time,
-    Word,
     array,
     digits,
     epoch,
@@ -62,40 +55,6 @@ class OrderWire(Message, frozen=True, omit_defaults=True, gc=False, tag="order")
         """The order."""
         command = None if self.command is None else self.command.read()
         return Order(self.number, command, epoch(self.epoch))
-
-
-class AskWire(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
-    """`Ask`."""
-
-    number: Number
-    t: Time | None = None
-
-    def read(self) -> Ask:
-        """The question."""
-        return Ask(self.number, self.t)
-
-
-class FollowWire(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
-    """`Follow`."""
-
-    number: Number
-    form: ViewForm
-    rate: Rate | None = None
-
-    def read(self) -> Follow:
-        """The wish."""
-        return Follow(self.number, self.form, self.rate)
-
-
-class WantWire(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
-    """`Want`."""
-
-    edit: Count
-    index: Count | None = None
-
-    def read(self) -> Want:
-        """The wish."""
-        return Want(self.edit, self.index)
 
 
 class OutcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="outcome"):
@@ -179,25 +138,6 @@ class BroadcastWire(Message, frozen=True, omit_defaults=True, gc=False, tag="bro
         """The frame and its verdicts."""
         frame = Frame(self.number, self.t, self.made_at, array(self.q), self.status, self.falsified_by)
         return Broadcast(frame, Verdicts(self.since, self.through, self.falsified))
-
-
-class SceneWire(Message, frozen=True, omit_defaults=True, gc=False, tag="scene"):
-    """`Scene`."""
-
-    number: Number
-    robot: Word
-    initial: Joints
-    start: Time
-    end: Time
-    segments: Count
-    edit: Count
-    now: Time
-    rate: Rate | None = None
-
-    def read(self) -> Scene:
-        """The scene."""
-        what = self.robot, array(self.initial), self.start, self.end, self.segments
-        return Scene(self.number, *what, self.edit, self.now, self.rate)
 
 
 class HistoryWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False, tag="history"):

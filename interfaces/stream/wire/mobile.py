@@ -10,7 +10,7 @@ from typing_extensions import override
 from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.file import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
-from interfaces.messages.control import MOST_MESSAGES, Lease, Role
+from interfaces.messages.control import MOST_MESSAGES
 from interfaces.messages.fields import (
     Count,
     Digits,
@@ -28,6 +28,7 @@ from interfaces.messages.fields import (
     text,
 )
 from interfaces.stream import mobile
+from interfaces.stream.mobile import Distance, Doubt, Points
 from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
 from interfaces.teleop.architectures.sites import MOST_REPEATED
 from interfaces.teleop.driving.messages import (
@@ -47,19 +48,7 @@ from robots.onboard.journey import JourneyState
 from robots.onboard.supervisor import CellChange
 from vrs.checks import normal, one_of
 from vrs.errors import InvalidValueError
-from vrs.mobile import DriveLimits
 from vrs.segment import ArcSegment
-
-MOST_THINGS = 1000
-"""Outlines of a map."""
-MOST_CORNERS = 64
-"""Of an outline."""
-Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]
-PointRow = tuple[Coordinate, Coordinate]
-Points = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_POINTS)]
-Distance = Annotated[float, Meta(ge=0, le=1e9)]
-Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
-Doubt = tuple[Variance, Variance, Variance]
 
 
 class TaskForm(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -263,33 +252,6 @@ class TasksWire(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks")
         return mobile.Tasks(self.doing, self.journey, *way, *jobs, self.loss, *words, self.answers)
 
 
-class SeenWire(Message, frozen=True, omit_defaults=True, gc=False, tag="seen"):
-    """`Seen`."""
-
-    time: Stamp
-    points: Points = ()
-    doubt: Doubt | None = None
-
-    def read(self) -> mobile.Seen:
-        """What is seen."""
-        return mobile.Seen(self.time, self.points, self.doubt)
-
-
-class PlanWire(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
-    """`Plan`."""
-
-    size: PointRow
-    things: Annotated[
-        tuple[Annotated[tuple[PointRow, ...], Meta(max_length=MOST_CORNERS)], ...], Meta(max_length=MOST_THINGS)
-    ] = ()
-    via: Points = ()
-    robot: tuple[Distance, Distance, Distance] = (0.0, 0.0, 0.0)
-
-    def read(self) -> mobile.Plan:
-        """The map."""
-        return mobile.Plan(self.size, self.things, self.via, self.robot)
-
-
 MOST_CELLS = 10_000
 """Cells that a report tells of, at most."""
 Metres = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -299,65 +261,10 @@ PostureRow = tuple[Metres, Metres, Angle]
 Speed = Annotated[float, Meta(ge=-1e6, le=1e6)]
 DriveRow = tuple[Speed, Speed]
 """v, ω."""
-Positive = Annotated[float, Meta(gt=0, le=1e9)]
 ArcRow = tuple[Time, Metres, Metres, Angle, Speed, Speed, Seconds]
 """Start, posture there, v, ω, duration."""
 Arcs = Annotated[tuple[ArcRow, ...], Meta(max_length=MOST_REPEATED)]
 Runs = Annotated[tuple[tuple[Count, Arcs], ...], Meta(max_length=8)]
-
-
-class DriveLimitsWire(Wire, frozen=True, omit_defaults=True, gc=False):
-    """`DriveLimits`."""
-
-    v_max: Positive
-    w_max: Positive
-    a_max: Positive
-    alpha_max: Positive
-
-    @classmethod
-    def of(cls, limits: DriveLimits) -> DriveLimitsWire:
-        """The wire form."""
-        return cls(limits.v_max, limits.w_max, limits.a_max, limits.alpha_max)
-
-    def read(self) -> DriveLimits:
-        """The limits."""
-        return DriveLimits(self.v_max, self.w_max, self.a_max, self.alpha_max)
-
-
-class MobileWelcomeWire(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
-    """`MobileWelcome`."""
-
-    protocol: Number
-    session: Word
-    role: Role
-    robot: Word
-    limits: DriveLimitsWire
-    period: Positive
-    holds: Positive
-    now: Time
-    lease: Lease
-    lease_timeout: Annotated[float, Meta(gt=0, le=3600)]
-    resumed: bool = False
-    instance: Word = ""
-    server: Word = ""
-    room: Word = ""
-
-    @override
-    @classmethod
-    def of(cls, value: mobile.MobileWelcome, packed: bool) -> MobileWelcomeWire:
-        return cls(
-            value.protocol, value.session, value.role, value.robot, DriveLimitsWire.of(value.limits), value.period,
-            value.holds, value.now, value.lease, value.lease_timeout, value.resumed,
-            value.instance, value.server, value.room,
-        )  # fmt: skip
-
-    def read(self) -> mobile.MobileWelcome:
-        """What there is."""
-        return mobile.MobileWelcome(
-            self.session, self.role, self.robot, self.limits.read(), self.period, self.holds, self.now,
-            self.lease, self.resumed, self.instance, self.server, self.lease_timeout, self.room,
-            self.protocol,
-        )  # fmt: skip
 
 
 class PosturesWire(Message, frozen=True, omit_defaults=True, gc=False, tag="postures"):

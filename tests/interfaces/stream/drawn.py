@@ -266,8 +266,8 @@ messages = {
         st.none() | floats(0, 1e3),
     ),
     b.MobileWelcome: st.builds(
-        b.MobileWelcome, words, st.sampled_from(c.Role), words, st.builds(DriveLimits, *[positive] * 4), positive,
-        positive, times, leases, st.booleans(), words, words, floats(0.1, 60), words, numbers,
+        b.MobileWelcome, numbers, words, st.sampled_from(c.Role), words, st.builds(DriveLimits, *[positive] * 4),
+        positive, positive, times, leases, floats(0.1, 60), st.booleans(), words, words, words,
     ),
     b.Postures: st.builds(
         b.Postures, numbers, times, postures, drives, postures, stamps, st.none() | postures, st.none() | drives,

@@ -144,8 +144,8 @@ def values() -> dict[str, Any]:
             architecture="timeline", room="Empty room",
         ),
         "mobile welcome": b.MobileWelcome(
-            "abc", c.Role.OPERATOR, "ipr", DriveLimits(0.5, 0.75, 0.52, 2.6), 0.1, 0.3, 2.5, held, False, "xyz",
-            "vrs 0.1.0", room="Empty room",
+            c.PROTOCOL, "abc", c.Role.OPERATOR, "ipr", DriveLimits(0.5, 0.75, 0.52, 2.6), 0.1, 0.3, 2.5, held, 2.0,
+            False, "xyz", "vrs 0.1.0", room="Empty room",
         ),
         "postures": b.Postures(
             31, 2.5, Posture(1.75, 3.0, 0.5), Drive(0.3, -0.1), Posture(1.76, 3.01, 0.5), 2.25,
