@@ -79,7 +79,7 @@ WIRES: dict[type, type[Wire]] = {
     Orders: sites.OrdersWire,
     Report: sites.ReportWire,
     mobile.MobileWelcome: mobile.MobileWelcome,
-    mobile.Postures: mobile_wires.PosturesWire,
+    mobile.Postures: mobile.Postures,
     mobile.TaskOrder: mobile_wires.TaskOrderWire,
     mobile.Tasks: mobile_wires.TasksWire,
     mobile.Seen: mobile.Seen,

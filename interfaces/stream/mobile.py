@@ -10,8 +10,20 @@ import msgspec
 from msgspec import Meta
 
 from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
-from interfaces.messages.control import Lease, Role
-from interfaces.messages.fields import Message, Number, Stamp, Time, Timeout, Word
+from interfaces.messages.control import MOST_MESSAGES, Lease, Role
+from interfaces.messages.fields import (
+    Count,
+    Epoch,
+    Leased,
+    Message,
+    Number,
+    Stamp,
+    Text,
+    Time,
+    Timeout,
+    Value,
+    Word,
+)  # fmt: skip
 from interfaces.teleop.driving.messages import MOST_POINTS, Doing, Go, Point
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
@@ -64,14 +76,11 @@ class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mob
     """Where it drives, for people."""
 
 
-@dataclass(frozen=True, slots=True)
-class Postures:
+class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"):
     """Server: where both robots are; the newest one counts."""
 
-    kind: ClassVar[str] = "postures"
-    version: ClassVar[int] = 1
-    number: int
-    now: float
+    number: Number
+    now: Time
     """Session time when it was made [s]."""
     virtual: Posture
     """Of the virtual robot, now."""
@@ -79,32 +88,32 @@ class Postures:
     """What it drives."""
     estimate: Posture
     """Where the real robot is thought to come to with all commands so far. Source: Han et al., eq. (8)–(10)."""
-    t: float | None = None
+    t: Time | None = None
     """When the real robot was measured [s]; None before the first report, as all that follows."""
     real: Posture | None = None
     """Where it took itself to be."""
     drive: Drive | None = None
     """What its motors are told."""
-    D: float | None = None
+    D: Time | None = None
     """The time of the operator's path that it's to play less his clock, as the robot takes it to be, without what
     braking needs: negative [s]; None where its architecture has none."""
     starved: bool = False
     """Whether it's slower than it should be, as nothing newer is known there."""
-    path_error: float | None = None
+    path_error: Distance | None = None
     """How far it is from the virtual robot's path [m]."""
-    time_difference: float | None = None
+    time_difference: Distance | None = None
     """How much later than the virtual robot it is there [s]."""
-    epoch: int = 0
-    """Epoch that it follows; 0 for none."""
+    epoch: Epoch | None = None
+    """That it follows; None for none."""
     connected: bool = True
     """Whether the robot's site is heard of."""
-    halted: str = ""
+    halted: Text = ""
     """Why it doesn't follow; empty while it does."""
-    drives: int = 0
+    drives: Count = 0
     """How often the virtual robot was put where the real one stood, to begin a drive."""
-    round_trip: float | None = None
+    round_trip: Value | None = None
     """Newest time that a message to the robot and the answer were under way [s]; None before the first."""
-    messages: tuple[tuple[float, float | None], ...] = ()
+    messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
     """Messages to the robot of which the emulated link told since the one before: when each was sent, and when it
     arrived [s]; None for one that was lost."""
 

@@ -6,7 +6,9 @@ Source: Kim, Han, Kim, Kim, 2002 [K]: safety limits of the mobile robot IPR.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
+
+from msgspec import Meta
 
 from vrs.mobile import DriveLimits, clipped
 
@@ -38,20 +40,20 @@ IPR_LIMITS: Final = drive_limits(IPR_WHEEL_BASE)
 class Drive(NamedTuple):
     """What a mobile robot is told to do."""
 
-    v: float
+    v: Annotated[float, Meta(ge=-1e6, le=1e6)]
     """Linear speed [m/s], forward positive."""
-    w: float
+    w: Annotated[float, Meta(ge=-1e6, le=1e6)]
     """Angular speed [rad/s], to the left positive."""
 
 
 class Posture(NamedTuple):
     """Where the middle of the driving axle is, in the world frame."""
 
-    x: float
+    x: Annotated[float, Meta(ge=-1e9, le=1e9)]
     """[m]."""
-    y: float
+    y: Annotated[float, Meta(ge=-1e9, le=1e9)]
     """[m]."""
-    theta: float
+    theta: Annotated[float, Meta(ge=-1e9, le=1e9)]
     """Heading [rad], not wrapped."""
 
 

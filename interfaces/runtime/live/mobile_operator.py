@@ -17,7 +17,8 @@ from typing_extensions import override
 from interfaces.jobs import ArmJob, JobFile, OperatorLoss
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
-from interfaces.messages.control import Attached, Role
+from interfaces.messages.control import MOST_MESSAGES, Attached, Role
+from interfaces.messages.fields import Epoch
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
 from interfaces.runtime.live.mobile_tasks import TaskDesk
@@ -259,7 +260,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
         real: dict[str, Any] = {}
         if report is not None:
             real = {"t": report.measured_at, "real": report.posture, "drive": report.drive, "D": report.D}
-            real |= {"starved": report.starved, "epoch": report.epoch}
+            real |= {"starved": report.starved, "epoch": Epoch(report.epoch) if report.epoch else None}
         if deviation is not None and not operator.halted:
             real |= {"path_error": deviation.path_error, "time_difference": deviation.time_difference}
         self.hub.show(
@@ -273,7 +274,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
                 halted=operator.gone or ("" if operator.halted == BY_ITSELF else operator.halted),
                 drives=operator.epochs,
                 round_trip=operator.round_trip,
-                messages=self.line.messages(),
+                messages=self.line.messages()[-MOST_MESSAGES:],
                 **real,
             )
         )

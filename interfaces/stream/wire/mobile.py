@@ -10,7 +10,6 @@ from typing_extensions import override
 from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.file import GoalForm, JobListForm, ProgressForm
 from interfaces.jobs.values import MOST_JOBS
-from interfaces.messages.control import MOST_MESSAGES
 from interfaces.messages.fields import (
     Count,
     Digits,
@@ -20,7 +19,6 @@ from interfaces.messages.fields import (
     Stamp,
     Text,
     Time,
-    Value,
     Wire,
     Word,
     digits,
@@ -265,48 +263,6 @@ ArcRow = tuple[Time, Metres, Metres, Angle, Speed, Speed, Seconds]
 """Start, posture there, v, ω, duration."""
 Arcs = Annotated[tuple[ArcRow, ...], Meta(max_length=MOST_REPEATED)]
 Runs = Annotated[tuple[tuple[Count, Arcs], ...], Meta(max_length=8)]
-
-
-class PosturesWire(Message, frozen=True, omit_defaults=True, gc=False, tag="postures"):
-    """`Postures`."""
-
-    number: Number
-    now: Time
-    virtual: PostureRow
-    command: DriveRow
-    estimate: PostureRow
-    t: Time | None = None
-    real: PostureRow | None = None
-    drive: DriveRow | None = None
-    D: Time | None = None
-    starved: bool = False
-    path_error: Annotated[float, Meta(ge=0, le=1e9)] | None = None
-    time_difference: Annotated[float, Meta(ge=0, le=1e9)] | None = None
-    epoch: Digits | None = None
-    connected: bool = True
-    halted: Text = ""
-    drives: Count = 0
-    round_trip: Value | None = None
-    messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
-
-    @override
-    @classmethod
-    def of(cls, value: mobile.Postures, packed: bool) -> PosturesWire:
-        return cls(
-            value.number, value.now, value.virtual, value.command, value.estimate, value.t, value.real, value.drive,
-            value.D, value.starved, value.path_error, value.time_difference, digits(value.epoch), value.connected,
-            text(value.halted), value.drives, value.round_trip, value.messages[-MOST_MESSAGES:],
-        )  # fmt: skip
-
-    def read(self) -> mobile.Postures:
-        """Where both are."""
-        real = None if self.real is None else Posture(*self.real)
-        drive = None if self.drive is None else Drive(*self.drive)
-        return mobile.Postures(
-            self.number, self.now, Posture(*self.virtual), Drive(*self.command), Posture(*self.estimate), self.t,
-            real, drive, self.D, self.starved, self.path_error, self.time_difference, epoch(self.epoch),
-            self.connected, self.halted, self.drives, self.round_trip, self.messages,
-        )  # fmt: skip
 
 
 class DriveOrdersWire(Message, frozen=True, omit_defaults=True, gc=False, tag="drive-orders"):

@@ -253,7 +253,7 @@ messages = {
     c.Lease: leases,
     c.Problem: st.builds(c.Problem, st.sampled_from(c.ProblemCode), words, st.none() | numbers, st.booleans()),
     c.State: st.builds(
-        c.State, numbers, times, arrays, times, finite, times, finite, st.integers(0, 2**64 - 1), st.booleans(),
+        c.State, numbers, times, arrays, times, finite, times, finite, st.none() | epochs, st.booleans(),
         words, counts, st.none() | arrays, st.none() | finite,
         st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
     ),
