@@ -36,7 +36,7 @@ def part() -> Part:
     frames = [
         m.Frame(k + 1, x, x, row, m.FrameStatus.PREDICTED) for k, (x, row) in enumerate(zip(t, q, strict=True))
     ]
-    ours = _rate(encode(m.Broadcast(f, m.Verdicts(1, f.number - 1)), Encoding.MSGPACK) for f in frames)
+    ours = _rate(encode(m.Broadcast.showing(f, m.Verdicts(1, f.number - 1)), Encoding.MSGPACK) for f in frames)
     bare = _rate(msgspec.msgpack.encode({"t": x, "q": row}) for x, row in zip(t.tolist(), q.tolist(), strict=True))
     transforms = _rate(umsgpack.packb(_set(i, X)) for row in q for i, X in enumerate(MODEL.links(row)))
     note = f"moving {moving:.0%} of the time; joints off by {error:.0e} rad"
@@ -119,10 +119,10 @@ def _costs(frame: m.Frame) -> list[Result]:
     rng = np.random.default_rng(1)
     pieces = [PolynomialSegment(0.25 * k, 0.25, rng.normal(size=(4, 6)), 7) for k in range(64)]
     found = {
-        "a frame": (m.Broadcast(frame, m.Verdicts(1, 5)), Bar(median=5.0)),
+        "a frame": (m.Broadcast.showing(frame, m.Verdicts(1, 5)), Bar(median=5.0)),
         "an order": (m.Order(1, MotionCommand(JointTarget(HOME)), 1), Bar()),
-        "an edit of four segments": (m.Change(1, 2, 7, 0, tuple(pieces[:4]), None, 1.0, 1.0), Bar()),
-        "a history of 64 segments": (m.History(1, 0, tuple(pieces)), Bar()),
+        "an edit of four segments": (m.Change(2, 0, 1.0, 7, segments=tuple(pieces[:4])), Bar()),
+        "a history of 64 segments": (m.History(1, 0, segments=tuple(pieces)), Bar()),
     }
     results = []
     for name, (message, bar) in found.items():

@@ -17,12 +17,11 @@ from numpy.typing import ArrayLike
 
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
+from vrs.record import LARGEST
 
 _ClassT = TypeVar("_ClassT", bound=type)
 _Converters: TypeAlias = tuple[tuple[str, Callable[[object], object]], ...]
 
-LARGEST = 1e9
-"""Size of the largest value that a command may ask for, in any unit: squares and products are far from overflow."""
 SMALLEST = sys.float_info.min
 """Size of the smallest number besides 0 [2.2e-308]; what is divided by a subnormal one overflows."""
 

@@ -8,14 +8,16 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 from math import inf
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
+from msgspec import Meta, field
 from numpy.typing import ArrayLike
 
-from vrs.checks import LARGEST, finite, finite_array, normal, number_in, sized_array, validated, within
+from vrs.checks import finite, finite_array, normal, number_in, sized_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
+from vrs.record import LARGEST, Number, Pose, Record, Time, Value, set_field
 
 __all__ = [
     "Cancel", "Command", "DriveCommand", "Frame", "InsertVia", "Insertion", "JointTarget", "Lateness", "Motion",
@@ -24,8 +26,35 @@ __all__ = [
 ]  # fmt: skip
 
 
-_FARTHEST = 1e6
+FARTHEST = 1e6
 """Largest distance in a command [m]."""
+_UNCHANGED = 1.0
+"""A share that changes nothing, and isn't written."""
+ENDLESS = "inf"
+"""How infinity is written, of which JSON knows nothing."""
+
+_Share = Annotated[float, Meta(ge=1e-3, le=1)]
+_Distance = Annotated[float, Meta(ge=0, le=FARTHEST)]
+if TYPE_CHECKING:
+    _Deviation: TypeAlias = float
+    _Parameter: TypeAlias = Any
+else:
+    _Deviation = _Distance | Literal["inf"]
+    _Parameter = (
+        bool
+        | Annotated[int, Meta(ge=-(10**9), le=10**9)]
+        | Value
+        | Annotated[str, Meta(max_length=200)]
+        | Annotated[list[Value], Meta(min_length=1, max_length=64)]
+        | None
+    )
+
+
+class Endless(float):
+    """Infinity, as it's held; it's written as `ENDLESS`."""
+
+
+_FOR_EVER = Endless(inf)
 
 
 class Motion(enum.StrEnum):
@@ -76,18 +105,18 @@ class Frame(enum.StrEnum):
 _Kind = TypeVar("_Kind", bound=enum.StrEnum)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointTarget:
+class JointTarget(Record, frozen=True, omit_defaults=True, gc=False, eq=False, tag_field="type", tag="joints"):
     """A target in joint space."""
 
     q: Array
     """Joint values [rad], shape (n,)."""
 
-    def __init__(self, q: ArrayLike) -> None:
-        array = sized_array("target q", q, None, "finite joint values [rad], shape (n,)")
-        if array.ndim != 1:
-            raise InvalidValueError("target q", q, "finite joint values [rad], shape (n,)")
-        object.__setattr__(self, "q", array)
+    if TYPE_CHECKING:
+
+        def __init__(self, q: ArrayLike) -> None: ...
+
+    def __post_init__(self) -> None:
+        set_field(self, "q", _joints("target q", self.q, "finite joint values [rad], shape (n,)"))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, JointTarget) and np.array_equal(self.q, other.q)
@@ -96,21 +125,22 @@ class JointTarget:
         return hash(self.q.tobytes())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseTarget:
+class PoseTarget(Record, frozen=True, omit_defaults=True, gc=False, eq=False, tag_field="type", tag="pose"):
     """A target pose of the last link in the base frame."""
 
-    X: Array
+    X: Pose
     """Homogeneous transform, (4, 4), with a proper rotation."""
-    configuration: str | None
+    configuration: Annotated[str, Meta(max_length=200)] | None = None
     """Asked-for arm configuration, as `LEFTY BELOW FLIP` or a part of it; None keeps the arm's own."""
 
-    def __init__(self, X: ArrayLike, configuration: str | None = None) -> None:
-        array = _transform("target X", X)
-        if configuration is not None and not isinstance(configuration, str):
-            raise InvalidValueError("configuration", configuration, "None or the words of a configuration")
-        object.__setattr__(self, "X", array)
-        object.__setattr__(self, "configuration", configuration)
+    if TYPE_CHECKING:
+
+        def __init__(self, X: ArrayLike, configuration: str | None = None) -> None: ...
+
+    def __post_init__(self) -> None:
+        set_field(self, "X", _transform("target X", self.X))
+        if self.configuration is not None and not isinstance(self.configuration, str):
+            raise InvalidValueError("configuration", self.configuration, "None or the words of a configuration")
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, PoseTarget):
@@ -124,35 +154,38 @@ class PoseTarget:
 Target: TypeAlias = JointTarget | PoseTarget
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MotionCommand:
+class _Command(Record, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
+    """A command, named by its type where it crosses."""
+
+
+class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="move"):
     """Move to a target: (p, t, v) of eq. (1), Doulgeri, Zikos, Delopoulos."""
 
     target: Target
-    issued_at: float | None = None
+    issued_at: Time | None = None
     """Issue time t_iss [s]; None is stamped by whoever registers the command.
 
     An engine in real-time mode stamps its present time; a command for an earlier t_exec then is rejected, so one
     that was issued in time and comes late must carry its own stamp to be postponed.
     """
-    execute_at: float | None = None
+    execute_at: Time | None = None
     """Execution time t_exec [s]; None means as soon as possible: now, or the end of the plan when offline."""
-    speed: float = 1.0
+    speed: _Share = field(default_factory=lambda: 1.0)
     """Share v of the nominal speeds, in (0, 1]. The paper's v = 0 would never arrive, so it is refused."""
     motion: Motion = Motion.JOINT
     profile: Profile = Profile.PARABOLIC
     insertion: Insertion = Insertion.SPLICE
-    deviation: float = 0.0
+    deviation: _Deviation = field(default_factory=float)
     """How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops.
 
     Infinity is a continuous path: the move begins where the one before it begins to brake, or so late that it's at
     its speed when that one ends. Such moves take half of the acceleration, so that any two can overlap.
     """
-    pace: float = 1.0
+    pace: _Share = _UNCHANGED
     """Planned as at 1, a move takes 1/pace times as long on the same path, roundings included; in [0.001, 1]."""
-    acceleration: float = 1.0
+    acceleration: Annotated[float, Meta(ge=1e-2, le=1)] = _UNCHANGED
     """Share of the limits of acceleration and jerk that the move takes, in [0.01, 1]."""
-    tool: Array | None = None
+    tool: Pose | None = None
     """What goes straight and keeps the deviation: a frame in the last link's, (4, 4). Targets stay that link's."""
 
     def __post_init__(self) -> None:
@@ -163,12 +196,12 @@ class MotionCommand:
             share = normal(finite(name, getattr(self, name), "a number in (0, 1]"))
             if not least <= share <= 1:
                 raise InvalidValueError(name, share, f"a number in (0, 1], at least {least:g} so that it arrives")
-            object.__setattr__(self, name, share)
-        object.__setattr__(self, "deviation", _deviation(self.deviation, endless=True))
+            set_field(self, name, _UNCHANGED if share == 1.0 and name != "speed" else share)
+        set_field(self, "deviation", _deviation(self.deviation, endless=True))
         if self.tool is not None:
-            object.__setattr__(self, "tool", _transform("tool", self.tool))
+            set_field(self, "tool", _transform("tool", self.tool))
         for name, kind in (("motion", Motion), ("profile", Profile), ("insertion", Insertion)):
-            object.__setattr__(self, name, _word(name, getattr(self, name), kind))
+            set_field(self, name, _word(name, getattr(self, name), kind))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, MotionCommand) and self._values() == other._values()
@@ -178,54 +211,50 @@ class MotionCommand:
 
     def _values(self) -> tuple[object, ...]:
         tool = None if self.tool is None else tuple(self.tool.ravel().tolist())
-        return (*(getattr(self, name) for name in self.__slots__ if name != "tool"), tool)
+        return (*(getattr(self, name) for name in self.__struct_fields__ if name != "tool"), tool)
 
 
-@dataclass(frozen=True, slots=True)
-class PositionQuery:
+class PositionQuery(_Command, frozen=True, omit_defaults=True, gc=False, tag="query"):
     """Ask for the position at time t: g of eq. (4)."""
 
-    t: float | None = None
+    t: Time | None = None
     """Timeline time [s]; None means now (offline: the end of the plan)."""
 
     def __post_init__(self) -> None:
         if self.t is not None:
-            object.__setattr__(self, "t", normal(finite("t", self.t, "None or finite seconds")))
+            set_field(self, "t", normal(finite("t", self.t, "None or finite seconds")))
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterChange:
+class ParameterChange(_Command, frozen=True, omit_defaults=True, gc=False, tag="parameter"):
     """Change an internal simulation parameter; `Engine.parameters` names them."""
 
-    name: str
-    value: Any
+    name: Annotated[str, Meta(max_length=200)]
+    value: _Parameter = None
 
 
-@dataclass(frozen=True, slots=True)
-class DriveCommand:
+class DriveCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="drive"):
     """Drive a mobile robot on an arc at constant speeds."""
 
-    v: float
+    v: Value
     """Linear speed [m/s], forward positive."""
-    w: float
+    w: Value
     """Angular speed [rad/s], to the left positive."""
-    duration: float
+    duration: Annotated[float, Meta(gt=0, le=LARGEST)]
     """[s], positive."""
-    issued_at: float | None = None
+    issued_at: Time | None = None
     """Issue time t_iss [s]; None is stamped by whoever registers the command."""
-    execute_at: float | None = None
+    execute_at: Time | None = None
     """Execution time t_exec [s]; None means as soon as possible."""
 
     def __post_init__(self) -> None:
         for name in ("v", "w", "duration"):
-            object.__setattr__(self, name, normal(number_in(name, getattr(self, name), -LARGEST, LARGEST)))
+            set_field(self, name, normal(number_in(name, getattr(self, name), -LARGEST, LARGEST)))
         if self.duration <= 0:
             raise InvalidValueError("duration", self.duration, "positive seconds")
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-class SteerCommand:
+class SteerCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="steer"):
     """Move as a hand on a joystick asks: joint rates, or a twist of the tool; it ends by itself."""
 
     rates: Array | None = None
@@ -234,107 +263,98 @@ class SteerCommand:
     """Twist of the tool, (6,): linear [m/s], then angular [rad/s]; instead of rates."""
     frame: Frame = Frame.BASE
     """Frame of the twist."""
-    issued_at: float | None = None
+    issued_at: Time | None = None
     """Issue time t_iss [s]; an input older than 0.2 s moves nothing."""
-    execute_at: float | None = None
+    execute_at: Time | None = None
     """Execution time t_exec [s]; None means as soon as possible."""
 
     def __post_init__(self) -> None:
         if (self.rates is None) == (self.twist is None):
             raise InvalidValueError("steering", (self.rates, self.twist), "either rates or a twist")
         if self.rates is not None:
-            rates = sized_array("rates", self.rates, None, "finite joint rates [rad/s], shape (n,)")
-            if rates.ndim != 1:
-                raise InvalidValueError("rates", self.rates, "finite joint rates [rad/s], shape (n,)")
-            object.__setattr__(self, "rates", rates)
+            set_field(self, "rates", _joints("rates", self.rates, "finite joint rates [rad/s], shape (n,)"))
         if self.twist is not None:
-            object.__setattr__(self, "twist", sized_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
-        object.__setattr__(self, "frame", _word("frame", self.frame, Frame))
+            set_field(self, "twist", sized_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
+        set_field(self, "frame", _word("frame", self.frame, Frame))
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-class Retime:
+class Retime(_Command, frozen=True, omit_defaults=True, gc=False, tag="retime"):
     """Let a scheduled move begin at another time."""
 
-    command_id: int
-    execute_at: float
+    command_id: Number
+    execute_at: Time
     """New start [s]."""
-    issued_at: float | None = None
+    issued_at: Time | None = None
 
     def __post_init__(self) -> None:
-        _check_id(self.command_id)
-        object.__setattr__(self, "execute_at", normal(finite("execute_at", self.execute_at, "finite seconds")))
+        _check_id(self)
+        set_field(self, "execute_at", normal(finite("execute_at", self.execute_at, "finite seconds")))
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-class Cancel:
+class Cancel(_Command, frozen=True, omit_defaults=True, gc=False, tag="cancel"):
     """Take a scheduled move out of the plan; one under way brakes."""
 
-    command_id: int
-    issued_at: float | None = None
-    execute_at: float | None = None
+    command_id: Number
+    issued_at: Time | None = None
+    execute_at: Time | None = None
     """When [s]; None means as soon as possible."""
 
     def __post_init__(self) -> None:
-        _check_id(self.command_id)
+        _check_id(self)
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-class InsertVia:
+class InsertVia(_Command, frozen=True, omit_defaults=True, gc=False, tag="via"):
     """Let a scheduled move, or what is left of one under way, go by another place."""
 
-    command_id: int
+    command_id: Number
     target: Target
-    deviation: float = 0.0
+    deviation: _Distance = field(default_factory=float)
     """How far the tool may stay away from the via [m], so as not to stop there; 0 stops."""
-    issued_at: float | None = None
-    execute_at: float | None = None
+    issued_at: Time | None = None
+    execute_at: Time | None = None
     """When a move under way turns to the via [s]; None means as soon as possible."""
 
     def __post_init__(self) -> None:
-        _check_id(self.command_id)
+        _check_id(self)
         if not isinstance(self.target, (JointTarget, PoseTarget)):
             raise InvalidValueError("target", self.target, "a JointTarget or a PoseTarget")
-        object.__setattr__(self, "deviation", _deviation(self.deviation))
+        set_field(self, "deviation", _deviation(self.deviation))
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class ScaleTime:
+class ScaleTime(_Command, frozen=True, omit_defaults=True, gc=False, tag="scale"):
     """Run what is scheduled `factor` times as fast: the path stays, holds are scaled too."""
 
-    factor: Annotated[float, within(1e-3, 1e3)]
+    factor: Annotated[float, Meta(ge=1e-3, le=1e3)]
     """Ratio of the new pace to the present one, 0.001 to 1000."""
-    issued_at: float | None = None
-    execute_at: float | None = None
+    issued_at: Time | None = None
+    execute_at: Time | None = None
     """When it begins [s]; None means as soon as possible (offline: the start of the timeline)."""
 
     def __post_init__(self) -> None:
+        set_field(self, "factor", number_in("factor", self.factor, 1e-3, 1e3))
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(_Command, frozen=True, omit_defaults=True, gc=False, tag="stop"):
     """Stop along the present motion as fast as the limits allow, and drop what is scheduled."""
 
-    issued_at: float | None = None
-    execute_at: float | None = None
+    issued_at: Time | None = None
+    execute_at: Time | None = None
     """When [s]; None means as soon as possible. A late stop stops at once, whatever the lateness policy."""
 
     def __post_init__(self) -> None:
         _check_stamps(self)
 
 
-@dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
     """Go on with what a stop interrupted and dropped."""
 
-    issued_at: float | None = None
-    execute_at: float | None = None
+    issued_at: Time | None = None
+    execute_at: Time | None = None
     """When [s]; None means as soon as possible."""
 
     def __post_init__(self) -> None:
@@ -345,20 +365,29 @@ PlanEdit: TypeAlias = Retime | Cancel | InsertVia | ScaleTime | Stop | Resume
 """Edits of what is scheduled."""
 
 
-def _check_id(command_id: object) -> None:
-    if isinstance(command_id, bool) or not isinstance(command_id, (int, np.integer)) or command_id < 1:
-        raise InvalidValueError("command_id", command_id, "a command's id, an integer from 1")
+def _joints(name: str, value: ArrayLike, allowed: str) -> Array:
+    array = sized_array(name, value, None, allowed)
+    if array.ndim != 1:
+        raise InvalidValueError(name, value, allowed)
+    return array
+
+
+def _check_id(command: Retime | Cancel | InsertVia) -> None:
+    number = command.command_id
+    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 1:
+        raise InvalidValueError("command_id", number, "a command's id, an integer from 1")
+    set_field(command, "command_id", int(number))
 
 
 def _deviation(value: object, *, endless: bool = False) -> float:
-    if endless and isinstance(value, float) and value == inf:
-        return inf
-    return normal(number_in("deviation", value, 0.0, _FARTHEST, unit=" m"))
+    if endless and (value == ENDLESS or (isinstance(value, float) and value == inf)):
+        return _FOR_EVER
+    return normal(number_in("deviation", value, 0.0, FARTHEST, unit=" m"))
 
 
 def _transform(name: str, value: ArrayLike) -> Array:
     allowed = "a homogeneous transform of shape (4, 4) with a rotation matrix orthonormal to 1e-6"
-    array = sized_array(name, value, (4, 4), allowed, largest=_FARTHEST)
+    array = sized_array(name, value, (4, 4), allowed, largest=FARTHEST)
     R = array[:3, :3]
     proper = np.abs(R @ R.T - np.eye(3)).max() <= 1e-6 and np.linalg.det(R) > 0
     if not proper or not np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
@@ -367,6 +396,8 @@ def _transform(name: str, value: ArrayLike) -> Array:
 
 
 def _word(name: str, value: object, kind: type[_Kind]) -> _Kind:
+    if isinstance(value, kind):
+        return value
     try:
         return kind(value)  # type: ignore[arg-type]
     except ValueError:
@@ -380,7 +411,7 @@ def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdi
             stamp = normal(finite(name, value, "None or finite seconds"))
             if abs(stamp) > LARGEST:
                 raise InvalidValueError(name, value, "within ±1e9 s: times count from the session's origin")
-            object.__setattr__(command, name, stamp)
+            set_field(command, name, stamp)
 
 
 Command: TypeAlias = MotionCommand | DriveCommand | SteerCommand | PlanEdit | PositionQuery | ParameterChange

@@ -13,20 +13,26 @@ from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import inf
-from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
+from msgspec import field
+from msgspec.structs import replace
 
 from vrs.commands import Lateness, MotionCommand, Profile
 from vrs.errors import UnknownCommandError
 from vrs.model import Array, Limits
+from vrs.record import Count, Number, Record, Text, Time, Value
 from vrs.timeline import BaseTimeline
 
-Names: TypeAlias = tuple[int, ...] | Callable[[], tuple[int, ...]]
-"""Command ids, or what finds them when somebody asks."""
+if TYPE_CHECKING:
+    Names: TypeAlias = tuple[int, ...] | Callable[[], tuple[int, ...]]
+else:
+    Names = tuple[Number, ...]
+"""Command ids, or what finds them when somebody asks: only those that were found can be written."""
 
 
 class Status(enum.StrEnum):
@@ -37,38 +43,37 @@ class Status(enum.StrEnum):
     REJECTED = "rejected"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Receipt:
+class Receipt(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     """What became of a command; it belongs to one version of the timeline."""
 
-    command_id: int
+    command_id: Count
     """Id of the command, from 1; rejected commands have one too."""
     status: Status
-    issued_at: float | None
+    issued_at: Time | None = None
     """Issue time [s]; None where none was given to an offline engine."""
-    asked_at: float | None
+    asked_at: Time | None = None
     """Execution time that was asked for [s]; None where none was."""
-    execute_at: float | None = None
+    execute_at: Time | None = None
     """Start of the motion [s]; None when rejected."""
-    end: float | None = None
+    end: Time | None = None
     """Arrival [s]; None when rejected."""
     q: Array | None = None
     """Joints of the target [rad], (n,), poses resolved; None when rejected, or where there's no target."""
-    reason: str = ""
+    reason: Text = ""
     """Why it was postponed or rejected, or what else the user must know."""
-    version: int = 0
+    version: Count = 0
     """Version of the timeline that the command made, or left when rejected."""
-    shift: float = 0.0
+    shift: Value = field(default_factory=float)
     """Δ by which the commands in `shifted` were shifted [s]."""
-    superseded_by: int | None = None
-    """Id of the later command that cut this one short or dropped it; None while it stands."""
+    superseded_by: Count | None = None
+    """Id of the later command that cut this one short or dropped it, 0 for a correction; None while it stands."""
     undone: bool = False
     """Whether it was taken back or cancelled."""
-    shifted_names: Names = ()
+    shifted_names: Names = field(default=(), name="shifted")
     """Ids for `shifted`, or what finds them: naming a long tail takes time that a command hasn't got."""
-    superseded_names: Names = ()
+    superseded_names: Names = field(default=(), name="superseded")
     """Ids for `superseded`, or what finds them."""
-    hindrance: str = ""
+    hindrance: Text = ""
     """Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it."""
 
     @property
@@ -80,6 +85,13 @@ class Receipt:
     def superseded(self) -> tuple[int, ...]:
         """Ids of commands that will not arrive any more, wholly or in part."""
         return self.superseded_names if isinstance(self.superseded_names, tuple) else self.superseded_names()
+
+    def named(self, most: int | None = None) -> Receipt:
+        """The same receipt with its names found, the first `most` of each kind."""
+        shifted, superseded = self.shifted[:most], self.superseded[:most]
+        if shifted is self.shifted_names and superseded is self.superseded_names:
+            return self
+        return replace(self, shifted_names=shifted, superseded_names=superseded)
 
     @property
     def is_still(self) -> bool:

@@ -158,7 +158,7 @@ class Broadcaster:
         frame = Frame(self.number, t, now, q, status)
         through = int(min(self._forecasts.oldest - 1, self.number))
         since = max(self._since, self.number - WINDOW + 1, self._forecasts.forgotten + 1)
-        return Broadcast(frame, Verdicts(since, through, self._ranges))
+        return Broadcast.showing(frame, Verdicts(since, through, self._ranges))
 
     def _catch_up(self) -> None:
         found = 0

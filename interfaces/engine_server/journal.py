@@ -44,7 +44,7 @@ def parts(edit: int, timeline: Timeline, index: int) -> list[History]:
     """
     first = max(index, 0)
     cuts = range(first, min(first + AHEAD * PART, len(timeline)), PART)
-    return [History(edit, cut, timeline.segments[cut : cut + PART]) for cut in cuts]
+    return [History(edit, cut, segments=timeline.segments[cut : cut + PART]) for cut in cuts]
 
 
 def difference(base: Timeline, new: Timeline, since: float, *, edit: int, command_id: int | None) -> Change | None:
@@ -142,9 +142,6 @@ KEPT = 256
 
 HISTORIES = 64
 """Parts of histories that are kept for whoever asks for the same."""
-
-NAMES = 1000
-"""Commands that a receipt names on the wire, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,9 +271,3 @@ class Journal:
         if missing > len(self.edits):
             return (replace(self.edits[-1], command_id=None, others=()),)
         return tuple(islice(self.edits, len(self.edits) - missing, None)) if missing > 0 else ()
-
-
-def portable(receipt: Receipt) -> Receipt:
-    """A receipt that holds nothing of the engine: names are found, the first 1000 of each kind."""
-    names = receipt.shifted[:NAMES], receipt.superseded[:NAMES]
-    return replace(receipt, shifted_names=names[0], superseded_names=names[1])

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from interfaces.engine_server.broadcast import DUE, MOST_VIEWERS, Broadcaster, FrameSlot
 from interfaces.engine_server.forecasts import Forecasts
-from interfaces.engine_server.journal import MOST_CHANGED, Journal, portable
+from interfaces.engine_server.journal import MOST_CHANGED, Journal
 from interfaces.link.delivery import REMEMBERED, OrderBook
 from interfaces.messages import (
     Answer,
@@ -30,6 +30,8 @@ from interfaces.messages import (
     ViewForm,
     Want,
 )
+from interfaces.messages.commands import portable
+from interfaces.messages.fields import MOST_NAMES
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import frozen_array
@@ -141,19 +143,19 @@ class Servlet:
     def _carry_out(self, order: Order, now: float) -> Outcome:
         refusal = "" if self._admit is None else self._admit(order)
         if refusal:
-            return Outcome(order.number, None, refusal, 0, now)
+            return Outcome(order.number, now, None, refusal)
         try:
             if order.command is None:
                 refusal = self.journal.engine.undo_refusal()
             receipt = self.journal.execute(order.command)
         except VrsError as error:
-            return Outcome(order.number, None, str(error), 0, now)
+            return Outcome(order.number, now, None, str(error))
         if receipt is None:
-            return Outcome(order.number, None, refusal, 0, now)
+            return Outcome(order.number, now, None, refusal)
         # It's done, whether the other commands that it names are found now or when it's written.
         with contextlib.suppress(Exception):
-            receipt = portable(receipt)
-        return Outcome(order.number, receipt, "", 0, now)
+            receipt = portable(receipt, MOST_NAMES)
+        return Outcome(order.number, now, receipt)
 
     def _answer(self, ask: Ask, now: float) -> None:
         frame = self.answers.get(ask.number)
@@ -166,7 +168,7 @@ class Servlet:
             self.answers[ask.number] = frame
             if len(self.answers) > REMEMBERED:
                 self.answers.popitem(last=False)
-        self.outbox.append(Answer(frame, now))
+        self.outbox.append(Answer.showing(frame, now))
 
     def _begin(self, follow: Follow, now: float) -> None:
         if self._follow is None or self._follow.number != follow.number:
@@ -236,7 +238,7 @@ class Servlet:
             frame = replace(frame, status=verdict.status, falsified_by=verdict.falsified_by)
             self.answers[verdict.number] = frame
             if verdict.status is FrameStatus.FALSIFIED:
-                self.outbox.append(Answer(frame, now))
+                self.outbox.append(Answer.showing(frame, now))
 
     def _revise(self, now: float) -> None:
         """Send the receipts again that a later command changed."""
@@ -247,6 +249,6 @@ class Servlet:
                 continue
             new = self.journal.engine.receipt(old.command_id)
             if new.version != old.version:
-                revised = Outcome(number, portable(new), "", outcome.revision + 1, now)
+                revised = Outcome(number, now, portable(new, MOST_NAMES), "", outcome.revision + 1)
                 self.orders.outcomes[number] = revised
                 self.outbox.append(revised)

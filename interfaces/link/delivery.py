@@ -144,12 +144,12 @@ class OrderBook:
         """Take an order that has come at now [s]."""
         number = order.number
         if number < self._next:
-            self.settle(self.outcomes.get(number) or Outcome(number, None, OVERTAKEN, 0, now))
+            self.settle(self.outcomes.get(number) or Outcome(number, now, None, OVERTAKEN))
             return
         if isinstance(order.command, Stop):
             for early in sorted(n for n in self._early if n < number):
                 del self._early[early]
-                self.settle(Outcome(early, None, OVERTAKEN, 0, now))
+                self.settle(Outcome(early, now, None, OVERTAKEN))
             self._next = number
         if number - self._next <= BACKLOG:
             self._early[number] = order
@@ -160,7 +160,7 @@ class OrderBook:
                 outcome = self._carry_out(due, now)
             except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this order
                 _LOG.exception("an order failed, and changed nothing")
-                outcome = Outcome(due.number, None, f"{FAILED}: {type(error).__name__}", 0, now)
+                outcome = Outcome(due.number, now, None, f"{FAILED}: {type(error).__name__}")
             self.settle(outcome)
 
     def settle(self, outcome: Outcome) -> None:

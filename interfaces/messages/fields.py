@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Annotated, Any, ClassVar, Self
 
@@ -12,28 +13,25 @@ import msgspec.inspect
 import numpy as np
 from msgspec import Meta
 
-from vrs.checks import LARGEST, SMALLEST
+from vrs.checks import SMALLEST
+from vrs.commands import ENDLESS, FARTHEST, Endless
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
+from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Value
+from vrs.record import Record as Wire
+
+__all__ = ["Count", "Number", "Pose", "Text", "Time", "Value", "Wire"]
 
 MOST_JOINTS = 64
 """Joints of a robot, at most."""
 MOST_NAMES = 1000
 """Commands that a receipt names, at most."""
-LONGEST_TEXT = 2000
-"""Text for people is cut off after so many characters."""
 
 _DIGITS = re.compile(r"[1-9][0-9]{0,19}")
 
-Number = Annotated[int, Meta(ge=1, le=2**63 - 1)]
-Count = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 CommandId = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 """A coefficient: a short segment's may be of any size."""
-Value = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
-"""A joint value, a speed, a parameter; in its own unit."""
-Time = Annotated[float, Meta(ge=-1e9, le=1e9)]
-"""Seconds of the session."""
 Seconds = Annotated[float, Meta(gt=0, le=1e9)]
 """A duration."""
 Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
@@ -42,7 +40,6 @@ Digits = Annotated[str, Meta(pattern=r"\A[1-9][0-9]{0,19}\Z")]
 """An epoch's."""
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Word = Annotated[str, Meta(max_length=200)]
-Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 Rate = Annotated[float, Meta(gt=0, le=1e4)]
 """Of frames [1/s]."""
 Share = Annotated[float, Meta(ge=0, le=1)]
@@ -68,10 +65,6 @@ class Epoch(int):
         return super().__new__(cls, number)
 
 
-class Wire(msgspec.Struct, frozen=True, omit_defaults=True, gc=False):
-    """A message or a part of one as it crosses: defaults are left out, unknown fields passed over."""
-
-
 class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
     """A message, or a part that has a type."""
 
@@ -82,6 +75,14 @@ class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type")
     def kind(self) -> str:
         """What stands for it in `type`."""
         return str(self.__struct_config__.tag)
+
+    def as_written(self, _packed: bool) -> Self:
+        """The same message as it's written, where that isn't what it holds.
+
+        Args:
+            _packed: Whether it's for msgpack, where coefficients are bytes; all else looks the same in both.
+        """
+        return self
 
     def __repr__(self) -> str:
         shown = (name for name in self.__struct_fields__ if name not in self.secrets)
@@ -107,30 +108,32 @@ class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type")
         raise NotImplementedError
 
 
-def check_normal(value: object, name: str) -> None:
+def check_normal(raw: object, read: object, name: str) -> None:
     """Look for a subnormal number in a message or a part of it: what is divided by one overflows.
 
     Args:
-        value: The message, as it crossed.
+        raw: The message as it crossed: numbers, texts, lists and maps.
+        read: What was read from it; fields that it doesn't have are passed over.
         name: What it's called.
 
     Raises:
         InvalidValueError: If one of its numbers is nearer to 0 than `SMALLEST`, and isn't 0.
     """
-    if isinstance(value, float):
-        if 0.0 < abs(value) < SMALLEST:
-            raise InvalidValueError(name, value, f"0, or at least {SMALLEST:.3g} in size")
-    elif isinstance(value, msgspec.Struct):
-        for field in value.__struct_fields__:
-            check_normal(getattr(value, field), f"{name}.{field}")
-    elif isinstance(value, np.ndarray):
-        check_normal(value.tolist(), name)
-    elif isinstance(value, (list, tuple)):
-        for i, item in enumerate(value):
-            check_normal(item, f"{name}[{i}]")
-    elif isinstance(value, dict):
-        for key, item in value.items():
-            check_normal(item, f"{name}[{key!r}]")
+    if isinstance(raw, float):
+        if 0.0 < abs(raw) < SMALLEST:
+            raise InvalidValueError(name, raw, f"0, or at least {SMALLEST:.3g} in size")
+    elif isinstance(raw, dict):
+        known = getattr(read, "__struct_encode_fields__", None)
+        for key, item in raw.items():
+            if known is None:
+                check_normal(item, None, f"{name}[{key!r}]")
+            elif key in known:
+                field = read.__struct_fields__[known.index(key)]  # type: ignore[attr-defined]
+                check_normal(item, getattr(read, field), f"{name}.{key}")
+    elif isinstance(raw, list):
+        parts = read if isinstance(read, tuple) and len(read) == len(raw) else [None] * len(raw)
+        for i, (item, part) in enumerate(zip(raw, parts, strict=True)):
+            check_normal(item, part, f"{name}[{i}]")
 
 
 def numbers(q: Array) -> list[float]:
@@ -159,23 +162,44 @@ def plain(value: object) -> object:
         return value.tolist()
     if isinstance(value, Epoch):
         return str(value)
+    if isinstance(value, Endless):
+        return ENDLESS
     raise InvalidValueError("field", value, "what a message may hold")
 
 
 def rich(kind: Any, value: Any) -> Any:
-    """The opposite, for a decoder: an epoch of digits, a read-only array (n,) of a list of numbers.
+    """The opposite, for a decoder: an epoch of digits, a pose of its rows, a read-only array (n,) of numbers.
 
     Raises:
         ValueError: If there's none.
     """
     if kind is Epoch:
         return epoch_of(value)
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_JOINTS:
-        raise ValueError(f"Expected `array` of 1 to {MOST_JOINTS} numbers")
+    if kind is Pose:
+        if not isinstance(value, list) or len(value) != 4:
+            raise ValueError("Expected `array` of 4 rows")
+        return frozen_array([_numbers(row, 4, 4, FARTHEST) for row in value]).view(kind)
+    return frozen_array(_numbers(value, 1, MOST_JOINTS, LARGEST))
+
+
+def _numbers(value: Any, least: int, most: int, largest: float) -> list[float]:
+    if not isinstance(value, list) or not least <= len(value) <= most:
+        raise ValueError(f"Expected `array` of {least} to {most} numbers")
     for number in value:
-        if (type(number) is not float and type(number) is not int) or not -LARGEST <= number <= LARGEST:
-            raise ValueError(f"Expected `array` of numbers from -{LARGEST:g} to {LARGEST:g}")
-    return frozen_array(value)
+        if (type(number) is not float and type(number) is not int) or not -largest <= number <= largest:
+            raise ValueError(f"Expected `array` of numbers from -{largest:g} to {largest:g}")
+    return value
+
+
+def json_schema(kind: Any) -> dict[str, Any]:
+    """JSON Schema of what crosses by hooks."""
+    if kind is Epoch:
+        return {"type": "string", "pattern": _DIGITS.pattern}
+    number = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
+    if kind is Pose:
+        row = {"type": "array", "items": number, "minItems": 4, "maxItems": 4}
+        return {"type": "array", "items": row, "minItems": 4, "maxItems": 4}
+    return {"type": "array", "items": number, "minItems": 1, "maxItems": MOST_JOINTS}
 
 
 def epoch_of(digits: object) -> Epoch:
@@ -194,25 +218,63 @@ def cut(message: Any) -> Any:
     changed: dict[str, Any] = {}
     for name, most in _texts(message.__class__).items():
         value = getattr(message, name)
-        if isinstance(value, str):
-            fit = value[:most].encode("utf-8", "replace").decode("utf-8")
-            if fit != value:
-                changed[name] = fit
-        elif isinstance(value, msgspec.Struct) and (fitting := cut(value)) is not value:
-            changed[name] = fitting
+        fit = _fitting(value, most)
+        if fit is not value and fit != value:
+            changed[name] = fit
     return msgspec.structs.replace(message, **changed) if changed else message
+
+
+def _fitting(value: Any, most: int | None) -> Any:
+    if isinstance(value, str):
+        return value[:most].encode("utf-8", "replace").decode("utf-8")
+    if isinstance(value, msgspec.Struct):
+        return cut(value)
+    if isinstance(value, tuple):
+        parts = [_fitting(part, most) for part in value]
+        return tuple(parts) if any(a is not b for a, b in zip(parts, value, strict=True)) else value
+    return value
+
+
+def writer(encode: Callable[[Any], bytes]) -> Callable[[Any], bytes]:
+    """What writes messages: as `encode` does, their texts cut off where a reader takes no more."""
+
+    def write(message: Any) -> bytes:
+        try:
+            data = encode(message)
+        except UnicodeEncodeError:
+            return encode(cut(message))
+        return data if len(data) <= LONGEST_TEXT else encode(cut(message))
+
+    return write
 
 
 @cache
 def _texts(kind: Any) -> dict[str, int | None]:
-    """Fields that are text, with how long it may be, and those that are messages themselves."""
+    """Fields that may hold text, with how long it may be, and those that hold messages themselves."""
     found: dict[str, int | None] = {}
     for field in msgspec.inspect.type_info(kind).fields:  # type: ignore[attr-defined]
-        kinds = getattr(field.type, "types", (field.type,))
-        for one in kinds:
-            if isinstance(one, msgspec.inspect.StrType | msgspec.inspect.StructType):
-                found[field.encode_name] = getattr(one, "max_length", None)
+        for one in _parts(field.type):
+            if isinstance(one, msgspec.inspect.StrType) or (
+                isinstance(one, msgspec.inspect.StructType) and _texts(one.cls)
+            ):
+                found[field.name] = getattr(one, "max_length", None)
     return found
+
+
+def _parts(kind: msgspec.inspect.Type) -> Iterator[msgspec.inspect.Type]:
+    """What a field may hold, in arrays too."""
+    inspect = msgspec.inspect
+    if isinstance(kind, inspect.UnionType):
+        inner = kind.types
+    elif isinstance(kind, inspect.TupleType):
+        inner = kind.item_types
+    elif isinstance(kind, inspect.VarTupleType):
+        inner = (kind.item_type,)
+    else:
+        yield kind
+        return
+    for one in inner:
+        yield from _parts(one)
 
 
 def digits(epoch: int | None) -> str | None:

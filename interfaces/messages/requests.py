@@ -7,15 +7,44 @@ the same timeline, shifted by D, so that stamps cross as they are (Doulgeri, Zik
 from __future__ import annotations
 
 import enum
+import math
+from copy import copy
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Annotated, ClassVar, TypeAlias
 
-from interfaces.messages.fields import Count, Message, Number, Rate, Time, Word
+import msgspec
+from msgspec import Meta
+from typing_extensions import override
+
+from interfaces.messages.commands import check_command
+from interfaces.messages.fields import (
+    MOST_NAMES,
+    CommandId,
+    Count,
+    Epoch,
+    Leased,
+    Message,
+    Number,
+    Rate,
+    Text,
+    Time,
+    Word,
+)
+from interfaces.messages.segments import Dof, Segmented, Segments
 from vrs.commands import Command, finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.segment import PolynomialSegment
+from vrs.record import set_field
+
+if TYPE_CHECKING:
+    Before: TypeAlias = int
+    When: TypeAlias = float
+    Past: TypeAlias = float
+else:
+    Before = Count | None
+    When = Time | None
+    Past = Time | msgspec.UnsetType | None
 
 
 class FrameStatus(enum.StrEnum):
@@ -68,23 +97,21 @@ class Frame:
     """Id of the first command that changed what happens at t."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Order:
+class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):
     """Client: carry out a command. It's sent again until its outcome comes, and carried out once."""
 
-    kind: ClassVar[str] = "order"
-    version: ClassVar[int] = 1
-    number: int
+    number: Number
     """Orders are carried out in the order of their numbers; a stop doesn't wait."""
-    command: Command | None
+    command: Command | None = None
     """None takes back the newest accepted command."""
-    epoch: int = 0
-    """Of the control lease, below 2⁶⁴; 0 where none is needed, as on an engine in this process."""
+    epoch: Epoch | None = None
+    """Of the control lease; None where none is needed, as on an engine in this process."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
-        if isinstance(self.epoch, bool) or not isinstance(self.epoch, int) or not 0 <= self.epoch < 2**64:
-            raise InvalidValueError("epoch", self.epoch, "an integer from 0 to 2**64 - 1")
+        if self.command is not None:
+            check_command(self.command)
+        super().__post_init__()
 
 
 class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
@@ -123,32 +150,47 @@ class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
     """First segment that it lacks of a history; None when it has that and lacks later edits."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class Outcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="outcome"):
     """Servlet: what became of an order; again when a later command changed that."""
 
-    kind: ClassVar[str] = "outcome"
-    version: ClassVar[int] = 1
-    number: int
-    receipt: Receipt | None
-    """None where there was nothing to take back, the command gives no receipt, or it was refused."""
-    refusal: str
-    """Why the command couldn't be taken at all; empty where it could."""
-    revision: int
-    """Counts up with each change of the receipt, from 0."""
-    made_at: float
+    number: Number
+    made_at: Time
     """The engine's time [s]."""
+    receipt: Receipt | None = None
+    """None where there was nothing to take back, the command gives no receipt, or it was refused."""
+    refusal: Text = ""
+    """Why the command couldn't be taken at all; empty where it could."""
+    revision: Count = 0
+    """Counts up with each change of the receipt, from 0."""
+
+    @override
+    def as_written(self, _packed: bool) -> Outcome:
+        if self.receipt is None or (named := self.receipt.named(MOST_NAMES)) is self.receipt:
+            return self
+        return msgspec.structs.replace(self, receipt=named)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class Answer(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="answer"):
     """Servlet: the frame that was asked for, with its status as it is now."""
 
-    kind: ClassVar[str] = "answer"
-    version: ClassVar[int] = 1
-    frame: Frame
-    now: float
+    number: Count
+    t: Time
+    made_at: Time
+    q: Array
+    status: FrameStatus
+    now: Time
     """The engine's time when this was sent [s]."""
+    falsified_by: CommandId | None = None
+
+    @classmethod
+    def showing(cls, frame: Frame, now: float) -> Answer:
+        """The answer that shows a frame."""
+        return cls(frame.number, frame.t, frame.made_at, frame.q, frame.status, now, frame.falsified_by)
+
+    @property
+    def frame(self) -> Frame:
+        """The frame."""
+        return Frame(self.number, self.t, self.made_at, self.q, self.status, self.falsified_by)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,14 +207,34 @@ class Verdicts:
     """First and last number, and the command."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Broadcast:
+class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="broadcast"):
     """Servlet: the newest frame of a broadcaster, and what became of earlier ones."""
 
-    kind: ClassVar[str] = "broadcast"
-    version: ClassVar[int] = 1
-    frame: Frame
-    verdicts: Verdicts
+    number: Count
+    t: Time
+    made_at: Time
+    q: Array
+    since: Count
+    through: Count
+    status: FrameStatus = FrameStatus.PREDICTED
+    falsified_by: CommandId | None = None
+    falsified: Annotated[tuple[tuple[Count, Count, CommandId | None], ...], Meta(max_length=256)] = ()
+
+    @classmethod
+    def showing(cls, frame: Frame, verdicts: Verdicts) -> Broadcast:
+        """The message with a frame and verdicts."""
+        what = frame.number, frame.t, frame.made_at, frame.q, verdicts.since, verdicts.through
+        return cls(*what, frame.status, frame.falsified_by, verdicts.falsified)
+
+    @property
+    def frame(self) -> Frame:
+        """The frame."""
+        return Frame(self.number, self.t, self.made_at, self.q, self.status, self.falsified_by)
+
+    @property
+    def verdicts(self) -> Verdicts:
+        """What became of earlier frames."""
+        return Verdicts(self.since, self.through, self.falsified)
 
 
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
@@ -198,54 +260,82 @@ class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="s
     """Rate of the frames that follow [1/s]; None where segments do."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class History:
+class History(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="history"):
     """Servlet: a part of the timeline that a `Scene` named."""
 
-    kind: ClassVar[str] = "history"
-    version: ClassVar[int] = 1
-    edit: int
-    index: int
+    edit: Count
+    index: Count
     """Index of the first segment."""
-    segments: tuple[PolynomialSegment, ...]
+    dof: Dof = 0
+    """Joints of the segments."""
+    start: Time = 0.0
+    """Start of the first segment [s]."""
+    segments: Segments = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Change:
+class Change(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change"):
     """Servlet: an edit of the timeline, as the segments that it put in.
 
     The first `first` segments stay, then come `segments`, then those of the base from `tail` on, beginning at
     `tail_start`.
     """
 
-    kind: ClassVar[str] = "change"
-    version: ClassVar[int] = 1
-    base: int
-    """Number of the edit before it."""
-    edit: int
+    edit: Number
     """Its number."""
-    command_id: int | None
-    """The command that made it, where that's known."""
-    first: int
-    segments: tuple[PolynomialSegment, ...]
-    tail: int | None
-    tail_start: float
-    """[s]."""
-    end: float
+    first: Count
+    end: Time
     """End of the new timeline [s], for a check."""
+    command_id: CommandId | None = None
+    """The command that made it, where that's known."""
+    base: Before = None  # type: ignore[assignment]
+    """Number of the edit that it builds on; the one before unless given."""
+    tail: Count | None = None
+    tail_start: When = None  # type: ignore[assignment]
+    """[s]; the end unless given."""
+    dof: Dof = 0
+    """Joints of the segments."""
+    start: Time = 0.0
+    """Start of the first segment [s]."""
+    segments: Segments = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.base is None:
+            set_field(self, "base", self.edit - 1)
+        if self.tail_start is None:
+            set_field(self, "tail_start", self.end)
+
+    @override
+    def as_written(self, packed: bool) -> Change:
+        message = super().as_written(packed)
+        if self.base == self.edit - 1:
+            set_field(message, "base", None)
+        if self.tail_start == self.end:
+            set_field(message, "tail_start", None)
+        return message
 
 
-@dataclass(frozen=True, slots=True)
-class Pulse:
+class Pulse(Message, frozen=True, omit_defaults=True, gc=False, tag="pulse"):
     """Servlet: up to `past`, the timeline with this edit is what happened."""
 
-    kind: ClassVar[str] = "pulse"
-    version: ClassVar[int] = 1
-    edit: int
-    now: float
+    edit: Count
+    now: Time
     """The engine's time [s]."""
-    past: float
-    """What lies before doesn't change any more [s]; −∞ for an offline engine."""
+    past: Past = msgspec.UNSET  # type: ignore[assignment]
+    """What lies before doesn't change any more [s]: now unless given; −∞ for an offline engine, which crosses as
+    null."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.past, float):
+            set_field(self, "past", -math.inf if self.past is None else float(self.now))
+
+    @override
+    def as_written(self, _packed: bool) -> Pulse:
+        if self.past not in {self.now, -math.inf}:
+            return self
+        message = copy(self)
+        set_field(message, "past", msgspec.UNSET if self.past == self.now else None)
+        return message
 
 
 def _check_number(number: object) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, Generic, TypeVar
+from copy import copy
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias
 
 import msgspec
 import numpy as np
@@ -12,6 +13,7 @@ from msgspec import Meta
 from interfaces.messages.fields import MOST_JOINTS, CommandId, Finite, Seconds, Time
 from vrs.errors import InvalidValueError
 from vrs.model import Array
+from vrs.record import Record, set_field
 from vrs.segment import PolynomialSegment, known_segment
 
 MOST_SEGMENTS = 256
@@ -28,23 +30,53 @@ Plain = Annotated[
     Meta(min_length=1, max_length=MOST_POWERS),
 ]
 """Coefficients in JSON: rows by ascending power."""
-C = TypeVar("C")
 
 _DOUBLE = np.dtype("<f8")
 
 
-class SegmentWire(msgspec.Struct, Generic[C], frozen=True, array_like=True, gc=False):
+class SegmentRow(msgspec.Struct, frozen=True, array_like=True, gc=False):
     """A segment as it crosses: an array of three or four."""
 
     duration: Seconds
     command_id: CommandId | None
-    coefficients: C
+    coefficients: Packed | Plain
     start: Time | None = None
 
 
 Dof = Annotated[int, Meta(ge=0, le=MOST_JOINTS)]
-Segments = Annotated[tuple[SegmentWire[C], ...], Meta(max_length=MOST_SEGMENTS)]
-Planned = Annotated[tuple[SegmentWire[C], ...], Meta(max_length=MOST_PLANNED)]
+if TYPE_CHECKING:
+    Segments: TypeAlias = tuple[PolynomialSegment, ...]
+    Planned: TypeAlias = tuple[PolynomialSegment, ...]
+else:
+    Segments = Annotated[tuple[SegmentRow, ...], Meta(max_length=MOST_SEGMENTS)]
+    Planned = Annotated[tuple[SegmentRow, ...], Meta(max_length=MOST_PLANNED)]
+
+
+class Segmented(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
+    """A message, or a part of one, with segments: it holds them as they are, and crosses with their rows."""
+
+    def __post_init__(self) -> None:
+        given = self.segments  # type: ignore[attr-defined]
+        if not given:
+            return
+        if type(given[0]) is SegmentRow:
+            set_field(self, "segments", segments_of(self.dof, self.start, given))  # type: ignore[attr-defined]
+        else:
+            set_field(self, "dof", given[0].coefficients.shape[1])
+            set_field(self, "start", given[0].start)
+
+    def as_written(self, packed: bool) -> Self:
+        """The same with rows for segments.
+
+        Args:
+            packed: Whether coefficients are bytes, for msgpack, or lists.
+        """
+        message = copy(self)
+        dof, start, found = rows(self.segments, packed)  # type: ignore[attr-defined]
+        set_field(message, "dof", dof)
+        set_field(message, "start", start)
+        set_field(message, "segments", found)
+        return message
 
 
 def rows(segments: Sequence[PolynomialSegment], packed: bool) -> tuple[int, float, tuple[Any, ...]]:
@@ -68,7 +100,7 @@ def rows(segments: Sequence[PolynomialSegment], packed: bool) -> tuple[int, floa
     return segments[0].coefficients.shape[1], segments[0].start, tuple(found)
 
 
-def segments_of(dof: int, start: float, wires: Iterable[SegmentWire[Any]]) -> tuple[PolynomialSegment, ...]:
+def segments_of(dof: int, start: float, wires: Iterable[SegmentRow]) -> tuple[PolynomialSegment, ...]:
     """The segments that rows stand for.
 
     Raises:

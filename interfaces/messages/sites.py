@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Annotated, Final
 
+import msgspec
+from msgspec import Meta
+from typing_extensions import override
+
+from interfaces.messages.fields import (
+    MOST_NAMES,
+    Count,
+    Epoch,
+    Leased,
+    Number,
+    Stamp,
+    Text,
+    Time,
+    Value,
+)
+from interfaces.messages.segments import Dof, Planned, Segmented
 from vrs.commands import Command
 from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.segment import PolynomialSegment
+from vrs.record import Record
 
 NEW: Final = 128
 """New samples in one report, at most; the older ones are asked for."""
@@ -17,18 +32,22 @@ AGAIN: Final = 32
 RANGES: Final = 32
 """Ranges of samples that are asked for in one message, at most."""
 
-Ranges = tuple[tuple[int, int], ...]
+MOST_ENTRIES = 4096
+"""Entries or receipts in one message, at most."""
+
+Ranges = tuple[tuple[Number, Number], ...]
 """First and last number of each range."""
+Uncertainty = Annotated[float, Meta(ge=0, le=1e12)]
 
 
-class Sample(NamedTuple):
-    """Where the robot was measured once."""
+class Sample(msgspec.Struct, frozen=True, array_like=True, gc=False, eq=False):
+    """Where the robot was measured once; it crosses as an array."""
 
-    number: int
+    number: Number
     """Counts the samples of a robot's site, without gaps; 0 of a robot that doesn't number them."""
-    t: float
+    t: Stamp
     """When, by the robot's clock [s]."""
-    play: float
+    play: Time
     """Time on the robot's timeline that it played then [s]."""
     q: Array
     """Measured joints [rad], (n,)."""
@@ -36,95 +55,108 @@ class Sample(NamedTuple):
     """What the robot's own timeline asked for at `play` [rad], (n,); None of a robot that doesn't say."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LogEntry:
+class LogEntry(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     """One command of the operator's log."""
 
-    number: int
+    number: Number
     """From 1, without gaps, within an epoch."""
-    at: float
+    at: Time
     """When it was given, by the operator's clock [s]; entries are in this order."""
-    command: Command | None
-    """What was commanded, poses and times resolved as they were accepted; None takes back the newest."""
-    command_id: int
+    command_id: Count
     """Id that the operator's engine gave it."""
+    command: Command | None = None
+    """What was commanded, poses and times resolved as they were accepted; None takes back the newest."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Orders:
+class Orders(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="orders"):
     """From the operator's site: entries of the log, or a heartbeat without any."""
 
-    epoch: int
+    epoch: Epoch
     """Of the control lease."""
-    number: int
+    number: Number
     """Of the packet, from 1."""
-    sent_at: float
+    sent_at: Stamp
     """By the operator's clock [s]."""
-    newest: int
+    newest: Count
     """Number of the newest entry."""
-    complete_until: float
+    complete_until: Time
     """With all entries up to the newest, nothing will change before this time on the timeline [s]."""
-    epoch_began: float
+    epoch_began: Time
     """When the epoch began [s]: no entry of it changes anything before."""
-    heard: int = 0
+    heard: Count = 0
     """Number of the newest report that came."""
-    entries: tuple[LogEntry, ...] = ()
+    entries: Annotated[tuple[LogEntry, ...], Meta(max_length=MOST_ENTRIES)] = ()
     """New ones, and older ones that may have been lost."""
-    wanted: Ranges = ()
+    wanted: Annotated[Ranges, Meta(max_length=RANGES)] = ()
     """Samples that are missing; see `interfaces.teleop.samples`."""
-    halted: str = ""
+    halted: Text = ""
     """Why the operator's site commands no more until somebody resumes: the robot is to stop and wait for that."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlanPart:
+class PlanPart(Segmented, frozen=True, omit_defaults=True, gc=False, eq=False):
     """The robot's plan from a time on."""
 
-    version: int
+    version: Count
     """Of the robot's timeline."""
-    since: float
+    since: Time
     """Before it nothing changed since the version that the operator knew [s]."""
     initial: Array
     """Where the arm stands before the first segment [rad], (n,)."""
-    segments: tuple[PolynomialSegment, ...]
+    dof: Dof = 0
+    """Joints of the segments."""
+    start: Time = 0.0
+    """Start of the first segment [s]."""
+    segments: Planned = ()
     """All of them from there on."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Report:
+class Report(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="report"):
     """From the robot's site: where it is, and what became of the entries."""
 
-    epoch: int
+    epoch: Epoch
     """Epoch that it follows."""
-    number: int
+    number: Number
     """Of the packet, from 1."""
-    sent_at: float
+    sent_at: Stamp
     """By the robot's clock [s]."""
-    echo: tuple[int, float, float] | None
-    """The newest Orders heard: its number, its sent_at, and when it arrived by the robot's clock [s]."""
-    executed: int
+    executed: Count
     """Entries up to this number were carried out."""
-    play: float
+    play: Time
     """Time on the robot's timeline that it plays now [s]."""
-    pace: float
+    pace: Value
     """How fast it plays; 1 is as planned."""
     q: Array
     """Measured joints [rad], (n,)."""
-    measured_at: float
+    measured_at: Stamp
     """When they were measured, by the robot's clock [s]."""
-    q_at: float
+    q_at: Time
     """Time on the robot's timeline that it played then [s]."""
-    halted: str = ""
+    echo: tuple[Number, Stamp, Stamp] | None = None
+    """The newest Orders heard: its number, its sent_at, and when it arrived by the robot's clock [s]."""
+    halted: Text = ""
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
-    receipts: tuple[tuple[int, Receipt], ...] = ()
+    receipts: Annotated[tuple[tuple[Number, Receipt], ...], Meta(max_length=MOST_ENTRIES)] = ()
     """Receipts by entry number, of entries not known to have been reported."""
     plan: PlanPart | None = None
     """Where the robot's plan may be another than the operator thinks."""
     reference: Array | None = None
     """What the robot's own timeline asked for at `measured_at` [rad], (n,); None where it doesn't say."""
-    uncertainty: float | None = None
+    uncertainty: Uncertainty | None = None
     """Bound on the error of what it takes for the operator's clock [s]; None where that isn't known."""
-    samples: tuple[Sample, ...] = ()
+    samples: Annotated[tuple[Sample, ...], Meta(max_length=NEW + AGAIN)] = ()
     """Where it was measured since the report before, and earlier samples that are missing at the operator's."""
-    oldest: int = 0
+    oldest: Count = 0
     """Number of the oldest sample that it keeps; 0 where it keeps none."""
+
+    def __post_init__(self) -> None:
+        # A robot that follows nobody yet reports, too, to whoever watches it in its own process.
+        if self.epoch != 0:
+            super().__post_init__()
+
+    @override
+    def as_written(self, packed: bool) -> Report:
+        if self.plan is None and not self.receipts:
+            return self
+        receipts = tuple((number, receipt.named(MOST_NAMES)) for number, receipt in self.receipts)
+        plan = None if self.plan is None else self.plan.as_written(packed)
+        return msgspec.structs.replace(self, receipts=receipts, plan=plan)

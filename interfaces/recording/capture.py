@@ -17,7 +17,7 @@ from typing_extensions import override
 
 from interfaces.engine_server.journal import difference
 from interfaces.link import PacketRecord
-from interfaces.messages.commands import command_wire
+from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
@@ -25,7 +25,6 @@ from interfaces.recording.messages import (
     Anchor,
     ChangeEntry,
     CommandEntry,
-    FullReceipt,
     GivenEntry,
     HistoryEntry,
     Late,
@@ -128,9 +127,7 @@ class Capture(SiteObserver):
         timeline, now = self._began
         yield from whole_entries(timeline, 0, now, cut=self._cut)
         for known in () if self.late is None else self.late.known:
-            command = None if known.command is None else command_wire(known.command, packed=False)
-            receipt = FullReceipt.of(self._named(known.receipt))
-            yield GivenEntry(now, receipt, command, known.profile is Profile.JERK_LIMITED)
+            yield GivenEntry(now, self._named(known.receipt), known.command, known.profile is Profile.JERK_LIMITED)
 
     def commanded(self, deed: CommandRecord) -> None:
         """Note a command."""
@@ -143,7 +140,7 @@ class Capture(SiteObserver):
     @override
     def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
         """Note an answer of the robot's."""
-        self.add(now, ReceiptEntry(now, "real", FullReceipt.of(self._named(receipt))))
+        self.add(now, ReceiptEntry(now, "real", self._named(receipt)))
 
     def reported(self, report: Report, *, now: float) -> None:
         """Drivers that know the real robot by its reports alone take them."""
@@ -242,8 +239,7 @@ class Capture(SiteObserver):
             if isinstance(what, CommandRecord):
                 at, command_id = what.at, None if what.receipt is None else what.receipt.command_id
                 receipt = None if what.receipt is None else self._named(what.receipt)
-                entry = CommandEntry.of(self._number, at, what.command, receipt, refused=what.refused)
-                self.add(at, entry)
+                self.add(at, CommandEntry(self._number, at, what.command, receipt, what.refused))
                 if what.receipt is not None and what.receipt.status is not Status.REJECTED:
                     self._known[what.receipt.command_id] = what.receipt.version
             else:
@@ -267,16 +263,16 @@ class Capture(SiteObserver):
             if receipt.version != version:
                 self._known[command_id] = receipt.version
                 now = engine.now()
-                self.add(now, ReceiptEntry(now, "virtual", FullReceipt.of(self._named(receipt))))
+                self.add(now, ReceiptEntry(now, "virtual", self._named(receipt)))
 
     def _named(self, receipt: Receipt) -> Receipt:
         """A receipt whose names don't take long."""
         if self._every:
-            return receipt
+            return portable(receipt)
         names = [
             names if isinstance(names, tuple) else () for names in (receipt.shifted_names, receipt.superseded_names)
         ]
-        return replace(receipt, shifted_names=names[0], superseded_names=names[1])
+        return portable(replace(receipt, shifted_names=names[0], superseded_names=names[1]))
 
     def whole(self, t: float) -> None:
         """Write down the newest timeline once more at a time [s]: it's known then, whatever is lost of a file."""
@@ -287,7 +283,7 @@ class Capture(SiteObserver):
     def receipts(self, t: float, site: str, receipts: Sequence[Receipt]) -> None:
         """Write down the truth about commands at a site, `virtual` or `real`, at a time [s]."""
         for receipt in receipts:
-            self.add(t, ReceiptEntry(t, site, FullReceipt.of(self._named(receipt))))  # type: ignore[arg-type]
+            self.add(t, ReceiptEntry(t, site, self._named(receipt)))  # type: ignore[arg-type]
 
 
 def edit_entries(

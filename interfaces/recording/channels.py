@@ -13,6 +13,7 @@ from typing import Any, Final, TypeAlias
 
 import msgspec
 
+from interfaces.messages.fields import json_schema
 from interfaces.recording import messages as m
 from interfaces.recording.poses import FrameTransforms, RealPose, VirtualPose
 
@@ -96,7 +97,7 @@ Message: TypeAlias = (
 
 @cache
 def _schema(name: str, kinds: Kinds) -> bytes:
-    found, parts = msgspec.json.schema_components(kinds, ref_template="{name}")
+    found, parts = msgspec.json.schema_components(kinds, ref_template="{name}", schema_hook=json_schema)
     merged = _merged([_plain(schema, parts) for schema in found])
     return msgspec.json.encode({"title": name, **_sayable(merged or {})})
 

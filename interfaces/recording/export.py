@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from interfaces.messages.fields import plain
 from interfaces.recording.history import arm_timeline
 from interfaces.recording.messages import Anchor, CommandEntry
 from interfaces.recording.poses import quaternions
@@ -158,7 +159,7 @@ def _content(entry: CommandEntry | Anchor) -> str | None:
     """A command as JSON."""
     if isinstance(entry, Anchor) or entry.command is None:
         return None
-    return msgspec.json.encode(entry.command).decode()
+    return msgspec.json.encode(entry.command, enc_hook=plain).decode()
 
 
 def receipts_table(recording: Recording) -> RecordingTable:

@@ -306,14 +306,14 @@ class _Reading:
         found = []
         for entry in self.recording.commands:
             if isinstance(entry, CommandEntry):
-                receipt = None if entry.receipt is None else entry.receipt.read()
+                receipt = entry.receipt
                 if receipt is None or receipt.status is not Status.REJECTED:
                     found.append((entry, receipt))
         return found
 
     def _alone(self) -> Timeline:
         """What the commands alone make of the virtual robot."""
-        sent = [(entry.at, entry.read(), receipt) for entry, receipt in self._taken()]
+        sent = [(entry.at, entry.command, receipt) for entry, receipt in self._taken()]
         return carried_out(*begun(self.recording), sent)
 
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[CommandPacket, ...]:

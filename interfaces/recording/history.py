@@ -216,6 +216,13 @@ def _changed(base: Timeline, entry: ChangeEntry) -> Timeline:
         raise InvalidValueError("dof", entry.dof, f"{base.dof}")
     segments = segments_of(entry.dof, base.start, entry.segments)
     change = Change(
-        entry.base, entry.edit, entry.command_id, entry.first, segments, entry.tail, entry.tail_start, entry.end
+        entry.edit,
+        entry.first,
+        entry.end,
+        entry.command_id,
+        entry.base,
+        entry.tail,
+        entry.tail_start,
+        segments=segments,
     )
     return changed(base, change).with_version(entry.version)

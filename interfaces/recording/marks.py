@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.messages.commands import DriveWire, MoveWire
-from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt
+from interfaces.recording.messages import Anchor, CommandEntry
 from interfaces.runs.twin_run import correction_text
-from vrs.commands import Motion
-from vrs.ledger import Status
+from vrs.commands import DriveCommand, Motion, MotionCommand
+from vrs.ledger import Receipt, Status
 from vrs.model import Array
 from vrs.timeline import Timeline
 
@@ -224,16 +223,16 @@ def _told(entry: CommandEntry | Anchor) -> Iterator[Mark]:
 def _usual(entry: CommandEntry) -> bool:
     """Whether it's one of the many by which somebody drives."""
     accepted = entry.receipt is not None and entry.receipt.status is Status.ACCEPTED
-    return accepted and isinstance(entry.command, DriveWire)
+    return accepted and isinstance(entry.command, DriveCommand)
 
 
-def _described(entry: CommandEntry, receipt: FullReceipt) -> str:
+def _described(entry: CommandEntry, receipt: Receipt) -> str:
     """A command and what became of it at first, in a line."""
     command = entry.command
     if command is None:
         return f"command {receipt.command_id} was taken back"
     tag = str(type(command).__struct_config__.tag)
-    straight = isinstance(command, MoveWire) and command.motion is Motion.LINE
+    straight = isinstance(command, MotionCommand) and command.motion is Motion.LINE
     text = (
         f"command {receipt.command_id} ({'straight line' if straight else _WORDS.get(tag, tag)}): {receipt.status}"
     )

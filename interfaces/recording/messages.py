@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 from msgspec import Meta, field
 
-from interfaces.messages.commands import CommandWire, ReceiptWire, command_wire
 from interfaces.messages.fields import (
     MOST_JOINTS,
     CommandId,
@@ -259,7 +258,6 @@ COLLISION = "collision"
 """`EventEntry.kind` of collisions."""
 
 _Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
-_Names = tuple[Number, ...]
 Site: TypeAlias = Literal["virtual", "real"]
 
 
@@ -339,14 +337,6 @@ class End(Entry, frozen=True, omit_defaults=True, gc=False, tag="end"):
     """What the run's summary holds besides what can be computed from the recording."""
 
 
-class FullReceipt(ReceiptWire, frozen=True, omit_defaults=True, gc=False):
-    """A receipt that names every command it shifted or superseded."""
-
-    most_names: ClassVar[int | None] = None
-    shifted: _Names = ()
-    superseded: _Names = ()
-
-
 class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="command"):
     """A command as the operator's engine took it, rejected ones too."""
 
@@ -354,37 +344,20 @@ class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="comman
     """Counts commands and anchors, from 1."""
     at: Time
     """The engine's clock, exactly [s]."""
-    command: CommandWire | None = None
+    command: Command | None = None
     """None takes back the newest accepted command."""
-    receipt: FullReceipt | None = None
+    receipt: Receipt | None = None
     """None where the command gives none."""
     refused: bool = False
     """Whether the site refused it before the engine saw it."""
-
-    @classmethod
-    def of(
-        cls, number: int, at: float, command: Command | None, receipt: Receipt | None, *, refused: bool = False
-    ) -> CommandEntry:
-        """The entry of a command."""
-        given = None if receipt is None else FullReceipt.of(receipt)
-        return cls(number, at, command_wire(command, packed=False), given, refused)
-
-    def read(self) -> Command | None:
-        """The command; None takes back the newest.
-
-        Raises:
-            InvalidValueError: If it's none.
-        """
-        command: Command | None = None if self.command is None else self.command.read()
-        return command
 
 
 class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
     """A command from before the recording that wasn't over when it began, or by which the arm had moved last."""
 
     t: Time
-    receipt: FullReceipt
-    command: CommandWire | None = None
+    receipt: Receipt
+    command: Command | None = None
     """None where it's no motion command."""
     smooth: bool = False
     """Whether it moves the arm with bounded jerk."""
@@ -396,11 +369,11 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         Raises:
             InvalidValueError: If it's no command's.
         """
-        command = None if self.command is None else self.command.read()
+        command = self.command
         if command is not None and not isinstance(command, MotionCommand):
             raise InvalidValueError("command", command, "a motion command")
         profile = Profile.JERK_LIMITED if self.smooth else Profile.PARABOLIC
-        return Known(self.receipt.read(), command, profile)
+        return Known(self.receipt, command, profile)
 
 
 class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -446,7 +419,7 @@ class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receip
 
     t: Time
     site: Site
-    receipt: FullReceipt
+    receipt: Receipt
 
 
 class PacketEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):

@@ -229,7 +229,7 @@ class Recording:
                     found[entry.receipt.command_id] = entry.receipt
             elif isinstance(entry, CommandEntry | GivenEntry) and site == "virtual" and entry.receipt is not None:
                 found[entry.receipt.command_id] = entry.receipt
-        return tuple(found[command_id].read() for command_id in sorted(found))
+        return tuple(found[command_id] for command_id in sorted(found))
 
     @property
     def packets(self) -> tuple[CommandPacket, ...]:

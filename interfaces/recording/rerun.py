@@ -10,7 +10,7 @@ import numpy as np
 
 from interfaces.recording import capture, history
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
-from interfaces.recording.messages import Anchor, CommandEntry, FullReceipt, Late
+from interfaces.recording.messages import Anchor, CommandEntry, Late
 from interfaces.recording.recording import Recording
 from robots.ipr.model import Ipr
 from robots.ipr.model import model as ipr_model
@@ -195,7 +195,7 @@ class _Again:
         late = self._late
         if late is None or isinstance(entry, Anchor):
             return False
-        command, answer = entry.read(), entry.receipt
+        command, answer = entry.command, entry.receipt
         undone = command is None and made is None and answer is not None and answer.command_id <= late.newest
         resumed = isinstance(command, Resume) and made is not None and made.status is Status.REJECTED
         of = command.command_id if isinstance(command, Retime | Cancel | InsertVia) else None
@@ -208,7 +208,7 @@ class _Again:
         return undone or resumed or unknown
 
     def _carry_out(self, entry: CommandEntry) -> Receipt | None:
-        command = entry.read()
+        command = entry.command
         if entry.refused and command is not None:
             return self._engine.refuse(command, "" if entry.receipt is None else entry.receipt.reason)
         if command is None:
@@ -258,14 +258,16 @@ def _named(entry: CommandEntry | Anchor) -> str:
     return f"command{given} at {entry.at:.6f} s"
 
 
-def _unlike(made: Receipt | None, recorded: FullReceipt | None) -> str:
+def _unlike(made: Receipt | None, recorded: Receipt | None) -> str:
     """How a receipt differs from the recorded one, names of others aside; empty where it doesn't."""
     if made is None or recorded is None:
         return "" if made is None and recorded is None else "has a receipt in one of the runs alone"
-    mine = FullReceipt.of(made)
-    for name in mine.__struct_fields__:
-        a, b = getattr(mine, name), getattr(recorded, name)
-        if name not in {"shifted", "superseded"} and a != b:
+    for name in made.__struct_fields__:
+        a, b = (
+            value.tolist() if isinstance(value, np.ndarray) else value
+            for value in (getattr(made, name), getattr(recorded, name))
+        )
+        if name not in {"shifted_names", "superseded_names"} and a != b:
             return f"is answered with {name} {a!r}, not {b!r}"
     return ""
 

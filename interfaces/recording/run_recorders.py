@@ -16,6 +16,7 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link import PacketRecord
+from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
 from interfaces.recording import messages as d
 from interfaces.recording.capture import Capture
@@ -345,7 +346,10 @@ class DriveRecorder(Witness):
         before, edit = self._first, 0
         for number, (deed, after) in enumerate(self._deeds, start=1):
             command_id = None if deed.receipt is None else deed.receipt.command_id
-            yield deed.at, CommandEntry.of(number, deed.at, deed.command, deed.receipt, refused=deed.refused)
+            yield (
+                deed.at,
+                CommandEntry(number, deed.at, deed.command, deed.receipt and portable(deed.receipt), deed.refused),
+            )
             if after is not before:
                 edit += 1
                 for entry in edit_entries(before, after, edit, deed.at, command_id):

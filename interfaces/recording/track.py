@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from interfaces.messages.fields import rich
 from interfaces.recording import messages as d
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.mcap_reading import NUMBERS, Blocks
@@ -19,7 +20,10 @@ from interfaces.recording.messages import RealSample, VirtualSample
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
-DECODERS = {number: msgspec.json.Decoder(reduce(or_, channel.kinds)) for number, channel in enumerate(CHANNELS, 1)}
+DECODERS = {
+    number: msgspec.json.Decoder(reduce(or_, channel.kinds), dec_hook=rich)
+    for number, channel in enumerate(CHANNELS, 1)
+}
 """By number of the channel."""
 DECODING = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
 """What decoders raise."""

@@ -6,8 +6,8 @@ import contextlib
 from pathlib import Path
 
 import msgspec
-import numpy as np
 
+from interfaces.messages.fields import plain
 from interfaces.recording.channels import CHANNELS, NUMBER_OF, Message
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import McapFile, RawFile, Sink
@@ -24,14 +24,7 @@ AGAIN = 10.0
 """How often the beginning is repeated [s]."""
 
 
-def _plain(value: object) -> object:
-    """Python's number for one of NumPy's."""
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(type(value))
-
-
-_encode = msgspec.json.Encoder(enc_hook=_plain).encode
+_encode = msgspec.json.Encoder(enc_hook=plain).encode
 
 
 class RecordingWriter:

@@ -234,7 +234,7 @@ class ClientCore:
             self._base = self._newest
             for number in lost:
                 del self._orders[number]
-                self.port.receive(Outcome(number, None, UNKNOWN, 0, welcome.now), now=welcome.now)
+                self.port.receive(Outcome(number, welcome.now, None, UNKNOWN), now=welcome.now)
         if before is not None and before.instance != welcome.instance:
             self.sync = ClockSync()
         self._pings, self._ping_due = 0, now
@@ -317,7 +317,7 @@ class ClientCore:
         """The order with the epoch that it had when it was seen first."""
         known = self._orders.get(order.number)
         if known is None:
-            known = self._orders[order.number] = replace(order, epoch=self.epoch)
+            known = self._orders[order.number] = replace(order, epoch=Epoch(self.epoch) if self.epoch else None)
             if len(self._orders) > KEPT:
                 self._orders.popitem(last=False)
         return known

@@ -7,21 +7,18 @@ from collections import OrderedDict
 from collections.abc import Callable
 from functools import cache
 from types import UnionType
-from typing import Any, Generic, TypeAlias, TypeVar, get_args
+from typing import Any, TypeAlias, TypeVar, get_args
 
 import msgspec
 
 from interfaces import messages
 from interfaces.messages import Reply, Request, control
 from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, ProtocolError, Question
-from interfaces.messages.fields import LONGEST_TEXT, check_normal, cut, plain, rich
 from interfaces.messages.fields import Message as Wire
-from interfaces.messages.segments import Packed, Plain
+from interfaces.messages.fields import check_normal, plain, rich, writer
 from interfaces.messages.sites import Orders, Report
 from interfaces.stream import mobile
-from interfaces.stream.wire import messages as message_wires
 from interfaces.stream.wire import mobile as mobile_wires
-from interfaces.stream.wire import sites
 from interfaces.teleop.driving.messages import DriveOrders, DriveReport
 from vrs.errors import InvalidValueError
 
@@ -48,17 +45,17 @@ Value: TypeAlias = (
 T = TypeVar("T")
 
 WIRES: dict[type, type[Wire]] = {
-    messages.Order: message_wires.OrderWire,
+    messages.Order: messages.Order,
     messages.Ask: messages.Ask,
     messages.Follow: messages.Follow,
     messages.Want: messages.Want,
-    messages.Outcome: message_wires.OutcomeWire,
-    messages.Answer: message_wires.AnswerWire,
-    messages.Broadcast: message_wires.BroadcastWire,
+    messages.Outcome: messages.Outcome,
+    messages.Answer: messages.Answer,
+    messages.Broadcast: messages.Broadcast,
     messages.Scene: messages.Scene,
-    messages.History: message_wires.HistoryWire,
-    messages.Change: message_wires.ChangeWire,
-    messages.Pulse: message_wires.PulseWire,
+    messages.History: messages.History,
+    messages.Change: messages.Change,
+    messages.Pulse: messages.Pulse,
     control.Hello: control.Hello,
     control.Welcome: control.Welcome,
     control.Attached: control.Attached,
@@ -76,8 +73,8 @@ WIRES: dict[type, type[Wire]] = {
     control.Survey: control.Survey,
     control.Impair: control.Impair,
     control.Network: control.Network,
-    Orders: sites.OrdersWire,
-    Report: sites.ReportWire,
+    Orders: Orders,
+    Report: Report,
     mobile.MobileWelcome: mobile.MobileWelcome,
     mobile.Postures: mobile.Postures,
     mobile.TaskOrder: mobile_wires.TaskOrderWire,
@@ -115,9 +112,13 @@ _HEADS: dict[Encoding, Callable[[bytes], _MessageHead]] = {
 }
 
 
+_PLAIN: dict[Encoding, Callable[[bytes], Any]] = {
+    Encoding.MSGPACK: msgspec.msgpack.Decoder().decode,
+    Encoding.JSON: msgspec.json.Decoder().decode,
+}
 _WRITERS: dict[Encoding, Callable[[Wire], bytes]] = {
-    Encoding.MSGPACK: msgspec.msgpack.Encoder(enc_hook=plain).encode,
-    Encoding.JSON: msgspec.json.Encoder(enc_hook=plain).encode,
+    Encoding.MSGPACK: writer(msgspec.msgpack.Encoder(enc_hook=plain).encode),
+    Encoding.JSON: writer(msgspec.json.Encoder(enc_hook=plain).encode),
 }
 
 
@@ -130,13 +131,9 @@ def encode(message: Value, encoding: Encoding) -> bytes:
     kind = WIRES.get(type(message))
     if kind is None:
         raise InvalidValueError("message", message, f"one of {', '.join(known.__name__ for known in WIRES)}")
-    wire: Any = message if kind is type(message) else kind.of(message, encoding is Encoding.MSGPACK)
-    write = _WRITERS[encoding]
-    try:
-        data = write(wire)
-    except UnicodeEncodeError:
-        return write(cut(wire))
-    return data if len(data) <= LONGEST_TEXT else write(cut(wire))
+    packed = encoding is Encoding.MSGPACK
+    wire: Any = message.as_written(packed) if kind is type(message) else kind.of(message, packed)
+    return _WRITERS[encoding](wire)
 
 
 def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARGEST) -> Any:
@@ -156,7 +153,7 @@ def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARG
     try:
         wire = _reader(encoding, allowed)(data)
         if type(wire) in ASKED:
-            check_normal(wire, str(wire.__struct_config__.tag))
+            check_normal(_PLAIN[encoding](data), wire, str(wire.__struct_config__.tag))
         return wire if type(wire) in WIRES else wire.read()
     except msgspec.ValidationError as error:
         raise _invalid(data, encoding, allowed, str(error)) from None
@@ -188,8 +185,6 @@ def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
     union: Any = None
     for value in _classes(allowed):
         kind: Any = WIRES[value]
-        if issubclass(kind, Generic):
-            kind = kind[Packed if packed else Plain]
         union = kind if union is None else union | kind
     reader: Callable[[bytes], Wire] = (
         (msgspec.msgpack if packed else msgspec.json).Decoder(union, dec_hook=rich).decode

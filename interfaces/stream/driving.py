@@ -101,7 +101,7 @@ class DriveServlet:
             self._outbox.append(Problem(ProblemCode.NOT_ALLOWED, _NOTHING, getattr(message, "number", None)))
 
     def _carry_out(self, order: Order, now: float) -> Outcome:
-        return Outcome(order.number, None, self._admit(order) or self._refusal(order, now), 0, now)
+        return Outcome(order.number, now, None, self._admit(order) or self._refusal(order, now))
 
     def _refusal(self, order: Order, now: float) -> str:
         """Give the operator's site an order; why it isn't carried out, empty if it is."""

@@ -92,8 +92,9 @@ class Leasing:
         if seat is not self.holder and not shares:
             return "no lease: acquire it first" if shares is None else OVERRULED
         heard = self._lease.heard if seat is self.holder else self._lease.refused
-        if heard(order.epoch, now=now) is not None:
-            return f"no lease: epoch {order.epoch} isn't in force"
+        epoch = order.epoch or 0
+        if heard(epoch, now=now) is not None:
+            return f"no lease: epoch {epoch} isn't in force"
         for other in [other for other, counts in self._shares.items() if counts and other is not seat]:
             self._shares[other] = False
             self.version += 1

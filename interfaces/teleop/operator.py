@@ -12,6 +12,7 @@ import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
 from interfaces.messages.commands import check_crosses
+from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.samples import Gathering
@@ -303,7 +304,7 @@ class OperatorSite:
                 command = resolved(command, answer, now)
             if command is not None:
                 check_crosses(command)
-            entry = LogEntry(number, now, command, newest)
+            entry = LogEntry(number, now, newest, command)
             # From here on nothing may raise.
             if command is not None and answer is not None:
                 self.command_ids[number] = answer.command_id
@@ -348,7 +349,7 @@ class OperatorSite:
         # A robot that knows that it has halted isn't told.
         halted = "" if self.report is None or self.report.halted else self.halted
         facts = self.entries_sent, now, self._began, heard, entries, wanted, halted
-        return (Orders(self.epoch, self._packets, now, *facts),)
+        return (Orders(Epoch(self.epoch), self._packets, now, *facts),)
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, cast
 
 import numpy as np
 from typing_extensions import override
@@ -21,6 +21,7 @@ from typing_extensions import override
 from interfaces.engine_server.site import engine_time
 from interfaces.link.delays import share_of
 from interfaces.link.round_trip import RelativeDelays, WindowConfig
+from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.connection import Host, HostConfig, lost
 from interfaces.teleop.samples import SampleLog
@@ -471,9 +472,10 @@ class RobotSite:
         q = self._measured.copy()
         q.flags.writeable = False
         return Report(
-            self.epoch, self._reports, now, self._newest, self._log.executed, float(p[0]), float(pace[0]), q,
-            *self._measured_at, self.halted, self._told(), plan, self.engine.timeline.sample(self._measured_at[1]),
-            self._uncertainty, self._samples.take(), self._samples.oldest,
+            cast("Epoch", self.epoch), self._reports, now, self._log.executed, float(p[0]), float(pace[0]), q,
+            *self._measured_at, self._newest, self.halted, self._told(), plan,
+            self.engine.timeline.sample(self._measured_at[1]), self._uncertainty, self._samples.take(),
+            self._samples.oldest,
         )  # fmt: skip
 
     def _told(self) -> tuple[tuple[int, Receipt], ...]:
@@ -493,7 +495,7 @@ class RobotSite:
         high = min(low + SEGMENTS_MOST, len(timeline))
         since = timeline.start_of(low) if low < len(timeline) else timeline.end
         segments = tuple(timeline.segment(i) for i in range(low, high))
-        return PlanPart(timeline.version, since, timeline.sample(since), segments)
+        return PlanPart(timeline.version, since, timeline.sample(since), segments=segments)
 
 
 @dataclass(frozen=True, slots=True)

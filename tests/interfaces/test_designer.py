@@ -195,9 +195,9 @@ def test_old_news_that_come_late_are_passed_over():
     designer = Designer(joined.engine)
     issued = designer.issue(to(1), now=0.0)
     newer = replace(issued.receipt, superseded_by=2)
-    designer.receive(Outcome(1, newer, "", 1, 0.0), now=1.0)
-    designer.receive(Outcome(1, issued.receipt, "", 0, 0.0), now=2.0)
-    designer.receive(Outcome(7, issued.receipt, "", 0, 0.0), now=2.0)
+    designer.receive(Outcome(1, 0.0, newer, "", 1), now=1.0)
+    designer.receive(Outcome(1, 0.0, issued.receipt), now=2.0)
+    designer.receive(Outcome(7, 0.0, issued.receipt), now=2.0)
     assert designer.issued(1).receipt.superseded_by == 2
     assert designer.issued(1).answered_at == 0.0
     assert len(designer.history) == 1
@@ -268,10 +268,10 @@ def test_an_answer_that_comes_twice_is_news_once():
     designer = Designer(RemotePort())
     issued = designer.issue(Stop(), now=1.0)
     for now in (2.0, 3.0):
-        designer.receive(Outcome(issued.number, None, "no", 0, now), now=now)
+        designer.receive(Outcome(issued.number, now, None, "no"), now=now)
         news = designer.advance(now=now)
         assert [one.answered_at for one in news] == ([2.0] if now == 2.0 else [])
-    designer.receive(Outcome(issued.number, None, "really", 1, 4.0), now=4.0)
+    designer.receive(Outcome(issued.number, 4.0, None, "really", 1), now=4.0)
     assert [one.refusal for one in designer.advance(now=4.0)] == ["really"]
 
 

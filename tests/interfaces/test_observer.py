@@ -118,9 +118,9 @@ def test_news_of_another_frame_are_passed_over():
     observer = Observer(Joined().engine)
     number = observer.ask(5.0, now=0.0)
     frame = observer.observation(number).frame
-    observer.receive(Answer(replace(frame, q=frame.q + 1, status=CONFIRMED), 6.0), now=6.0)
+    observer.receive(Answer.showing(replace(frame, q=frame.q + 1, status=CONFIRMED), 6.0), now=6.0)
     assert observer.observation(number).status is PREDICTED
-    observer.receive(Answer(replace(frame, status=CONFIRMED), 6.0), now=6.0)
+    observer.receive(Answer.showing(replace(frame, status=CONFIRMED), 6.0), now=6.0)
     assert observer.observation(number).status is CONFIRMED
 
 
@@ -181,7 +181,7 @@ def test_a_prediction_is_asked_for_again_when_its_time_has_passed_there():
     number = observer.ask(4.0, now=10.0)
     port.advance(now=10.0)
     frame = Frame(number, 4.0, 3.0, HOME, PREDICTED)
-    observer.receive(Answer(frame, 3.0), now=10.0)
+    observer.receive(Answer.showing(frame, 3.0), now=10.0)
     for now in (10.0, 10.3, 10.9):
         observer.advance(now=now)
         assert port.advance(now=now) == ()

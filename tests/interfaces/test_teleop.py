@@ -267,7 +267,7 @@ def test_what_is_of_an_old_epoch_is_ignored() -> None:
 
 
 def test_what_waits_for_a_lost_entry_isnt_complete() -> None:
-    first, second, third = (LogEntry(k, float(k), None, k) for k in (1, 2, 3))
+    first, second, third = (LogEntry(k, float(k), k, None) for k in (1, 2, 3))
     log = ReceivedLog(0.0)
     assert log.due((third,), as_they_come=False) == []
     log.claim(3, 9.0)

@@ -70,7 +70,7 @@ def decoded(data: bytes) -> Change:
     """What `encoded` wrote."""
     base, edit, command_id, first, rows, tail, tail_start, end = msgspec.msgpack.decode(data)
     segments = tuple(PolynomialSegment(start, span, frozen_array(a), owner) for start, span, a, owner in rows)
-    return Change(base, edit, command_id, first, segments, tail, tail_start, end)
+    return Change(edit, first, end, command_id, base, tail, tail_start, segments=segments)
 
 
 def acts(kind: str, rng: np.random.Generator, length: float) -> list[Act]:

@@ -97,7 +97,7 @@ class Site:
         except VrsError as error:
             receipt = self.engine.refuse(command, str(error))
         self.number += 1
-        self.writer.write(CommandEntry.of(self.number, now, command, receipt), t=now)
+        self.writer.write(CommandEntry(self.number, now, command, receipt), t=now)
         after = self.engine.timeline
         if after is not before:
             change = difference(before, after, now, edit=self.edit + 1, command_id=receipt.command_id)

@@ -14,6 +14,7 @@ from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
 from interfaces.recording.poses import link_transforms, real_pose, virtual_pose
 from robots import puma560
+from tests.interfaces.stream.same import same
 from vrs import Engine, Insertion, JointTarget, Lateness, ManualClock, MotionCommand
 
 MODEL = puma560.model()
@@ -60,10 +61,10 @@ def motion(
             timelines.append(engine.timeline)
             (edit,) = edit_entries(before, engine.timeline, number, t, receipt.command_id)
             found += [
-                (t, m.CommandEntry.of(number, t, command, receipt)),
+                (t, m.CommandEntry(number, t, command, receipt)),
                 (t, edit),
-                (t, m.ReceiptEntry(t, "real", m.FullReceipt.of(receipt))),
-                (t, m.GivenEntry(t, m.FullReceipt.of(receipt), smooth=True)),
+                (t, m.ReceiptEntry(t, "real", receipt.named())),
+                (t, m.GivenEntry(t, receipt.named(), smooth=True)),
                 (t, m.PacketEntry(number, receipt.command_id, t, t + 0.2, receipt.command_id)),
                 (t, m.LinkEntry("forward", t, t + 0.2)),
                 (t, m.LinkEntry("backward", t, lost=True, attempts=2)),
@@ -111,4 +112,4 @@ def everything(recording: Recording) -> dict[str, list[Any]]:
 def is_part(some: list[Any], whole: list[Any]) -> bool:
     """Whether a list is another one with items left out."""
     rest: Iterator[Any] = iter(whole)
-    return all(any(item == other for other in rest) for item in some)
+    return all(any(same(item, other) for other in rest) for item in some)

@@ -116,10 +116,10 @@ class Sitting:
         timeline = real.timeline
         low = max(timeline.index_at(now - 0.1), 0)
         since = timeline.start_of(low)
-        part = PlanPart(timeline.version, since, timeline.sample(since), tuple(timeline.segments[low:]))
+        part = PlanPart(timeline.version, since, timeline.sample(since), segments=tuple(timeline.segments[low:]))
         q = frozen_array(timeline.sample(now - 0.1))
         report = Report(
-            self.site.epoch, self._reports, now, None, 0, now, 1.0, q, now - 0.1, now - 0.1, halted, (), part
+            self.site.epoch, self._reports, now, 0, now, 1.0, q, now - 0.1, now - 0.1, None, halted, (), part
         )
         self.site.receive(report, now=now)
         self._note()

@@ -184,7 +184,7 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
     for k, halted in enumerate(said):
         at = 0.3 + 0.1 * (k // 2)
         # Of a robot that numbers no samples: each report has one.
-        line.operator.receive(Report(1, k + 1, at, None, 0, at, 1.0, q, at, at - 0.2, halted), now=0.3 + 0.1 * k)
+        line.operator.receive(Report(1, k + 1, at, 0, at, 1.0, q, at, at - 0.2, None, halted), now=0.3 + 0.1 * k)
     heard.answered(1, receipts[0], now=1.1)
     heard.answered(2, replace(receipts[1], execute_at=receipts[1].execute_at + 0.5), now=1.2)
     heard.answered(3, replace(receipts[2], status=Status.REJECTED, reason="too far"), now=1.3)

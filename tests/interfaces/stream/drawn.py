@@ -161,8 +161,8 @@ def welcomes(draw):
 ways = st.builds(c.DirectionConditions, words, words, words)
 spans = st.none() | floats(0, 1e9)
 measured = st.builds(LinkFigures, counts, st.none() | floats(0, 1), spans, spans)
-plans = st.builds(PlanPart, counts, times, arrays, runs())
-entries = st.builds(LogEntry, numbers, times, st.none() | commands, counts)
+plans = st.builds(PlanPart, counts, times, arrays, segments=runs())
+entries = st.builds(LogEntry, numbers, times, counts, st.none() | commands)
 echoes = st.none() | st.tuples(numbers, times, times)
 postures = st.builds(Posture, times, times, times)
 drives = st.builds(Drive, floats(-1e6, 1e6), floats(-1e6, 1e6))
@@ -229,12 +229,12 @@ messages = {
     m.Ask: st.builds(m.Ask, numbers, stamps),
     m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.ViewForm), st.none() | floats(0.1, 1e3)),
     m.Want: st.builds(m.Want, counts, st.none() | counts),
-    m.Outcome: st.builds(m.Outcome, numbers, st.none() | receipts, words, counts, times),
-    m.Answer: st.builds(m.Answer, frames, times),
-    m.Broadcast: st.builds(m.Broadcast, frames, verdicts),
+    m.Outcome: st.builds(m.Outcome, numbers, times, st.none() | receipts, words, counts),
+    m.Answer: st.builds(m.Answer.showing, frames, times),
+    m.Broadcast: st.builds(m.Broadcast.showing, frames, verdicts),
     m.Scene: st.builds(m.Scene, numbers, words, arrays, times, times, counts, counts, times, rates),
-    m.History: st.builds(m.History, counts, counts, runs()),
-    m.Change: st.builds(m.Change, counts, numbers, ids, counts, runs(), st.none() | counts, times, times),
+    m.History: st.builds(m.History, counts, counts, segments=runs()),
+    m.Change: st.builds(m.Change, numbers, counts, times, ids, counts, st.none() | counts, times, segments=runs()),
     m.Pulse: st.builds(m.Pulse, counts, times, times | st.just(-math.inf)),
     c.Hello: st.builds(c.Hello, numbers, st.sampled_from(c.Role), names, st.none() | words, st.none() | words),
     c.Welcome: welcomes(),
@@ -261,7 +261,7 @@ messages = {
         Orders, epochs, numbers, times, counts, times, times, counts, st.lists(entries, max_size=3).map(tuple)
     ),
     Report: st.builds(
-        Report, epochs, numbers, times, echoes, counts, times, finite, arrays, times, times, words,
+        Report, epochs, numbers, times, counts, times, finite, arrays, times, times, echoes, words,
         st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans, st.none() | arrays,
         st.none() | floats(0, 1e3),
     ),

@@ -121,8 +121,8 @@ def values() -> dict[str, Any]:
     rejected = Receipt(8, Status.REJECTED, None, None, reason="out of limits")
     limits = Limits([-1.0] * 3, [1.0] * 3, [2.0] * 3, [4.0] * 3, [40.0] * 3)
     held = c.Lease(LeaseState.HELD, 2**64 - 1, "Ada", True, 3)
-    plan = PlanPart(4, 2.5, Q, segments())
-    entries = LogEntry(1, 2.0, ordered()["move"], 6), LogEntry(2, 2.0, None, 6)
+    plan = PlanPart(4, 2.5, Q, segments=segments())
+    entries = LogEntry(1, 2.0, 6, ordered()["move"]), LogEntry(2, 2.0, 6, None)
     orders = {
         f"order: {name}": m.Order(number, order, 7_730_941_132_801)
         for number, (name, order) in enumerate(ordered().items(), 1)
@@ -250,17 +250,17 @@ def values() -> dict[str, Any]:
         "follow frames": m.Follow(11, m.ViewForm.FRAMES, 60.0),
         "want history": m.Want(3, 256),
         "want edits": m.Want(3, None),
-        "outcome": m.Outcome(1, receipt, "", 0, 2.5),
-        "outcome rejected": m.Outcome(2, rejected, "", 1, 2.5),
-        "outcome refused": m.Outcome(3, None, "no lease: acquire it first", 0, 2.5),
-        "answer": m.Answer(false, 2.5),
-        "broadcast": m.Broadcast(frame, m.Verdicts(1, 8)),
-        "broadcast with false frames": m.Broadcast(frame, m.Verdicts(1, 8, ((9, 10, 7), (11, 11, None)))),
+        "outcome": m.Outcome(1, 2.5, receipt),
+        "outcome rejected": m.Outcome(2, 2.5, rejected, "", 1),
+        "outcome refused": m.Outcome(3, 2.5, None, "no lease: acquire it first"),
+        "answer": m.Answer.showing(false, 2.5),
+        "broadcast": m.Broadcast.showing(frame, m.Verdicts(1, 8)),
+        "broadcast with false frames": m.Broadcast.showing(frame, m.Verdicts(1, 8, ((9, 10, 7), (11, 11, None)))),
         "scene": m.Scene(11, "puma560", Q, 0.0, 3.55, 3, 3, 2.5),
         "scene of frames": m.Scene(11, "puma560", Q, 0.0, 3.55, 3, 3, 2.5, 60.0),
-        "history": m.History(3, 0, segments()),
-        "change": m.Change(3, 4, 7, 5, segments(), 6, 3.75, 9.0),
-        "change that drops the rest": m.Change(3, 4, 7, 5, segments()[:1], None, 3.25, 3.25),
+        "history": m.History(3, 0, segments=segments()),
+        "change": m.Change(4, 5, 9.0, 7, 3, 6, 3.75, segments=segments()),
+        "change that drops the rest": m.Change(4, 5, 3.25, 7, 3, None, 3.25, segments=segments()[:1]),
         "pulse": m.Pulse(4, 2.5, 2.5),
         "pulse of a site with an offset": m.Pulse(4, 2.5, 2.25),
         "pulse offline": m.Pulse(4, 2.5, -math.inf),
@@ -270,24 +270,24 @@ def values() -> dict[str, Any]:
             7_730_941_132_801, 7, 2.6, 2, 2.6, 1.0, 3, wanted=((4, 9), (12, 12))
         ),
         "report": Report(
-            7_730_941_132_801, 3, 2.75, (5, 2.5, 2.7), 1, 2.0, 0.95, Q, 2.72, 2.0, "", ((1, receipt),), plan
+            7_730_941_132_801, 3, 2.75, 1, 2.0, 0.95, Q, 2.72, 2.0, (5, 2.5, 2.7), "", ((1, receipt),), plan
         ),
         "report of a robot that knows the time": Report(
-            7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0, uncertainty=0.015
+            7_730_941_132_801, 5, 2.95, 1, 2.0, 1.0, Q, 2.92, 2.0, uncertainty=0.015
         ),
         "report with samples": Report(
-            7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0,
+            7_730_941_132_801, 5, 2.95, 1, 2.0, 1.0, Q, 2.92, 2.0,
             samples=(Sample(4, 2.1, 1.25, Q), Sample(146, 2.92, 2.0, 1.001 * Q)), oldest=3,
         ),
         "report with samples and references": Report(
-            7_730_941_132_801, 5, 2.95, None, 1, 2.0, 1.0, Q, 2.92, 2.0,
+            7_730_941_132_801, 5, 2.95, 1, 2.0, 1.0, Q, 2.92, 2.0,
             samples=(Sample(5, 2.2, 1.3, Q, 1.001 * Q),), oldest=3,
         ),
         "report of a halted robot": Report(
-            7_730_941_132_801, 4, 2.85, None, 1, 2.0, 0.0, Q, 2.82, 2.0, "link lost"
+            7_730_941_132_801, 4, 2.85, 1, 2.0, 0.0, Q, 2.82, 2.0, None, "link lost"
         ),
         "report with a reference": Report(
-            7_730_941_132_801, 5, 2.95, None, 1, 2.1, 1.0, Q, 2.92, 2.07, "", (), None, 1.001 * Q
+            7_730_941_132_801, 5, 2.95, 1, 2.1, 1.0, Q, 2.92, 2.07, None, "", (), None, 1.001 * Q
         ),
     }  # fmt: skip
 

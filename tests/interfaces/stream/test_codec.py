@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 
 from interfaces import messages as m
 from interfaces.messages import control as c
-from interfaces.messages.commands import ReceiptWire
 from interfaces.messages.control import ProblemCode, ProtocolError
 from interfaces.messages.fields import MOST_NAMES
 from interfaces.messages.sites import Orders, Report
@@ -35,7 +34,7 @@ PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 QUICK = settings(max_examples=25, deadline=None, phases=PHASES, database=None, derandomize=True)
 Q = frozen(np.linspace(-1, 1, 6) / 3)
 PACKED, PLAIN = Encoding
-BROADCAST = m.Broadcast(m.Frame(7, 2.5, 2.0, Q, m.FrameStatus.PREDICTED), m.Verdicts(1, 5, ((2, 3, 4),)))
+BROADCAST = m.Broadcast.showing(m.Frame(7, 2.5, 2.0, Q, m.FrameStatus.PREDICTED), m.Verdicts(1, 5, ((2, 3, 4),)))
 
 
 MOBILE = {MobileWelcome, Postures, TaskOrder, Tasks, Seen, Plan, DriveOrders, DriveReport}
@@ -83,8 +82,10 @@ def test_numpys_numbers_cross(encoding: Encoding) -> None:
 
 def test_a_receipt_names_no_more_than_may_cross() -> None:
     names = tuple(range(1, 3001))
-    wire = ReceiptWire.of(Receipt(1, Status.ACCEPTED, 0.0, None, shifted_names=names, superseded_names=names))
-    assert wire.shifted == wire.superseded == names[:MOST_NAMES]
+    receipt = Receipt(1, Status.ACCEPTED, 0.0, None, shifted_names=names, superseded_names=lambda: names)
+    data = encode(m.Outcome(1, 0.0, receipt), Encoding.JSON)
+    back = decode(data, Encoding.JSON, allowed=m.Outcome).receipt
+    assert back.shifted == back.superseded == names[:MOST_NAMES]
 
 
 @pytest.mark.parametrize("encoding", Encoding)
@@ -95,7 +96,7 @@ def test_what_newer_peers_add_is_passed_over(encoding: Encoding) -> None:
 
 @pytest.mark.parametrize("encoding", Encoding)
 def test_arrays_that_come_are_read_only(encoding: Encoding) -> None:
-    change = m.Change(0, 1, 1, 0, (PolynomialSegment(0.0, 1.0, np.ones((2, 6)), 1),), None, 1.0, 1.0)
+    change = m.Change(1, 0, 1.0, 1, 0, None, 1.0, segments=(PolynomialSegment(0.0, 1.0, np.ones((2, 6)), 1),))
     for message in (BROADCAST, change):
         back = decode(encode(message, encoding), encoding, allowed=type(message))
         array = back.frame.q if isinstance(back, m.Broadcast) else back.segments[0].coefficients
@@ -217,8 +218,12 @@ def test_too_long_a_frame_isnt_looked_at() -> None:
 def heaviest() -> dict[str, tuple[type, bytes]]:
     """Messages of 64 KiB that make the most work."""
     segment = PolynomialSegment(0.0, 0.25, np.ones((1, 1)), 1)
-    history = m.History(1, 0, tuple(PolynomialSegment(k * 0.25, 0.25, np.ones((1, 1)), 1) for k in range(256)))
-    wide = m.History(1, 0, tuple(PolynomialSegment(k * 0.25, 0.25, np.ones((4, 6)), 1) for k in range(256)))
+    history = m.History(
+        1, 0, segments=tuple(PolynomialSegment(k * 0.25, 0.25, np.ones((1, 1)), 1) for k in range(256))
+    )
+    wide = m.History(
+        1, 0, segments=tuple(PolynomialSegment(k * 0.25, 0.25, np.ones((4, 6)), 1) for k in range(256))
+    )
     many = {"type": "history", "edit": 1, "index": 0, "dof": 1, "segments": [[1.0, None, [[0.0]]]] * 2900}
     unknown = {"type": "ask", "number": 1, "more": [[1, 2, 3]] * 5900}
     assert segment in history.segments

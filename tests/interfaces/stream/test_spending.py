@@ -161,7 +161,7 @@ def test_no_way_that_is_taken_ever_fails_and_others_say_what_is_allowed() -> Non
     rng = random.Random(7)
     hub, line, _ = emulated()
     mine, epoch = holder(hub)
-    report = Report(1, 1, 0.0, None, 0, 0.0, 1.0, HOME, 0.0, 0.0)
+    report = Report(1, 1, 0.0, 0, 0.0, 1.0, HOME, 0.0, 0.0)
     taken = refused = 0
     now = 0.2
     for k in range(700):
