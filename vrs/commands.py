@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from vrs.checks import finite, finite_array, normal, number_in, sized_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
-from vrs.record import LARGEST, Number, Pose, Record, Time, Value, set_field
+from vrs.record import LARGEST, Number, Pose, Record, Time, Twist, Value, set_field
 
 __all__ = [
     "Cancel", "Command", "DriveCommand", "Frame", "InsertVia", "Insertion", "JointTarget", "Lateness", "Motion",
@@ -259,7 +259,7 @@ class SteerCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="ste
 
     rates: Array | None = None
     """Joint rates [rad/s], (n,)."""
-    twist: Array | None = None
+    twist: Twist | None = None
     """Twist of the tool, (6,): linear [m/s], then angular [rad/s]; instead of rates."""
     frame: Frame = Frame.BASE
     """Frame of the twist."""
@@ -414,7 +414,7 @@ def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdi
             set_field(command, name, stamp)
 
 
-Command: TypeAlias = MotionCommand | DriveCommand | SteerCommand | PlanEdit | PositionQuery | ParameterChange
+Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | PositionQuery | ParameterChange
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,10 +27,14 @@ Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 
 if TYPE_CHECKING:
     Pose: TypeAlias = Array
+    Twist: TypeAlias = Array
 else:
 
     class Pose(np.ndarray):
         """A homogeneous transform, (4, 4); it crosses as its rows."""
+
+    class Twist(np.ndarray):
+        """Speeds of a body, (6,): linear, then angular."""
 
 
 class _AsDataclass:

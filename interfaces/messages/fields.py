@@ -17,10 +17,10 @@ from vrs.checks import SMALLEST
 from vrs.commands import ENDLESS, FARTHEST, Endless
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
-from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Value
+from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Twist, Value
 from vrs.record import Record as Wire
 
-__all__ = ["Count", "Number", "Pose", "Text", "Time", "Value", "Wire"]
+__all__ = ["Count", "Number", "Pose", "Text", "Time", "Twist", "Value", "Wire"]
 
 MOST_JOINTS = 64
 """Joints of a robot, at most."""
@@ -179,6 +179,8 @@ def rich(kind: Any, value: Any) -> Any:
         if not isinstance(value, list) or len(value) != 4:
             raise ValueError("Expected `array` of 4 rows")
         return frozen_array([_numbers(row, 4, 4, FARTHEST) for row in value]).view(kind)
+    if kind is Twist:
+        return frozen_array(_numbers(value, 6, 6, LARGEST)).view(kind)
     return frozen_array(_numbers(value, 1, MOST_JOINTS, LARGEST))
 
 
@@ -199,7 +201,8 @@ def json_schema(kind: Any) -> dict[str, Any]:
     if kind is Pose:
         row = {"type": "array", "items": number, "minItems": 4, "maxItems": 4}
         return {"type": "array", "items": row, "minItems": 4, "maxItems": 4}
-    return {"type": "array", "items": number, "minItems": 1, "maxItems": MOST_JOINTS}
+    least, most = (6, 6) if kind is Twist else (1, MOST_JOINTS)
+    return {"type": "array", "items": number, "minItems": least, "maxItems": most}
 
 
 def epoch_of(digits: object) -> Epoch:

@@ -57,13 +57,11 @@ class Segmented(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
 
     def __post_init__(self) -> None:
         given = self.segments  # type: ignore[attr-defined]
-        if not given:
-            return
-        if type(given[0]) is SegmentRow:
-            set_field(self, "segments", segments_of(self.dof, self.start, given))  # type: ignore[attr-defined]
-        else:
-            set_field(self, "dof", given[0].coefficients.shape[1])
-            set_field(self, "start", given[0].start)
+        if given and type(given[0]) is SegmentRow:
+            given = segments_of(self.dof, self.start, given)  # type: ignore[attr-defined]
+            set_field(self, "segments", given)
+        set_field(self, "dof", given[0].coefficients.shape[1] if given else 0)
+        set_field(self, "start", given[0].start if given else 0.0)
 
     def as_written(self, packed: bool) -> Self:
         """The same with rows for segments.

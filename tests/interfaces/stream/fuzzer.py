@@ -189,8 +189,8 @@ def sound(value: Any) -> bool:
     if isinstance(value, MotionCommand) and value.deviation == math.inf:
         return sound(replace(value, deviation=0.0))
     if isinstance(value, msgspec.Struct):
-        return all(sound(getattr(value, name)) for name in value.__struct_fields__)
-    if is_dataclass(value):
-        names = {f.name for f in fields(value)} - ({"past"} if isinstance(value, Pulse) else set())
+        names = set(value.__struct_fields__) - ({"past"} if isinstance(value, Pulse) else set())
         return all(sound(getattr(value, name)) for name in names)
+    if is_dataclass(value):
+        return all(sound(getattr(value, f.name)) for f in fields(value))
     return True
