@@ -8,7 +8,16 @@ import tempfile
 from pathlib import Path
 
 from interfaces import connect_mobile
-from interfaces.jobs import Forecast, JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.messages.jobs import (
+    Forecast,
+    JobList,
+    JobStage,
+    ListCommand,
+    MessageJob,
+    MoveJob,
+    VoiceJob,
+    WaitJob,
+)
 from robots.onboard.journey import Goal
 
 JOBS = JobList.of(

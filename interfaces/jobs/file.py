@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from interfaces.jobs.values import (
+from interfaces.messages.jobs import (
     LONGEST_NAME,
     LONGEST_SOURCE,
     LONGEST_TEXT,

@@ -7,14 +7,23 @@ long as `speaking_time` says, an arm's program isn't known here, and nobody know
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from interfaces.jobs.devices import speaking_time
-from interfaces.jobs.values import ArmJob, Job, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.messages.jobs import (
+    ArmJob,
+    Forecast,
+    Job,
+    JobForecast,
+    JobList,
+    MessageJob,
+    MoveJob,
+    VoiceJob,
+    WaitJob,
+)
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Journey, JourneyState
-from robots.onboard.routes import Point, RouteMap
+from robots.onboard.routes import RouteMap
 from vrs.mobile import DriveLimits
 from vrs.mobile.model import advanced
 
@@ -22,39 +31,6 @@ PERIOD: Final = 0.05
 """Between two drives [s]."""
 LONGEST: Final = 1800.0
 """A move isn't followed for longer [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class JobForecast:
-    """What is likely to become of a job."""
-
-    number: int
-    begins: float
-    """After so long [s], times that nobody knows left out."""
-    lasts: float | None
-    """For so long [s]; None where nobody knows."""
-    route: tuple[Point, ...] = ()
-    """Of a move [m]."""
-    problem: str = ""
-    """Why it'd fail; the list ends there."""
-
-
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """What is likely to become of a list."""
-
-    jobs: tuple[JobForecast, ...] = ()
-    """In their order, up to the first that'd fail."""
-
-    @property
-    def lasts(self) -> float:
-        """For how long it'd take, times that nobody knows left out [s]."""
-        return self.jobs[-1].begins + (self.jobs[-1].lasts or 0.0) if self.jobs else 0.0
-
-    @property
-    def problem(self) -> str:
-        """Why it'd fail; empty if it wouldn't."""
-        return self.jobs[-1].problem if self.jobs else ""
 
 
 def dry_run(

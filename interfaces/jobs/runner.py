@@ -7,17 +7,18 @@ has failed asks for no motion.
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass, replace
 from typing import Annotated, TypeAlias
 
-from interfaces.jobs.values import (
+from interfaces.messages.jobs import (
     ArmJob,
     JobEntry,
     JobList,
     JobProgress,
     JobStage,
+    ListCommand,
+    Load,
     MessageJob,
     MoveJob,
     OperatorLoss,
@@ -27,28 +28,6 @@ from interfaces.jobs.values import (
 )
 from robots.onboard.journey import Goal
 from vrs.checks import finite, validated, within
-
-
-class ListCommand(enum.StrEnum):
-    """What a person asks of a list."""
-
-    RUN = "run"
-    """Begin with the first job."""
-    PAUSE = "pause"
-    RESUME = "resume"
-    """Go on with the first job that isn't done; one that was interrupted begins anew, a WAIT goes on."""
-    ABORT = "abort"
-    KEY = "key"
-    """End a WAIT for the key."""
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Take a list in place of the one before; not while that runs."""
-
-    jobs: JobList
-    progress: Progress | None = None
-    """How far it is already; None keeps what's known of jobs with the same number that are unchanged."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,17 +12,16 @@ from typing import Any, Generic, TypeAlias, TypeVar, get_args
 import msgspec
 
 from interfaces import messages
-from interfaces.messages import Reply, Request, control
+from interfaces.messages import Reply, Request, control, mobile
 from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, ProtocolError, Question
+from interfaces.messages.drive_sites import DriveOrders, DriveReport
 from interfaces.messages.fields import LONGEST_TEXT, check_normal, cut, plain, rich
 from interfaces.messages.fields import Message as Wire
 from interfaces.messages.segments import Packed, Plain
 from interfaces.messages.sites import Orders, Report
-from interfaces.stream import mobile
 from interfaces.stream.wire import messages as message_wires
 from interfaces.stream.wire import mobile as mobile_wires
 from interfaces.stream.wire import sites
-from interfaces.teleop.driving.messages import DriveOrders, DriveReport
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536

@@ -11,7 +11,6 @@ from typing import Generic, Self, TypeVar
 from interfaces.clients.designer import Issued
 from interfaces.clients.ports import EnginePort
 from interfaces.clients.viewer import ShownFrame
-from interfaces.jobs import Forecast, JobList, ListCommand, Load
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import ViewForm, control
 from interfaces.messages.control import (
@@ -26,13 +25,14 @@ from interfaces.messages.control import (
     Survey,
     Welcome,
 )
+from interfaces.messages.drive_sites import Doing, Go
 from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import Forecast, JobList, ListCommand, Load
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
 from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
 from interfaces.stream.codec import Encoding
-from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
-from interfaces.teleop.driving.messages import Doing, Go
 from robots.onboard.journey import Goal
 from vrs.clock import WallClock
 from vrs.commands import DriveCommand, Stop

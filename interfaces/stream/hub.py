@@ -14,12 +14,12 @@ import msgspec
 from interfaces.engine_server.site import earliest
 from interfaces.messages import control
 from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role
+from interfaces.messages.mobile import TaskOrder, Tasks, Wanted
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import LeasedRobot, Leasing
 from interfaces.stream.limits import Allowances, Bucket, ClientLimits
-from interfaces.stream.mobile import TaskOrder, Tasks, Wanted
 from interfaces.stream.session import (
     POLICY,
     RESTART,

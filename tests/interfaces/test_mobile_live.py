@@ -10,20 +10,21 @@ from pathlib import Path
 import pytest
 
 from interfaces import connect_mobile
-from interfaces.jobs import (
+from interfaces.jobs import JobFile, RunnerConfig
+from interfaces.link import LinkConditions
+from interfaces.messages.control import Lease, Problem, Role
+from interfaces.messages.drive_sites import Doing
+from interfaces.messages.jobs import (
     ArmJob,
     Forecast,
-    JobFile,
     JobList,
     JobStage,
     ListCommand,
     MoveJob,
     OperatorLoss,
-    RunnerConfig,
     WaitJob,
 )
-from interfaces.link import LinkConditions
-from interfaces.messages.control import Lease, Problem, Role
+from interfaces.messages.mobile import Tasks
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
 from interfaces.runtime.live.robot_server import LARGEST
@@ -31,11 +32,9 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.connection import MobileConnection
-from interfaces.stream.mobile import Tasks
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving import DrivenConfig
-from interfaces.teleop.driving.messages import Doing
 from robots import ipr
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.jobs import JobFile, JobList, JobStage, ListCommand, Load, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.jobs import JobFile
+from interfaces.messages.drive_sites import Doing, Go
+from interfaces.messages.jobs import JobList, JobStage, ListCommand, Load, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.messages.mobile import Plan, Tasks, Trial
 from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
-from interfaces.stream.mobile import Plan, Tasks, Trial
 from interfaces.stream.session import News
-from interfaces.teleop.driving.messages import Doing, Go
 from interfaces.teleop.driving.operator import NOT_MET
 from robots.bullet.rooms import Place, Room
 from robots.ipr.chassis import chassis

@@ -15,31 +15,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import (
-    Done,
-    EndJob,
-    JobFailed,
-    JobList,
-    JobRunner,
-    JobStage,
-    ListCommand,
-    Load,
-    MessageJob,
-    MoveJob,
-    MoveTo,
-    Request,
-    RunArm,
-    Show,
-    SilentSpeaker,
-    Speak,
-    VoiceJob,
-    WaitJob,
-)
+from interfaces.jobs import Done, EndJob, JobFailed, JobRunner, MoveTo, Request, RunArm, Show, SilentSpeaker, Speak
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
 from interfaces.lab.output import BAD, INK, MUTED, REAL, draw
 from interfaces.lab.statistics import bootstrap
+from interfaces.messages.jobs import JobList, JobStage, ListCommand, Load, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.bullet.rooms import Person, Room
 from robots.ipr.body import Cargo
 from robots.ipr.chassis import IPR, Senses

@@ -14,11 +14,14 @@ import numpy as np
 from starlette.routing import BaseRoute
 from typing_extensions import override
 
-from interfaces.jobs import ArmJob, JobFile, OperatorLoss
+from interfaces.jobs import JobFile
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
 from interfaces.messages.control import MOST_MESSAGES, Attached, Role
+from interfaces.messages.drive_sites import Doing, DriveReport
 from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import ArmJob, OperatorLoss
+from interfaces.messages.mobile import Postures, Tasks, Wanted
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
 from interfaces.runtime.live.mobile_tasks import TaskDesk
@@ -29,12 +32,10 @@ from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat.page import routes as view_routes
-from interfaces.stream.mobile import Postures, Tasks, Wanted
 from interfaces.stream.server import HubServer
 from interfaces.teleop.architectures import OperatorSurroundings
 from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator
-from interfaces.teleop.driving.messages import Doing, DriveReport
 from interfaces.teleop.driving.operator import BY_ITSELF, FREE, STOPPED
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room

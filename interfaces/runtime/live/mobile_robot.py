@@ -22,6 +22,7 @@ from typing_extensions import override
 from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.messages.control import PROTOCOL, Attached
+from interfaces.messages.drive_sites import DriveOrders, SensedPoints
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.teleop.architectures import (
@@ -34,7 +35,6 @@ from interfaces.teleop.architectures import (
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, SENSING, robot_surroundings
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands, JourneyPilot
-from interfaces.teleop.driving.messages import DriveOrders, SensedPoints
 from interfaces.timer import Turning
 from robots.bullet.rooms import Room
 from robots.ipr.body import MobileBody

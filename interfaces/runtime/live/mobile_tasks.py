@@ -9,26 +9,22 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from interfaces.jobs import (
+from interfaces.jobs import JobFile, JobRunner, carried_over, digest, dry_run, written_jobs
+from interfaces.jobs.runner import EMPTY, RUNS
+from interfaces.messages.drive_sites import Doing, Go, SensedPoints, TaskReport
+from interfaces.messages.jobs import (
+    LONGEST_NAME,
+    MOST_PLACES,
     ArmJob,
     Forecast,
-    JobFile,
     JobList,
-    JobRunner,
     ListCommand,
     Load,
     Progress,
-    carried_over,
-    digest,
-    dry_run,
-    written_jobs,
 )
-from interfaces.jobs.runner import EMPTY, RUNS
-from interfaces.jobs.values import LONGEST_NAME, MOST_PLACES
-from interfaces.stream.mobile import Plan, Seen, Tasks, Trial, Wanted
+from interfaces.messages.mobile import Plan, Seen, Tasks, Trial, Wanted
 from interfaces.stream.session import News
 from interfaces.teleop.driving import DrivingOperator
-from interfaces.teleop.driving.messages import Doing, Go, SensedPoints, TaskReport
 from interfaces.teleop.driving.operator import NOT_MET
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Chassis

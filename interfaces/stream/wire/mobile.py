@@ -7,9 +7,24 @@ from typing import Annotated
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.jobs import Forecast, JobForecast, ListCommand, Load, OperatorLoss
 from interfaces.jobs.file import GoalForm, JobListForm, ProgressForm
-from interfaces.jobs.values import MOST_JOBS
+from interfaces.messages import mobile
+from interfaces.messages.drive_sites import (
+    MOST_POINTS,
+    MOST_REPEATED,
+    ArchitectureReport,
+    ArcPacket,
+    CellChanges,
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    Task,
+    TaskReport,
+)
 from interfaces.messages.fields import (
     Count,
     Digits,
@@ -25,22 +40,8 @@ from interfaces.messages.fields import (
     epoch,
     text,
 )
-from interfaces.stream import mobile
-from interfaces.stream.mobile import Distance, Doubt, Points
-from interfaces.teleop.architectures import ArchitectureReport, ArcPacket, CellChanges
-from interfaces.teleop.architectures.sites import MOST_REPEATED
-from interfaces.teleop.driving.messages import (
-    MOST_POINTS,
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    Go,
-    Halt,
-    SensedPoints,
-    Task,
-    TaskReport,
-)
+from interfaces.messages.jobs import MOST_JOBS, Forecast, JobForecast, ListCommand, Load, OperatorLoss
+from interfaces.messages.mobile import Distance, Doubt, Points
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import JourneyState
 from robots.onboard.supervisor import CellChange

@@ -5,11 +5,11 @@ from __future__ import annotations
 import enum
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from interfaces.link.conditions import Service
-from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSurroundings, RobotSurroundings
+from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.operator import CommandRecord
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
@@ -18,12 +18,6 @@ from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
 from vrs.mobile.model import advanced, braking, limited
 from vrs.segment import ArcSegment, known_arc
 
-HEADER = 44
-"""Number of the first arc, time and posture at its start, and how many follow [byte]."""
-ARC = 24
-"""v, ω and duration of an arc [byte]."""
-MOST_REPEATED = 600
-"""Most arcs in a datagram's message: a minute's. With more missing, the oldest and the newest halves."""
 MOST_EARLY = 36_000
 """Most arcs that wait for those before them; what comes beyond is left out, and repeated by the sender."""
 
@@ -45,23 +39,6 @@ class Transport(enum.StrEnum):
     def service(self) -> Service:
         """What the link promises about order."""
         return Service.IN_ORDER if self is Transport.STREAM else Service.DATAGRAM
-
-
-@dataclass(frozen=True, slots=True)
-class ArcPacket:
-    """Arcs of the operator's path."""
-
-    runs: tuple[tuple[int, tuple[ArcSegment, ...]], ...]
-    """Runs of consecutive arcs, each with the number of its first."""
-    complete_until: float
-    """No later packet changes the path before this time [s]."""
-    tail: tuple[ArcSegment, ...] = ()
-    """How the virtual robot brakes from there, unless the operator goes on."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        return 8 + HEADER * len(self.runs) + ARC * (len(self.tail) + sum(len(arcs) for _, arcs in self.runs))
 
 
 class Sender:
@@ -164,27 +141,6 @@ class PositionSource(Protocol):
 
     def posture(self) -> Posture:
         """(x, y, θ) [m, m, rad], now."""
-
-
-@dataclass(frozen=True, slots=True)
-class ArchitectureReport:
-    """What the robot sends back."""
-
-    number: int
-    """It rises from report to report."""
-    executed: int
-    """j: how many commands the robot has executed."""
-    posture: Posture
-    """Where it takes itself to be."""
-    received: int
-    """How many arcs it has."""
-    changes: CellChanges | None = None
-    """What its supervisor saw change, in the extended architecture."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        return 48 + (0 if self.changes is None else self.changes.size)
 
 
 class ArchitectureOperatorSite:

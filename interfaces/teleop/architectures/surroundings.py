@@ -7,38 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
+from interfaces.messages.drive_sites import CellChanges
 from robots.onboard.avoidance import ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.movers import MoverTracker, Yielding
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor
 from vrs.mobile import Avoidance, VirtualEnvironment, wrapped
 
-CELL_BYTES = 6
-"""m with added or forgotten, n, and how long ago it was seen, two bytes each [byte]."""
 _AWAY, _BACK = 0.25, 0.05
 """A robot that avoided something further from its path than the first is back within the second [m]."""
 _ASIDE, _TURN, _SPEED = 0.5, 0.6, 0.3
 """On its way back it turns on the spot to what is further aside [rad], so fast [rad/s], and drives so [m/s]."""
 _STEERED = 1.0
 """A controller without a direction of its own is taken to want to get where its drive turns in this time [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class CellChanges:
-    """What a report says of the surroundings."""
-
-    time: float
-    """When the robot said it, by its own clock [s]."""
-    cells: tuple[CellChange, ...]
-    """Each cell once."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        return 10 + CELL_BYTES * len(self.cells)
 
 
 class OperatorSurroundings:

@@ -16,8 +16,6 @@ from interfaces.jobs.runner import (
     Interrupted,
     JobFailed,
     JobRunner,
-    ListCommand,
-    Load,
     MoveTo,
     OperatorLost,
     Request,
@@ -26,9 +24,9 @@ from interfaces.jobs.runner import (
     Show,
     Speak,
 )
-from interfaces.jobs.values import OperatorLoss
-from interfaces.teleop.driving.messages import Doing, Go, Halt, Task, TaskReport, is_still
-from robots.onboard.driving import STAND, Drive, Posture
+from interfaces.messages.drive_sites import Doing, Go, Halt, Task, TaskReport
+from interfaces.messages.jobs import ListCommand, Load, OperatorLoss
+from robots.onboard.driving import STAND, Drive, Posture, is_still
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
 from robots.onboard.routes import Point
 

@@ -9,9 +9,8 @@ from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
 from interfaces.link.quantiles import SlidingQuantiles
-from interfaces.teleop.architectures import ArchitectureOperatorSite, ArcPacket, OperatorSurroundings, Transport
-from interfaces.teleop.connection import SiteLine
-from interfaces.teleop.driving.messages import (
+from interfaces.messages.drive_sites import (
+    ArcPacket,
     Doing,
     DriveOrders,
     DriveReport,
@@ -20,10 +19,11 @@ from interfaces.teleop.driving.messages import (
     SensedPoints,
     Task,
     TaskReport,
-    is_still,
     stops,
 )
-from robots.onboard.driving import STAND, Drive, Posture
+from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
+from interfaces.teleop.connection import SiteLine
+from robots.onboard.driving import STAND, Drive, Posture, is_still
 from vrs.checks import finite
 from vrs.mobile import MobileModel
 from vrs.mobile.model import braking

@@ -9,21 +9,12 @@ from typing import Annotated
 
 from typing_extensions import override
 
+from interfaces.messages.drive_sites import Doing, DriveOrders, DriveReport, Errand, SensedPoints, TaskReport, stops
 from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
 from interfaces.teleop.connection import LOST, Host, HostConfig, OrderExecutor, lost
 from interfaces.teleop.driving.autonomy import Autonomy
-from interfaces.teleop.driving.messages import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    SensedPoints,
-    TaskReport,
-    is_still,
-    stops,
-)
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
-from robots.onboard.driving import STAND, Drive, Posture, kept
+from robots.onboard.driving import STAND, Drive, Posture, is_still, kept
 from robots.onboard.following import SoundPosition
 from vrs.checks import validated, within
 from vrs.mobile import DriveLimits

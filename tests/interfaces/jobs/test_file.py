@@ -9,14 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.jobs import (
+from interfaces.jobs import JobFile, JobRunner, read_jobs, written_jobs
+from interfaces.messages.jobs import (
     ArmJob,
     Job,
     JobEntry,
-    JobFile,
     JobList,
     JobProgress,
-    JobRunner,
     JobStage,
     ListCommand,
     Load,
@@ -25,8 +24,6 @@ from interfaces.jobs import (
     Progress,
     VoiceJob,
     WaitJob,
-    read_jobs,
-    written_jobs,
 )
 from robots.onboard.journey import Goal
 from vrs.errors import FormatError

@@ -6,7 +6,10 @@ import math
 
 import pytest
 
-from interfaces.jobs import (
+from interfaces.jobs import dry_run
+from interfaces.messages.drive_sites import Doing
+from interfaces.messages.jobs import (
+    ArmJob,
     Forecast,
     JobList,
     JobStage,
@@ -16,10 +19,7 @@ from interfaces.jobs import (
     MoveJob,
     VoiceJob,
     WaitJob,
-    dry_run,
 )
-from interfaces.jobs.values import ArmJob
-from interfaces.teleop.driving.messages import Doing
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteConfig, RouteMap

@@ -9,7 +9,23 @@ import numpy as np
 from hypothesis import strategies as st
 
 from interfaces import messages as m
-from interfaces.jobs import (
+from interfaces.messages import control as c
+from interfaces.messages import mobile as b
+from interfaces.messages.control import LinkFigures, Ping, Pong
+from interfaces.messages.drive_sites import ArchitectureReport as Followed
+from interfaces.messages.drive_sites import (
+    ArcPacket,
+    CellChanges,
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    TaskReport,
+)
+from interfaces.messages.jobs import (
     Forecast,
     JobForecast,
     JobList,
@@ -24,22 +40,7 @@ from interfaces.jobs import (
     VoiceJob,
     WaitJob,
 )
-from interfaces.messages import control as c
-from interfaces.messages.control import LinkFigures, Ping, Pong
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
-from interfaces.stream import mobile as b
-from interfaces.teleop.architectures import ArchitectureReport as Followed
-from interfaces.teleop.architectures import ArcPacket, CellChanges
-from interfaces.teleop.driving.messages import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    Go,
-    Halt,
-    SensedPoints,
-    TaskReport,
-)
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState

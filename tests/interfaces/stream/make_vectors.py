@@ -14,7 +14,25 @@ import numpy as np
 
 from interfaces import messages as m
 from interfaces.engine_server.site import Site
-from interfaces.jobs import (
+from interfaces.jobs import digest
+from interfaces.link import ClockSync, RoundTrip
+from interfaces.messages import control as c
+from interfaces.messages import mobile as b
+from interfaces.messages.control import LinkFigures, Ping, Pong
+from interfaces.messages.drive_sites import ArchitectureReport as Followed
+from interfaces.messages.drive_sites import (
+    ArcPacket,
+    CellChanges,
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    Go,
+    Halt,
+    SensedPoints,
+    TaskReport,
+)
+from interfaces.messages.jobs import (
     ArmJob,
     Forecast,
     JobForecast,
@@ -29,26 +47,9 @@ from interfaces.jobs import (
     Progress,
     VoiceJob,
     WaitJob,
-    digest,
 )
-from interfaces.link import ClockSync, RoundTrip
-from interfaces.messages import control as c
-from interfaces.messages.control import LinkFigures, Ping, Pong
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.stream import Encoding, encode
-from interfaces.stream import mobile as b
-from interfaces.teleop.architectures import ArchitectureReport as Followed
-from interfaces.teleop.architectures import ArcPacket, CellChanges
-from interfaces.teleop.driving.messages import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    Go,
-    Halt,
-    SensedPoints,
-    TaskReport,
-)
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState

@@ -19,12 +19,12 @@ from interfaces import messages as m
 from interfaces.messages import control as c
 from interfaces.messages.commands import ReceiptWire
 from interfaces.messages.control import ProblemCode, ProtocolError
+from interfaces.messages.drive_sites import DriveOrders, DriveReport
 from interfaces.messages.fields import MOST_NAMES
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.messages.sites import Orders, Report
 from interfaces.stream import LARGEST, Encoding, SharedEncoder, decode, encode
 from interfaces.stream.codec import TYPES, WIRES
-from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.teleop.driving.messages import DriveOrders, DriveReport
 from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
 from vrs import JointTarget, MotionCommand, PolynomialSegment

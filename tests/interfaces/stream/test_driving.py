@@ -7,17 +7,17 @@ from typing import Any
 
 import pytest
 
-from interfaces.jobs import Load
 from interfaces.messages import Order, Outcome
 from interfaces.messages.control import Problem
+from interfaces.messages.drive_sites import Go
+from interfaces.messages.jobs import Load
+from interfaces.messages.mobile import Postures, Seen, Tasks, Wanted
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
 from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
-from interfaces.stream.mobile import Postures, Seen, Tasks, Wanted
 from interfaces.stream.session import HubSession
-from interfaces.teleop.driving.messages import Go
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease

@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from interfaces.jobs import ArmJob, JobList, JobStage, ListCommand, Load, WaitJob
-from interfaces.teleop.driving.messages import Doing
+from interfaces.messages.drive_sites import Doing
+from interfaces.messages.jobs import ArmJob, JobList, JobStage, ListCommand, Load, WaitJob
 from interfaces.val2.val_arm import ValArm, in_a_thread, lasts
 from robots import puma560
 from tests.interfaces.teleop.driving.rig import Rig

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from interfaces.lab.driving.run import run
+from interfaces.messages.drive_sites import ArchitectureReport, CellChanges
 from interfaces.runs.drive_run import DriveCase, DriveRun
-from interfaces.teleop.architectures import ArchitectureReport, CellChanges, OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.compositions import BodySonar, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
 from robots.ipr.chassis import IPR, SonarModel

@@ -9,8 +9,8 @@ from itertools import pairwise
 import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.teleop.architectures import ARCHITECTURES, ArcPacket
-from interfaces.teleop.driving.messages import DriveOrders
+from interfaces.messages.drive_sites import ArcPacket, DriveOrders
+from interfaces.teleop.architectures import ARCHITECTURES
 from interfaces.teleop.driving.operator import HOLDS, MOVING, NOT_MET
 from interfaces.teleop.driving.robot import TOO_FAR
 from robots.onboard.driving import IPR_LIMITS, Posture

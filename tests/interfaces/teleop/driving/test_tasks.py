@@ -7,7 +7,10 @@ from itertools import pairwise
 
 import pytest
 
-from interfaces.jobs import (
+from interfaces.jobs import RunnerConfig
+from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
+from interfaces.messages.drive_sites import ArcPacket, Doing, DriveOrders, Go, Halt
+from interfaces.messages.jobs import (
     ArmJob,
     Job,
     JobList,
@@ -17,13 +20,9 @@ from interfaces.jobs import (
     MessageJob,
     MoveJob,
     OperatorLoss,
-    RunnerConfig,
     VoiceJob,
     WaitJob,
 )
-from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.teleop.architectures import ArcPacket
-from interfaces.teleop.driving.messages import Doing, DriveOrders, Go, Halt
 from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState

@@ -9,11 +9,11 @@ import enum
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.jobs.runner import ListCommand, Load
-from interfaces.jobs.values import OperatorLoss, Progress
-from interfaces.teleop.architectures.sites import ArchitectureReport, ArcPacket
+from interfaces.messages.jobs import ListCommand, Load, OperatorLoss, Progress
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
+from robots.onboard.supervisor import CellChange
+from vrs.segment import ArcSegment
 
 Point: TypeAlias = tuple[float, float]
 """x, y [m]."""
@@ -95,13 +95,67 @@ class SensedPoints:
     """Of its place: variance of x, covariance, variance of y [m²]; None where nobody knows."""
 
 
-STILL: Final = Drive(0.02, 0.05)
-"""A robot that's told to move slower than this stands: it only keeps its place [m/s, rad/s]."""
+HEADER = 44
+"""Number of the first arc, time and posture at its start, and how many follow [byte]."""
+ARC = 24
+"""v, ω and duration of an arc [byte]."""
+CELL_BYTES = 6
+"""m with added or forgotten, n, and how long ago it was seen, two bytes each [byte]."""
+MOST_REPEATED = 600
+"""Most arcs in a datagram's message: a minute's. With more missing, the oldest and the newest halves."""
 
 
-def is_still(drive: Drive) -> bool:
-    """Whether a robot that's told that is at rest."""
-    return abs(drive.v) <= STILL.v and abs(drive.w) <= STILL.w
+@dataclass(frozen=True, slots=True)
+class ArcPacket:
+    """Arcs of the operator's path."""
+
+    runs: tuple[tuple[int, tuple[ArcSegment, ...]], ...]
+    """Runs of consecutive arcs, each with the number of its first."""
+    complete_until: float
+    """No later packet changes the path before this time [s]."""
+    tail: tuple[ArcSegment, ...] = ()
+    """How the virtual robot brakes from there, unless the operator goes on."""
+
+    @property
+    def size(self) -> int:
+        """What it takes on the wire [byte]."""
+        return 8 + HEADER * len(self.runs) + ARC * (len(self.tail) + sum(len(arcs) for _, arcs in self.runs))
+
+
+@dataclass(frozen=True, slots=True)
+class CellChanges:
+    """What a report says of the surroundings."""
+
+    time: float
+    """When the robot said it, by its own clock [s]."""
+    cells: tuple[CellChange, ...]
+    """Each cell once."""
+
+    @property
+    def size(self) -> int:
+        """What it takes on the wire [byte]."""
+        return 10 + CELL_BYTES * len(self.cells)
+
+
+@dataclass(frozen=True, slots=True)
+class ArchitectureReport:
+    """What the robot sends back."""
+
+    number: int
+    """It rises from report to report."""
+    executed: int
+    """j: how many commands the robot has executed."""
+    posture: Posture
+    """Where it takes itself to be."""
+    received: int
+    """How many arcs it has."""
+    changes: CellChanges | None = None
+    """What its supervisor saw change, in the extended architecture."""
+
+    @property
+    def size(self) -> int:
+        """What it takes on the wire [byte]."""
+        return 48 + (0 if self.changes is None else self.changes.size)
 
 
 @dataclass(frozen=True, slots=True)

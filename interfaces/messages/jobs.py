@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import ClassVar, Final, TypeAlias
 
 from robots.onboard.journey import Goal
+from robots.onboard.routes import Point
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
@@ -269,3 +270,58 @@ class Progress:
     def running(self) -> JobProgress | None:
         """The job that is being done."""
         return next((job for job in self.jobs if job.stage is JobStage.RUNNING), None)
+
+
+class ListCommand(enum.StrEnum):
+    """What a person asks of a list."""
+
+    RUN = "run"
+    """Begin with the first job."""
+    PAUSE = "pause"
+    RESUME = "resume"
+    """Go on with the first job that isn't done; one that was interrupted begins anew, a WAIT goes on."""
+    ABORT = "abort"
+    KEY = "key"
+    """End a WAIT for the key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Take a list in place of the one before; not while that runs."""
+
+    jobs: JobList
+    progress: Progress | None = None
+    """How far it is already; None keeps what's known of jobs with the same number that are unchanged."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobForecast:
+    """What is likely to become of a job."""
+
+    number: int
+    begins: float
+    """After so long [s], times that nobody knows left out."""
+    lasts: float | None
+    """For so long [s]; None where nobody knows."""
+    route: tuple[Point, ...] = ()
+    """Of a move [m]."""
+    problem: str = ""
+    """Why it'd fail; the list ends there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What is likely to become of a list."""
+
+    jobs: tuple[JobForecast, ...] = ()
+    """In their order, up to the first that'd fail."""
+
+    @property
+    def lasts(self) -> float:
+        """For how long it'd take, times that nobody knows left out [s]."""
+        return self.jobs[-1].begins + (self.jobs[-1].lasts or 0.0) if self.jobs else 0.0
+
+    @property
+    def problem(self) -> str:
+        """Why it'd fail; empty if it wouldn't."""
+        return self.jobs[-1].problem if self.jobs else ""

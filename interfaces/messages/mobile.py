@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
 from interfaces.messages.control import MOST_MESSAGES, Lease, Role
+from interfaces.messages.drive_sites import MOST_POINTS, Doing, Go, Point
 from interfaces.messages.fields import (
     Count,
     Epoch,
@@ -24,7 +24,7 @@ from interfaces.messages.fields import (
     Value,
     Word,
 )  # fmt: skip
-from interfaces.teleop.driving.messages import MOST_POINTS, Doing, Go, Point
+from interfaces.messages.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from vrs.mobile import DriveLimits
