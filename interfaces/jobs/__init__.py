@@ -10,7 +10,7 @@ from interfaces.jobs.devices import (
     speaking_time,
 )
 from interfaces.jobs.file import JobFile, digest, read_jobs, written_jobs
-from interfaces.jobs.forecast import dry_run
+from interfaces.jobs.forecast import dry_run, time_needed
 from interfaces.jobs.runner import (
     Done,
     EndJob,
@@ -54,5 +54,6 @@ __all__ = [
     "dry_run",
     "read_jobs",
     "speaking_time",
+    "time_needed",
     "written_jobs",
 ]

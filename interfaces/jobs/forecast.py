@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from interfaces.jobs.devices import speaking_time
+from interfaces.messages.fields import MOST_POINTS
 from interfaces.messages.jobs import (
     ArmJob,
     Forecast,
@@ -52,26 +53,31 @@ def dry_run(
     """
     found: list[JobForecast] = []
     t = 0.0
-    for entry in jobs.entries:
-        if isinstance(entry.job, MoveJob):
-            moved, posture = _moved(entry.number, entry.job, jobs, t, posture, roads, limits)
+    for job in jobs.jobs:
+        if isinstance(job, MoveJob):
+            moved, posture = _moved(job, jobs, t, posture, roads, limits)
             found.append(moved)
         else:
-            lasts = _lasts(entry.job, arm)
+            lasts = _lasts(job, arm)
             why = lasts if isinstance(lasts, str) else ""
-            found.append(JobForecast(entry.number, t, None if isinstance(lasts, str) else lasts, problem=why))
+            found.append(JobForecast(job.number, t, None if isinstance(lasts, str) else lasts, problem=why))
         if found[-1].problem:
             break
         t += found[-1].lasts or 0.0
-    return Forecast(tuple(found))
+    return tuple(found)
+
+
+def time_needed(forecast: Forecast) -> float:
+    """For how long a list would take, times that nobody knows left out [s]."""
+    return forecast[-1].begins + (forecast[-1].lasts or 0.0) if forecast else 0.0
 
 
 def _lasts(job: Job, arm: Callable[[ArmJob], float | str | None]) -> float | str | None:
     match job:
-        case VoiceJob(text):
-            return speaking_time(text)
-        case WaitJob(seconds):
-            return seconds
+        case VoiceJob():
+            return speaking_time(job.text)
+        case WaitJob():
+            return job.seconds
         case ArmJob():
             return arm(job)
         case MessageJob() | MoveJob():
@@ -79,7 +85,7 @@ def _lasts(job: Job, arm: Callable[[ArmJob], float | str | None]) -> float | str
 
 
 def _moved(
-    number: int, move: MoveJob, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
+    move: MoveJob, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
 ) -> tuple[JobForecast, Posture]:
     """Drive to a goal; what became of it, and where the robot stands then."""
     journey, drive, t = Journey(roads), STAND, 0.0
@@ -92,4 +98,4 @@ def _moved(
         t += PERIOD
     arrived = journey.state is JourneyState.ARRIVED
     problem = "" if arrived else journey.reason or f"it'd take longer than {LONGEST:g} s"
-    return JobForecast(number, begins, t if arrived else None, route, problem), posture
+    return JobForecast(move.number, begins, t if arrived else None, route[:MOST_POINTS], problem), posture

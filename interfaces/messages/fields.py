@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import re
 import sys
 from functools import cache
@@ -22,6 +23,9 @@ MOST_NAMES = 1000
 """Commands that a receipt names, at most."""
 LONGEST_TEXT = 2000
 """Text for people is cut off after so many characters."""
+
+MOST_POINTS = 720
+"""Of a scan, or a route."""
 
 _DIGITS = re.compile(r"[1-9][0-9]{0,19}")
 
@@ -50,6 +54,12 @@ Span = Annotated[float, Meta(ge=0, le=1e9)]
 """A time that something took, or may take [s]."""
 Timeout = Annotated[float, Meta(gt=0, le=3600)]
 """[s]."""
+Distance = Annotated[float, Meta(ge=0, le=1e9)]
+"""[m]."""
+Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]
+PointRow = tuple[Coordinate, Coordinate]
+"""x, y [m]."""
+Points = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_POINTS)]
 Joints = Annotated[list[Value], Meta(min_length=1, max_length=MOST_JOINTS)]
 Names = Annotated[tuple[Number, ...], Meta(max_length=MOST_NAMES)]
 
@@ -200,16 +210,21 @@ def cut(message: Any) -> Any:
                 changed[name] = fit
         elif isinstance(value, msgspec.Struct) and (fitting := cut(value)) is not value:
             changed[name] = fitting
+        elif isinstance(value, tuple):
+            items = tuple(cut(item) if isinstance(item, msgspec.Struct) else item for item in value)
+            if any(map(operator.is_not, items, value)):
+                changed[name] = items
     return msgspec.structs.replace(message, **changed) if changed else message
 
 
 @cache
 def _texts(kind: Any) -> dict[str, int | None]:
-    """Fields that are text, with how long it may be, and those that are messages themselves."""
+    """Fields that are text, with how long it may be, and those that are messages themselves, or several."""
     found: dict[str, int | None] = {}
     for field in msgspec.inspect.type_info(kind).fields:  # type: ignore[attr-defined]
         kinds = getattr(field.type, "types", (field.type,))
-        for one in kinds:
+        several = [one.item_type for one in kinds if isinstance(one, msgspec.inspect.VarTupleType)]
+        for one in (*kinds, *(getattr(item, "types", (item,))[0] for item in several)):
             if isinstance(one, msgspec.inspect.StrType | msgspec.inspect.StructType):
                 found[field.encode_name] = getattr(one, "max_length", None)
     return found

@@ -1,4 +1,4 @@
-"""What a robot is asked to do, one after the other: jobs, named places, and the list of them, as frozen values.
+"""What a robot is asked to do, one after the other: jobs, named places, the list of them, and how far it is.
 
 Source: Kim, Han, Kim, Kim, section 4.1: MOVE, VOICE, MESSAGE and WAIT; ARM is ours.
 """
@@ -6,13 +6,14 @@ Source: Kim, Han, Kim, Kim, section 4.1: MOVE, VOICE, MESSAGE and WAIT; ARM is o
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import ClassVar, Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
+import msgspec
+from msgspec import Meta
+from msgspec.structs import force_setattr, replace
+
+from interfaces.messages.fields import Number, Points, Span, Text, Wire
 from robots.onboard.journey import Goal
-from robots.onboard.routes import Point
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
@@ -28,78 +29,93 @@ LONGEST_SOURCE: Final = 16_000
 """Characters of a VAL-II program."""
 LONGEST_WAIT: Final = 86_400.0
 """[s]."""
+LONGEST_REASON: Final = 500
+"""Of a reason more characters aren't kept."""
+JobNumber = Annotated[int, Meta(ge=1, lt=2**31)]
+JobName = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
+"""Of a place or a program."""
+JobText = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
+WaitTime = Annotated[float, Meta(ge=0, le=LONGEST_WAIT)]
+"""[s]."""
+Reason = Annotated[str, Meta(max_length=LONGEST_REASON)]
 
 
-def _text(name: str, value: object, longest: int) -> str:
-    allowed = f"1 to {longest} characters, not all blank"
+def _check_text(name: str, value: object, longest: int) -> None:
     if not isinstance(value, str) or not 1 <= len(value) <= longest or not value.strip():
-        raise InvalidValueError(name, value, allowed)
-    return value
+        raise InvalidValueError(name, value, f"1 to {longest} characters, not all blank")
 
 
-@dataclass(frozen=True, slots=True)
-class MoveJob:
+class NumberedJob(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="do"):
+    """A job of a list."""
+
+    number: JobNumber
+    """By which it's known; it stays the same where the job is put elsewhere."""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.number, bool) or not isinstance(self.number, int) or not 1 <= self.number < 2**31:
+            raise InvalidValueError("number", self.number, "an integer from 1")
+
+    @property
+    def word(self) -> str:
+        """What people call its kind."""
+        return str(self.__struct_config__.tag).upper()
+
+
+class MoveJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="move"):
     """Go somewhere."""
 
-    word: ClassVar[str] = "MOVE"
-    to: Goal | str
+    to: Goal | JobName
     """Where: a goal, or the name of a place of the list."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not isinstance(self.to, Goal):
-            _text("to", self.to, LONGEST_NAME)
+            _check_text("to", self.to, LONGEST_NAME)
 
 
-@dataclass(frozen=True, slots=True)
-class VoiceJob:
+class VoiceJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="voice"):
     """Say something."""
 
-    word: ClassVar[str] = "VOICE"
-    text: str
-    """1 to 400 characters."""
+    text: JobText
 
     def __post_init__(self) -> None:
-        _text("text", self.text, LONGEST_TEXT)
+        super().__post_init__()
+        _check_text("text", self.text, LONGEST_TEXT)
 
 
-@dataclass(frozen=True, slots=True)
-class MessageJob:
+class MessageJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="message"):
     """Show something on the robot's screen; it stays there until something else is shown."""
 
-    word: ClassVar[str] = "MESSAGE"
-    text: str
-    """1 to 400 characters."""
+    text: JobText
 
     def __post_init__(self) -> None:
-        _text("text", self.text, LONGEST_TEXT)
+        super().__post_init__()
+        _check_text("text", self.text, LONGEST_TEXT)
 
 
-@dataclass(frozen=True, slots=True)
-class WaitJob:
+class WaitJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="wait"):
     """Wait."""
 
-    word: ClassVar[str] = "WAIT"
-    seconds: float | None = None
-    """For so long, in [0, 86400]; None until the key is pressed."""
+    seconds: WaitTime | None = None
+    """For so long [s]; None until the key is pressed."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.seconds is not None:
-            seconds = number_in("seconds", self.seconds, 0.0, LONGEST_WAIT, unit=" s")
-            object.__setattr__(self, "seconds", seconds)
+            force_setattr(self, "seconds", number_in("seconds", self.seconds, 0.0, LONGEST_WAIT, unit=" s"))
 
 
-@dataclass(frozen=True, slots=True)
-class ArmJob:
+class ArmJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="arm"):
     """Let the arm carry out a VAL-II program."""
 
-    word: ClassVar[str] = "ARM"
-    program: str
-    """Its name, 1 to 40 characters."""
-    source: str = ""
-    """The file in which it is, at most 16000 characters; empty for a program that the arm's site has."""
+    program: JobName
+    """Its name."""
+    source: Annotated[str, Meta(max_length=LONGEST_SOURCE)] = ""
+    """The file in which it is; empty for a program that the arm's site has."""
 
     def __post_init__(self) -> None:
-        _text("program", self.program, LONGEST_NAME)
+        super().__post_init__()
+        _check_text("program", self.program, LONGEST_NAME)
         if not isinstance(self.source, str) or len(self.source) > LONGEST_SOURCE:
             raise InvalidValueError("source", self.source, f"at most {LONGEST_SOURCE} characters")
 
@@ -108,49 +124,33 @@ Job: TypeAlias = MoveJob | VoiceJob | MessageJob | WaitJob | ArmJob
 """One thing to be done."""
 
 
-@dataclass(frozen=True, slots=True)
-class JobEntry:
-    """A job of a list."""
-
-    number: int
-    """By which it's known, from 1; it stays the same where the job is put elsewhere."""
-    job: Job
-
-    def __post_init__(self) -> None:
-        if isinstance(self.number, bool) or not isinstance(self.number, int) or not 1 <= self.number < 2**31:
-            raise InvalidValueError("number", self.number, "an integer from 1")
-        if not isinstance(self.job, Job):
-            raise InvalidValueError("job", self.job, "a Move, Voice, Message, Wait or Arm")
-
-
-@dataclass(frozen=True, slots=True)
-class JobList:
+class JobList(Wire, frozen=True, omit_defaults=True, gc=False):
     """Jobs in their order, and the places that they name. Every edit makes another list."""
 
-    entries: tuple[JobEntry, ...] = ()
-    """At most 64, each number once."""
-    places: Mapping[str, Goal] = field(default_factory=dict)
-    """By name, at most 64."""
+    jobs: Annotated[tuple[Job, ...], Meta(max_length=MOST_JOBS)] = ()
+    """Each number once."""
+    places: Annotated[dict[JobName, Goal], Meta(max_length=MOST_PLACES)] = msgspec.field(default_factory=dict)
+    """By name."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "entries", tuple(self.entries))
-        object.__setattr__(self, "places", MappingProxyType(dict(self.places)))
-        if len(self.entries) > MOST_JOBS:
-            raise InvalidValueError("jobs", f"{len(self.entries)} jobs", f"at most {MOST_JOBS}")
-        if len({entry.number for entry in self.entries}) < len(self.entries):
+        force_setattr(self, "jobs", tuple(self.jobs))
+        force_setattr(self, "places", dict(self.places))
+        if len(self.jobs) > MOST_JOBS:
+            raise InvalidValueError("jobs", f"{len(self.jobs)} jobs", f"at most {MOST_JOBS}")
+        if len({job.number for job in self.jobs}) < len(self.jobs):
             raise InvalidValueError("jobs", "a number twice", "each number once")
         if len(self.places) > MOST_PLACES:
             raise InvalidValueError("places", f"{len(self.places)} places", f"at most {MOST_PLACES}")
         for name in self.places:
-            _text("place", name, LONGEST_NAME)
-        for entry in self.entries:
-            if isinstance(entry.job, MoveJob):
-                self.goal(entry.job)
+            _check_text("place", name, LONGEST_NAME)
+        for job in self.jobs:
+            if isinstance(job, MoveJob):
+                self.goal(job)
 
-    @classmethod
-    def of(cls, *jobs: Job, places: Mapping[str, Goal] | None = None) -> JobList:
-        """A list of jobs, numbered from 1."""
-        return cls(tuple(JobEntry(k, job) for k, job in enumerate(jobs, 1)), {} if places is None else places)
+    @property
+    def next_number(self) -> int:
+        """A number for one more job."""
+        return max((job.number for job in self.jobs), default=0) + 1
 
     def goal(self, move: MoveJob) -> Goal:
         """Where a move goes.
@@ -167,26 +167,23 @@ class JobList:
 
     def added(self, job: Job, at: int | None = None) -> JobList:
         """With one more job, before the one at an index; at the end unless given."""
-        number = max((entry.number for entry in self.entries), default=0) + 1
-        place = len(self.entries) if at is None else self._index(at, len(self.entries))
-        return replace(self, entries=(*self.entries[:place], JobEntry(number, job), *self.entries[place:]))
+        place = len(self.jobs) if at is None else self._index(at, len(self.jobs))
+        return replace(self, jobs=(*self.jobs[:place], job, *self.jobs[place:]))
 
     def removed(self, number: int) -> JobList:
         """Without a job."""
         k = self.index(number)
-        return replace(self, entries=self.entries[:k] + self.entries[k + 1 :])
+        return replace(self, jobs=self.jobs[:k] + self.jobs[k + 1 :])
 
     def changed(self, number: int, job: Job) -> JobList:
-        """With another job in the place of one; it gets a number of its own."""
+        """With another job in the place of one."""
         k = self.index(number)
-        return self.removed(number).added(job, k) if k < len(self.entries) - 1 else self.removed(number).added(job)
+        return self.removed(number).added(job, k)
 
     def moved(self, number: int, to: int) -> JobList:
         """With a job at another index."""
-        k = self.index(number)
-        rest = self.entries[:k] + self.entries[k + 1 :]
-        place = self._index(to, len(rest))
-        return replace(self, entries=(*rest[:place], self.entries[k], *rest[place:]))
+        rest = self.removed(number)
+        return rest.added(self.jobs[self.index(number)], to)
 
     def with_place(self, name: str, goal: Goal) -> JobList:
         """With a place of that name, in place of any other that has it."""
@@ -198,8 +195,8 @@ class JobList:
         Raises:
             InvalidValueError: If there's none of that number.
         """
-        for k, entry in enumerate(self.entries):
-            if entry.number == number:
+        for k, job in enumerate(self.jobs):
+            if job.number == number:
                 return k
         raise InvalidValueError("number", number, "that of a job of this list")
 
@@ -239,32 +236,41 @@ POLICY_SAYS: Final = {
 """What is printed of a policy."""
 
 
-@dataclass(frozen=True, slots=True)
-class JobProgress:
+def _cut_reason(progress: JobProgress | Progress) -> None:
+    if len(progress.reason) > LONGEST_REASON:
+        force_setattr(progress, "reason", progress.reason[:LONGEST_REASON])
+
+
+class JobProgress(Wire, frozen=True, omit_defaults=True, gc=False):
     """How far a job is."""
 
-    number: int
+    number: JobNumber
     stage: JobStage = JobStage.PLANNED
-    reason: str = ""
+    reason: Reason = ""
     """Why it's paused or has failed."""
-    left: float | None = None
+    left: WaitTime | None = None
     """Of a WAIT that's paused, what is left of it [s]."""
 
+    def __post_init__(self) -> None:
+        _cut_reason(self)
 
-@dataclass(frozen=True, slots=True)
-class Progress:
+
+class Progress(Wire, frozen=True, omit_defaults=True, gc=False):
     """How far a list is."""
 
     stage: JobStage = JobStage.PLANNED
-    jobs: tuple[JobProgress, ...] = ()
+    jobs: Annotated[tuple[JobProgress, ...], Meta(max_length=MOST_JOBS)] = ()
     """In the list's order."""
-    reason: str = ""
+    reason: Reason = ""
     """Why it's paused, has failed, or was aborted."""
+
+    def __post_init__(self) -> None:
+        _cut_reason(self)
 
     @classmethod
     def of(cls, jobs: JobList) -> Progress:
         """Nothing is done yet."""
-        return cls(jobs=tuple(JobProgress(entry.number) for entry in jobs.entries))
+        return cls(jobs=tuple(JobProgress(job.number) for job in jobs.jobs))
 
     @property
     def running(self) -> JobProgress | None:
@@ -283,45 +289,23 @@ class ListCommand(enum.StrEnum):
     ABORT = "abort"
     KEY = "key"
     """End a WAIT for the key."""
+    DRY_RUN = "dry-run"
+    """Say how long the list is likely to take: that's asked of the virtual robot alone."""
 
 
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Take a list in place of the one before; not while that runs."""
-
-    jobs: JobList
-    progress: Progress | None = None
-    """How far it is already; None keeps what's known of jobs with the same number that are unchanged."""
-
-
-@dataclass(frozen=True, slots=True)
-class JobForecast:
+class JobForecast(Wire, frozen=True, omit_defaults=True, gc=False):
     """What is likely to become of a job."""
 
-    number: int
-    begins: float
+    number: Number
+    begins: Span
     """After so long [s], times that nobody knows left out."""
-    lasts: float | None
+    lasts: Span | None = None
     """For so long [s]; None where nobody knows."""
-    route: tuple[Point, ...] = ()
+    route: Points = ()
     """Of a move [m]."""
-    problem: str = ""
+    problem: Text = ""
     """Why it'd fail; the list ends there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """What is likely to become of a list."""
-
-    jobs: tuple[JobForecast, ...] = ()
-    """In their order, up to the first that'd fail."""
-
-    @property
-    def lasts(self) -> float:
-        """For how long it'd take, times that nobody knows left out [s]."""
-        return self.jobs[-1].begins + (self.jobs[-1].lasts or 0.0) if self.jobs else 0.0
-
-    @property
-    def problem(self) -> str:
-        """Why it'd fail; empty if it wouldn't."""
-        return self.jobs[-1].problem if self.jobs else ""
+Forecast = Annotated[tuple[JobForecast, ...], Meta(max_length=MOST_JOBS)]
+"""What is likely to become of a list: of its jobs in their order, up to the first that'd fail."""

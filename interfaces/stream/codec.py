@@ -20,7 +20,6 @@ from interfaces.messages.fields import Message as Wire
 from interfaces.messages.segments import Packed, Plain
 from interfaces.messages.sites import Orders, Report
 from interfaces.stream.wire import messages as message_wires
-from interfaces.stream.wire import mobile as mobile_wires
 from interfaces.stream.wire import sites
 from vrs.errors import InvalidValueError
 
@@ -79,12 +78,12 @@ WIRES: dict[type, type[Wire]] = {
     Report: sites.ReportWire,
     mobile.MobileWelcome: mobile.MobileWelcome,
     mobile.Postures: mobile.Postures,
-    mobile.TaskOrder: mobile_wires.TaskOrderWire,
-    mobile.Tasks: mobile_wires.TasksWire,
+    mobile.TaskOrder: mobile.TaskOrder,
+    mobile.Tasks: mobile.Tasks,
     mobile.Seen: mobile.Seen,
     mobile.Plan: mobile.Plan,
-    DriveOrders: mobile_wires.DriveOrdersWire,
-    DriveReport: mobile_wires.DriveReportWire,
+    DriveOrders: DriveOrders,
+    DriveReport: DriveReport,
 }
 """The wire form of each message."""
 ASKED = frozenset(

@@ -23,6 +23,7 @@ from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.messages.control import PROTOCOL, Attached
 from interfaces.messages.drive_sites import DriveOrders, SensedPoints
+from interfaces.messages.fields import MOST_POINTS
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.teleop.architectures import (
@@ -102,7 +103,7 @@ class LaserSight:
             place = reckoned if localizer.posture is None else localizer.posture
             (xx, xy, _), (_, yy, _), _ = localizer.covariance.tolist()
             doubt = xx, xy, yy
-        self._sight = SensedPoints(scan.time, seen_from(scan, place), doubt)
+        self._sight = SensedPoints(scan.time, seen_from(scan, place)[:MOST_POINTS], doubt)
 
     def newest(self) -> SensedPoints | None:
         """What was seen since the last call; None if that's nothing."""

@@ -219,8 +219,8 @@ class ArchitectureOperatorSite:
 
     def receive(self, report: ArchitectureReport, *, now: float) -> None:
         """Correct the estimate, repeat no more what has arrived, and learn what changed around the robot [s]."""
-        if self.surroundings is not None and report.changes is not None:
-            self.surroundings.receive(report.changes, now=now)
+        if self.surroundings is not None and report.seen_at is not None:
+            self.surroundings.receive(report.cells, report.seen_at, now=now)
         self._sender.acknowledge(report.received)
         self.estimator.feedback(report.executed, report.posture, report.number)
 
@@ -280,7 +280,7 @@ class ArchitectureRobotSite:
     def report(self, *, now: float) -> ArchitectureReport:
         """What goes back to the operator now [s]."""
         self._reports += 1
-        changes = None if self._surroundings is None else self._surroundings.changes(now=now)
-        return ArchitectureReport(
-            self._reports, self.controller.executed, self.posture, self._receiver.count, changes
-        )
+        done = self._reports, self.controller.executed, self.posture, self._receiver.count
+        if self._surroundings is None:
+            return ArchitectureReport(*done)
+        return ArchitectureReport(*done, now, self._surroundings.supervisor.changes(now=now))

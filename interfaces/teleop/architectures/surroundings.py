@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from interfaces.messages.drive_sites import CellChanges
 from robots.onboard.avoidance import ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.movers import MoverTracker, Yielding
@@ -39,21 +38,22 @@ class OperatorSurroundings:
         self._last: dict[tuple[int, int], CellChange] = {}
         """The last observation of each cell that has come."""
 
-    def receive(self, changes: CellChanges, *, now: float) -> None:
+    def receive(self, cells: Sequence[CellChange], said_at: float, *, now: float) -> None:
         """Take in what a report says.
 
         Args:
-            changes: What it says.
+            cells: What it says changed, each cell once.
+            said_at: When the robot said it, by its own clock [s].
             now: By the operator's clock [s], not before an earlier call's.
         """
         environment = self.environment
-        self._offset = min(self._offset, now - changes.time)
+        self._offset = min(self._offset, now - said_at)
         # What was seen before this can't live any more, whatever a late report says of it.
         oldest = now - self._offset - environment.longest
         self._last = {cell: last for cell, last in self._last.items() if last.seen > oldest}
         freed, formed = [], {}
         m, n = environment.grid.shape
-        for change in changes.cells:
+        for change in cells:
             cell = change.cell
             if not (change.seen > oldest and 0 <= cell[0] < m and 0 <= cell[1] < n):
                 continue
@@ -148,10 +148,6 @@ class RobotSurroundings:
         wanted, towards, left = self._wanted(wanted, posture)
         found = self._avoidance.drive(wanted, posture, now=now, towards=towards, v_before=v_before, left=left)
         return self._yielding.drive(found, self._movers.movers(now=now), posture, now=now, v_before=v_before)
-
-    def changes(self, *, now: float) -> CellChanges:
-        """What a report says of the surroundings now [s]."""
-        return CellChanges(now, self.supervisor.changes(now=now))
 
     def _wanted(self, wanted: Drive, posture: Posture) -> tuple[Drive, float, float]:
         """What is wanted, in which direction [rad], and the way left [m]; or straight back to the path.

@@ -9,9 +9,8 @@ import pytest
 
 from interfaces.messages import Order, Outcome
 from interfaces.messages.control import Problem
-from interfaces.messages.drive_sites import Go
-from interfaces.messages.jobs import Load
-from interfaces.messages.mobile import Postures, Seen, Tasks, Wanted
+from interfaces.messages.drive_sites import RobotTask
+from interfaces.messages.mobile import Postures, Seen, Tasks
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
@@ -128,11 +127,11 @@ class Workers:
     """Takes what is wanted, but no list."""
 
     def __init__(self) -> None:
-        self.wanted: list[Wanted] = []
+        self.wanted: list[RobotTask] = []
 
-    def order(self, wanted: Wanted, *, now: float) -> str:
-        self.wanted.append(wanted)
-        return "no list is wanted here" if isinstance(wanted, Load) else ""
+    def order(self, task: RobotTask, *, now: float) -> str:
+        self.wanted.append(task)
+        return "no list is wanted here" if task.jobs is not None else ""
 
     def tasks(self, answers: int | None = None) -> Tasks:
         return Tasks(answers=answers)
@@ -154,7 +153,7 @@ def test_only_who_has_control_lets_the_robot_do_something_and_all_are_told() -> 
     assert told["problem"]["text"] == "a viewer commands nothing"
     assert not workers.wanted
     assert said(ada, order, now=5.4)[0]["answers"] == 1
-    assert workers.wanted == [Go(Goal(1.0, 2.0))]
+    assert workers.wanted == [RobotTask(go=Goal(1.0, 2.0))]
     refused = said(ada, order | {"number": 3, "task": {"jobs": {}}}, now=5.5)[0]
     assert (refused["text"], refused["number"]) == ("no list is wanted here", 3)
     for wrong in ({}, {"go": {"x": 1, "y": 2}, "do": "run"}, {"do": "dance"}, {"halt": "so"}):
