@@ -9,7 +9,7 @@ from msgspec import Meta
 from msgspec.structs import force_setattr
 
 from interfaces.messages.control import MOST_MESSAGES, Lease, Role
-from interfaces.messages.drive_sites import NONE_LEFT, Doing, Doubt, RobotTask
+from interfaces.messages.drive_sites import NONE_LEFT, Doing, RobotTask, SensedPoints
 from interfaces.messages.fields import (
     Count,
     Distance,
@@ -19,7 +19,6 @@ from interfaces.messages.fields import (
     Number,
     PointRow,
     Points,
-    Stamp,
     Text,
     Time,
     Timeout,
@@ -160,15 +159,8 @@ class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
             force_setattr(self, "left", NONE_LEFT)
 
 
-class Seen(Message, frozen=True, omit_defaults=True, gc=False, tag="seen"):
+class Seen(Message, SensedPoints, frozen=True, omit_defaults=True, gc=False, tag="seen"):
     """Server: what the robot sees of its surroundings; the newest one counts."""
-
-    time: Stamp
-    """By the robot's own clock [s]."""
-    points: Points = ()
-    """Where its laser's beams ended, on the map [m]."""
-    doubt: Doubt | None = None
-    """Of its place: variance of x, covariance, variance of y [m²]; None where nobody knows."""
 
 
 class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):

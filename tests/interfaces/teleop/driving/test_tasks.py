@@ -9,7 +9,7 @@ import pytest
 
 from interfaces.jobs import RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.messages.drive_sites import HALT, Doing, DriveOrders, RobotTask
+from interfaces.messages.drive_sites import HALT, Doing, DriveOrders, Errand, RobotTask
 from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import (
     ArmJob,
@@ -20,6 +20,7 @@ from interfaces.messages.jobs import (
     MessageJob,
     MoveJob,
     OperatorLoss,
+    Progress,
     VoiceJob,
     WaitJob,
 )
@@ -27,6 +28,7 @@ from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
+from vrs.errors import InvalidValueError
 
 THERE = Goal(2.0, 4.0, math.pi / 2)
 FAR = Goal(7.0, 1.0, 0.0)
@@ -331,6 +333,14 @@ def test_an_arm_that_works_is_stopped_with_its_list(stop: RobotTask) -> None:
     assert arm.told == ["pick"]
     autonomy.receive(stop, now=1.0)
     assert arm.told == ["pick", "end"]
+
+
+def test_a_task_is_one_thing_and_a_robot_makes_no_dry_run() -> None:
+    for given in ({}, {"go": THERE, "do": ListCommand.RUN}, {"progress": Progress()}):
+        with pytest.raises(InvalidValueError, match="one of go, do, jobs and halt"):
+            RobotTask(**given)  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="what a robot does"):
+        Errand(1, RobotTask(do=ListCommand.DRY_RUN))
 
 
 def test_it_sets_out_from_rest() -> None:
