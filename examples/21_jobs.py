@@ -8,15 +8,25 @@ import tempfile
 from pathlib import Path
 
 from interfaces import connect_mobile
-from interfaces.jobs import Forecast, JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.messages.jobs import (
+    JobList,
+    JobStage,
+    ListCommand,
+    MessageJob,
+    MoveJob,
+    VoiceJob,
+    WaitJob,
+)
 from robots.onboard.journey import Goal
 
-JOBS = JobList.of(
-    MoveJob("door"),
-    VoiceJob("Hello!"),
-    MessageJob("Please put the book on my top side!"),
-    WaitJob(),  # for the key
-    MoveJob(Goal(1.9, 5.4)),
+JOBS = JobList(
+    (
+        MoveJob(1, "door"),
+        VoiceJob(2, "Hello!"),
+        MessageJob(3, "Please put the book on my top side!"),
+        WaitJob(4),  # for the key
+        MoveJob(5, Goal(1.9, 5.4)),
+    ),
     places={"door": Goal(1.6, 5.4)},
 )
 
@@ -33,9 +43,9 @@ try:
         robot.wait(lambda it: it.postures is not None and not it.postures.halted, 10.0)
         robot.load(JOBS)
         forecast = robot.dry_run()
-        assert isinstance(forecast, Forecast)
-        for entry, one in zip(JOBS.entries, forecast.jobs, strict=True):
-            print(entry.job.word, "takes", "nobody knows how long" if one.lasts is None else f"{one.lasts:.1f} s")
+        assert isinstance(forecast, tuple)
+        for job, one in zip(JOBS.jobs, forecast, strict=True):
+            print(job.word, "takes", "nobody knows how long" if one.lasts is None else f"{one.lasts:.1f} s")
         robot.do(ListCommand.RUN)
         waits = robot.wait(lambda it: bool(it.tasks and it.tasks.progress.jobs[3].stage is JobStage.RUNNING), 60.0)
         assert robot.tasks is not None

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from interfaces.lab.driving.run import run
+from interfaces.messages.drive_sites import ArcPacket
 from interfaces.runs.drive_run import DriveCase
-from interfaces.teleop.architectures import ArcPacket, Constants
+from interfaces.teleop.architectures import Constants
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.mobile import wrapped
 from vrs.segment import ArcSegment

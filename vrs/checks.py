@@ -164,13 +164,10 @@ def validated(cls: _ClassT) -> _ClassT:
         cls: The class, its fields annotated.
     """
     own = cls.__dict__.get("__post_init__")
-    converters: dict[type, _Converters] = {}
 
     def check(self: Any) -> None:
-        kind = type(self)
-        if kind not in converters:
-            converters[kind] = _converters(kind)
-        for name, convert in converters[kind]:
+        kind: Any = type(self)
+        for name, convert in _converters(kind):
             object.__setattr__(self, name, convert(getattr(self, name)))
         if own is not None:
             own(self)
@@ -179,10 +176,30 @@ def validated(cls: _ClassT) -> _ClassT:
     return cls
 
 
-def _converters(cls: type) -> _Converters:
+def check_fields(value: msgspec.Struct) -> None:
+    """Check the fields of a Struct by their annotations, as `validated` does those of a dataclass.
+
+    Its `__post_init__` calls it.
+
+    Args:
+        value: The Struct; a number that isn't a float where one is asked for becomes one.
+
+    Raises:
+        InvalidValueError: If a field is out of its range.
+    """
+    for name, convert in _converters(type(value)):
+        given = getattr(value, name)
+        found = convert(given)
+        if found is not given:
+            msgspec.structs.force_setattr(value, name, found)
+
+
+@functools.cache
+def _converters(cls: Any) -> _Converters:
     """Return what checks and converts each field of a class that says what it allows."""
     hints = get_type_hints(cls, include_extras=True)
-    return tuple((item.name, found) for item in fields(cls) if (found := _converter(item.name, hints[item.name])))
+    names = cls.__struct_fields__ if issubclass(cls, msgspec.Struct) else [item.name for item in fields(cls)]
+    return tuple((name, found) for name in names if (found := _converter(name, hints[name])))
 
 
 def _converter(name: str, hint: object) -> Callable[[object], object] | None:

@@ -249,10 +249,11 @@ def run_mobile(
     """
     import uvloop
 
-    from interfaces.jobs import OperatorLoss, RunnerConfig
+    from interfaces.jobs import RunnerConfig
     from interfaces.link.proxy import parse_address
     from interfaces.media import Aloud
     from interfaces.messages.control import Role
+    from interfaces.messages.jobs import OperatorLoss
     from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
     from interfaces.teleop.architectures import architecture as makes
     from interfaces.teleop.architectures.compositions import CONTROL
@@ -280,8 +281,8 @@ def run_mobile(
 
 async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> None:
     """Run until a signal comes, or standard input ends."""
-    from interfaces.jobs import POLICY_SAYS
     from interfaces.link.proxy import Address
+    from interfaces.messages.jobs import POLICY_SAYS
     from interfaces.runtime.live.process import READY
     from interfaces.runtime.live.robot_server import LARGEST
     from interfaces.stream import sockets

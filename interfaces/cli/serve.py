@@ -152,10 +152,10 @@ def serve(
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
     import uvloop
 
-    from interfaces.jobs import OperatorLoss
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
+    from interfaces.messages.jobs import OperatorLoss
     from interfaces.recording.live import RATE, LiveRecording
     from interfaces.recording.mcap_file import Sink
     from interfaces.recording.messages import OWN

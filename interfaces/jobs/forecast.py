@@ -7,14 +7,24 @@ long as `speaking_time` says, an arm's program isn't known here, and nobody know
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from interfaces.jobs.devices import speaking_time
-from interfaces.jobs.values import ArmJob, Job, JobList, MessageJob, MoveJob, VoiceJob, WaitJob
+from interfaces.messages.fields import MOST_POINTS
+from interfaces.messages.jobs import (
+    ArmJob,
+    Forecast,
+    Job,
+    JobForecast,
+    JobList,
+    MessageJob,
+    MoveJob,
+    VoiceJob,
+    WaitJob,
+)
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Journey, JourneyState
-from robots.onboard.routes import Point, RouteMap
+from robots.onboard.routes import RouteMap
 from vrs.mobile import DriveLimits
 from vrs.mobile.model import advanced
 
@@ -22,39 +32,6 @@ PERIOD: Final = 0.05
 """Between two drives [s]."""
 LONGEST: Final = 1800.0
 """A move isn't followed for longer [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class JobForecast:
-    """What is likely to become of a job."""
-
-    number: int
-    begins: float
-    """After so long [s], times that nobody knows left out."""
-    lasts: float | None
-    """For so long [s]; None where nobody knows."""
-    route: tuple[Point, ...] = ()
-    """Of a move [m]."""
-    problem: str = ""
-    """Why it'd fail; the list ends there."""
-
-
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """What is likely to become of a list."""
-
-    jobs: tuple[JobForecast, ...] = ()
-    """In their order, up to the first that'd fail."""
-
-    @property
-    def lasts(self) -> float:
-        """For how long it'd take, times that nobody knows left out [s]."""
-        return self.jobs[-1].begins + (self.jobs[-1].lasts or 0.0) if self.jobs else 0.0
-
-    @property
-    def problem(self) -> str:
-        """Why it'd fail; empty if it wouldn't."""
-        return self.jobs[-1].problem if self.jobs else ""
 
 
 def dry_run(
@@ -76,26 +53,31 @@ def dry_run(
     """
     found: list[JobForecast] = []
     t = 0.0
-    for entry in jobs.entries:
-        if isinstance(entry.job, MoveJob):
-            moved, posture = _moved(entry.number, entry.job, jobs, t, posture, roads, limits)
+    for job in jobs.jobs:
+        if isinstance(job, MoveJob):
+            moved, posture = _moved(job, jobs, t, posture, roads, limits)
             found.append(moved)
         else:
-            lasts = _lasts(entry.job, arm)
+            lasts = _lasts(job, arm)
             why = lasts if isinstance(lasts, str) else ""
-            found.append(JobForecast(entry.number, t, None if isinstance(lasts, str) else lasts, problem=why))
+            found.append(JobForecast(job.number, t, None if isinstance(lasts, str) else lasts, problem=why))
         if found[-1].problem:
             break
         t += found[-1].lasts or 0.0
-    return Forecast(tuple(found))
+    return tuple(found)
+
+
+def time_needed(forecast: Forecast) -> float:
+    """For how long a list would take, times that nobody knows left out [s]."""
+    return forecast[-1].begins + (forecast[-1].lasts or 0.0) if forecast else 0.0
 
 
 def _lasts(job: Job, arm: Callable[[ArmJob], float | str | None]) -> float | str | None:
     match job:
-        case VoiceJob(text):
-            return speaking_time(text)
-        case WaitJob(seconds):
-            return seconds
+        case VoiceJob():
+            return speaking_time(job.text)
+        case WaitJob():
+            return job.seconds
         case ArmJob():
             return arm(job)
         case MessageJob() | MoveJob():
@@ -103,7 +85,7 @@ def _lasts(job: Job, arm: Callable[[ArmJob], float | str | None]) -> float | str
 
 
 def _moved(
-    number: int, move: MoveJob, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
+    move: MoveJob, jobs: JobList, begins: float, posture: Posture, roads: RouteMap, limits: DriveLimits
 ) -> tuple[JobForecast, Posture]:
     """Drive to a goal; what became of it, and where the robot stands then."""
     journey, drive, t = Journey(roads), STAND, 0.0
@@ -116,4 +98,4 @@ def _moved(
         t += PERIOD
     arrived = journey.state is JourneyState.ARRIVED
     problem = "" if arrived else journey.reason or f"it'd take longer than {LONGEST:g} s"
-    return JobForecast(number, begins, t if arrived else None, route, problem), posture
+    return JobForecast(move.number, begins, t if arrived else None, route[:MOST_POINTS], problem), posture

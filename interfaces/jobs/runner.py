@@ -7,17 +7,19 @@ has failed asks for no motion.
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
-from interfaces.jobs.values import (
+from msgspec.structs import replace
+
+from interfaces.messages.jobs import (
     ArmJob,
-    JobEntry,
+    Job,
     JobList,
     JobProgress,
     JobStage,
+    ListCommand,
     MessageJob,
     MoveJob,
     OperatorLoss,
@@ -27,28 +29,6 @@ from interfaces.jobs.values import (
 )
 from robots.onboard.journey import Goal
 from vrs.checks import finite, validated, within
-
-
-class ListCommand(enum.StrEnum):
-    """What a person asks of a list."""
-
-    RUN = "run"
-    """Begin with the first job."""
-    PAUSE = "pause"
-    RESUME = "resume"
-    """Go on with the first job that isn't done; one that was interrupted begins anew, a WAIT goes on."""
-    ABORT = "abort"
-    KEY = "key"
-    """End a WAIT for the key."""
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Take a list in place of the one before; not while that runs."""
-
-    jobs: JobList
-    progress: Progress | None = None
-    """How far it is already; None keeps what's known of jobs with the same number that are unchanged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +60,7 @@ class JobFailed:
     reason: str
 
 
-Input: TypeAlias = ListCommand | Load | OperatorLost | Interrupted | Done | JobFailed
+Input: TypeAlias = ListCommand | OperatorLost | Interrupted | Done | JobFailed
 """What a runner is told."""
 
 
@@ -137,6 +117,8 @@ ALL_DONE = "all jobs of the list are done: run it"
 """Why it can't be resumed."""
 ANEW = "the station was started anew"
 """Why a list is paused that was being done when it was saved."""
+NO_TRIAL = "the virtual robot alone tries a list"
+"""Why a runner makes no dry run."""
 NO_KEY = "no job waits for the key"
 """Why the key does nothing."""
 
@@ -156,24 +138,24 @@ class RunnerConfig:
     """The same of a program [s], in [1, 86400]."""
 
 
-def carried_over(jobs: JobList, progress: Progress, load: Load) -> Progress:
+def carried_over(jobs: JobList, progress: Progress, following: JobList, known: Progress | None = None) -> Progress:
     """How far a list is that takes the place of another; nothing of it is being done.
 
     Args:
         jobs: The list before.
         progress: How far that is.
-        load: What takes its place.
+        following: What takes its place.
+        known: How far this is already; None keeps what's known of jobs with the same number that are unchanged.
     """
-    given = progress if load.progress is None else load.progress
-    same = {entry for entry in load.jobs.entries if load.progress is not None or entry in jobs.entries}
-    known = {job.number: job for job in given.jobs}
-    states = tuple(
-        known.get(entry.number, JobProgress(entry.number)) if entry in same else JobProgress(entry.number)
-        for entry in load.jobs.entries
-    )
+    given = progress if known is None else known
+    same = {job.number for job in following.jobs if known is not None or job in jobs.jobs}
+    before = {job.number: job for job in given.jobs if job.number in same}
+    states = tuple(before.get(job.number, JobProgress(job.number)) for job in following.jobs)
     if given.stage is JobStage.RUNNING:
-        paused = tuple(replace(job, stage=JobStage.PAUSED, reason=ANEW) for job in states)
-        states = tuple(p if job.stage is JobStage.RUNNING else job for p, job in zip(paused, states, strict=True))
+        states = tuple(
+            replace(job, stage=JobStage.PAUSED, reason=ANEW) if job.stage is JobStage.RUNNING else job
+            for job in states
+        )
         given = Progress(JobStage.PAUSED, reason=ANEW)
     stages = {job.stage for job in states}
     if given.stage not in stages or (given.stage is JobStage.DONE and len(stages) > 1):
@@ -222,8 +204,8 @@ class JobRunner:
     @property
     def waits_for_key(self) -> bool:
         """Whether the key would end a WAIT."""
-        entry = self._current()
-        return entry is not None and entry.job == WaitJob()
+        wait = self._waiting()
+        return wait is not None and wait.seconds is None
 
     def receive(self, message: Input, *, now: float) -> str:
         """Take in what a person asks for, or what became of a request.
@@ -237,8 +219,6 @@ class JobRunner:
         """
         self._catch_up(finite("now", now, "finite seconds"))
         match message:
-            case Load():
-                return self._load(message)
             case ListCommand():
                 return self._commanded(message, now)
             case Done() | JobFailed():
@@ -248,6 +228,23 @@ class JobRunner:
                     self._pause(reason, now)
             case Interrupted(reason):
                 self._pause(reason, now)
+        return ""
+
+    def load(self, jobs: JobList, progress: Progress | None = None, *, now: float) -> str:
+        """Take a list in place of the one before.
+
+        Args:
+            jobs: The list.
+            progress: See `carried_over`.
+            now: [s].
+
+        Returns:
+            Why it isn't taken; empty if it is.
+        """
+        self._catch_up(finite("now", now, "finite seconds"))
+        if self.running:
+            return RUNS
+        self.jobs, self.progress = jobs, carried_over(self.jobs, self.progress, jobs, progress)
         return ""
 
     def advance(self, *, now: float) -> tuple[Request, ...]:
@@ -273,20 +270,16 @@ class JobRunner:
             self._pause("", now)
         elif command is ListCommand.ABORT:
             return self._abort()
+        elif command is ListCommand.DRY_RUN:
+            return NO_TRIAL
         else:
             return self._begin(command, now)
-        return ""
-
-    def _load(self, message: Load) -> str:
-        if self.running:
-            return RUNS
-        self.jobs, self.progress = message.jobs, carried_over(self.jobs, self.progress, message)
         return ""
 
     def _begin(self, command: ListCommand, now: float) -> str:
         if self.running:
             return RUNS
-        if not self.jobs.entries:
+        if not self.jobs.jobs:
             return EMPTY
         if command is ListCommand.RUN:
             self.progress = Progress.of(self.jobs)
@@ -347,21 +340,21 @@ class JobRunner:
 
     def _next(self, now: float) -> None:
         """Begin the first job that isn't done; messages, which take no time, as well as what follows them."""
-        for entry in self.jobs.entries:
-            before = self._of(entry)
+        for job in self.jobs.jobs:
+            before = self._of(job)
             if before.stage is JobStage.DONE:
                 continue
-            self._mark(JobProgress(entry.number, JobStage.RUNNING))
-            if not isinstance(entry.job, MessageJob):
-                self._ask(entry, before, now)
+            self._mark(JobProgress(job.number, JobStage.RUNNING))
+            if not isinstance(job, MessageJob):
+                self._ask(job, before, now)
                 return
-            self._requests.append(Show(entry.job.text))
-            self._mark(JobProgress(entry.number, JobStage.DONE))
+            self._requests.append(Show(job.text))
+            self._mark(JobProgress(job.number, JobStage.DONE))
         self.progress = replace(self.progress, stage=JobStage.DONE, reason="")
 
-    def _ask(self, entry: JobEntry, before: JobProgress, now: float) -> None:
+    def _ask(self, job: Job, before: JobProgress, now: float) -> None:
         """Let a job be carried out."""
-        job, config = entry.job, self._config
+        config = self._config
         if isinstance(job, WaitJob):
             seconds = job.seconds if before.left is None else before.left
             self._due = math.inf if seconds is None else now + seconds
@@ -372,11 +365,11 @@ class JobRunner:
             case MoveJob():
                 self._requests.append(MoveTo(self._attempt, self.jobs.goal(job)))
                 self._due = now + config.longest_move
-            case VoiceJob(text):
-                self._requests.append(Speak(self._attempt, text))
+            case VoiceJob():
+                self._requests.append(Speak(self._attempt, job.text))
                 self._due = now + config.longest_voice
-            case ArmJob(program, source):
-                self._requests.append(RunArm(self._attempt, program, source))
+            case ArmJob():
+                self._requests.append(RunArm(self._attempt, job.program, job.source))
                 self._due = now + config.longest_arm
 
     def _catch_up(self, now: float) -> None:
@@ -389,18 +382,14 @@ class JobRunner:
                 self._end()
                 self._stage_of_running(JobStage.FAILED, "it took longer than is allowed")
 
-    def _current(self) -> JobEntry | None:
-        """The job that is being done."""
-        job = self.progress.running
-        return None if job is None else self.jobs.entries[self.jobs.index(job.number)]
-
     def _waiting(self) -> WaitJob | None:
         """The WAIT that is being done."""
-        entry = self._current()
-        return entry.job if entry is not None and isinstance(entry.job, WaitJob) else None
+        running = self.progress.running
+        job = None if running is None else self.jobs.jobs[self.jobs.index(running.number)]
+        return job if isinstance(job, WaitJob) else None
 
-    def _of(self, entry: JobEntry) -> JobProgress:
-        return next(job for job in self.progress.jobs if job.number == entry.number)
+    def _of(self, job: Job) -> JobProgress:
+        return next(known for known in self.progress.jobs if known.number == job.number)
 
     def _mark(self, progress: JobProgress) -> None:
         jobs = tuple(progress if job.number == progress.number else job for job in self.progress.jobs)

@@ -16,7 +16,7 @@ from msgspec import Meta
 from vrs.checks import SMALLEST
 from vrs.commands import ENDLESS, FARTHEST, Endless
 from vrs.errors import InvalidValueError
-from vrs.model import Array, frozen_array
+from vrs.model import frozen_array
 from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Twist, Value
 from vrs.record import Record as Wire
 
@@ -27,6 +27,9 @@ MOST_JOINTS = 64
 MOST_NAMES = 1000
 """Commands that a receipt names, at most."""
 
+MOST_POINTS = 720
+"""Of a scan, or a route."""
+
 _DIGITS = re.compile(r"[1-9][0-9]{0,19}")
 
 CommandId = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
@@ -36,8 +39,6 @@ Seconds = Annotated[float, Meta(gt=0, le=1e9)]
 """A duration."""
 Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
 """Seconds by a clock with an origin of its own."""
-Digits = Annotated[str, Meta(pattern=r"\A[1-9][0-9]{0,19}\Z")]
-"""An epoch's."""
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Word = Annotated[str, Meta(max_length=200)]
 Rate = Annotated[float, Meta(gt=0, le=1e4)]
@@ -47,8 +48,13 @@ Span = Annotated[float, Meta(ge=0, le=1e9)]
 """A time that something took, or may take [s]."""
 Timeout = Annotated[float, Meta(gt=0, le=3600)]
 """[s]."""
+Distance = Annotated[float, Meta(ge=0, le=1e9)]
+"""[m]."""
+Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]
+PointRow = tuple[Coordinate, Coordinate]
+"""x, y [m]."""
+Points = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_POINTS)]
 Joints = Annotated[list[Value], Meta(min_length=1, max_length=MOST_JOINTS)]
-Names = Annotated[tuple[Number, ...], Meta(max_length=MOST_NAMES)]
 
 
 class Epoch(int):
@@ -88,25 +94,6 @@ class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type")
         shown = (name for name in self.__struct_fields__ if name not in self.secrets)
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in shown)})"
 
-    @classmethod
-    def of(cls, value: Any, _packed: bool) -> Message:
-        """The wire form of a value whose fields have the same names.
-
-        Args:
-            value: The value.
-            _packed: Whether it's for msgpack, where coefficients are bytes; most messages look the same in both.
-        """
-        fields = [getattr(value, name) for name in cls.__struct_fields__]
-        return cls(*[field.tolist() if isinstance(field, np.ndarray) else field for field in fields])
-
-    def read(self) -> Any:
-        """The value that it stands for.
-
-        Raises:
-            InvalidValueError: If there's none.
-        """
-        raise NotImplementedError
-
 
 def check_normal(raw: object, read: object, name: str) -> None:
     """Look for a subnormal number in a message or a part of it: what is divided by one overflows.
@@ -134,17 +121,6 @@ def check_normal(raw: object, read: object, name: str) -> None:
         parts = read if isinstance(read, tuple) and len(read) == len(raw) else [None] * len(raw)
         for i, (item, part) in enumerate(zip(raw, parts, strict=True)):
             check_normal(item, part, f"{name}[{i}]")
-
-
-def numbers(q: Array) -> list[float]:
-    """An array as a list of Python's floats."""
-    values: list[float] = q.tolist()
-    return values
-
-
-def array(values: list[float]) -> Array:
-    """A read-only array."""
-    return frozen_array(values)
 
 
 def text(words: str) -> str:
@@ -278,23 +254,6 @@ def _parts(kind: msgspec.inspect.Type) -> Iterator[msgspec.inspect.Type]:
         return
     for one in inner:
         yield from _parts(one)
-
-
-def digits(epoch: int | None) -> str | None:
-    """An epoch's digits; None where there's none."""
-    return str(epoch) if epoch else None
-
-
-def epoch(digits: str | None) -> int:
-    """The epoch that digits stand for; 0 where there are none.
-
-    Raises:
-        InvalidValueError: If it has more than 64 bits.
-    """
-    number = 0 if digits is None else int(digits)
-    if number >= 2**64:
-        raise InvalidValueError("epoch", digits, "less than 2**64")
-    return number
 
 
 class Leased(Message, frozen=True, omit_defaults=True, gc=False):

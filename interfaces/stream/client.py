@@ -18,8 +18,8 @@ from interfaces.link.round_trip import RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request, control
 from interfaces.messages.control import Impair, Network, Notice, Ping, Pong, ProblemCode, Role, Survey
 from interfaces.messages.fields import Epoch
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
-from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 
 FROM_SERVER = 4 * LARGEST
 """Longest message of a server that is read [bytes]."""

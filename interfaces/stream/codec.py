@@ -5,21 +5,19 @@ from __future__ import annotations
 import enum
 from collections import OrderedDict
 from collections.abc import Callable
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from types import UnionType
 from typing import Any, TypeAlias, TypeVar, get_args
 
 import msgspec
 
 from interfaces import messages
-from interfaces.messages import Reply, Request, control
-from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, ProtocolError, Question
-from interfaces.messages.fields import Message as Wire
-from interfaces.messages.fields import check_normal, plain, rich, writer
+from interfaces.messages import Reply, Request, control, mobile
+from interfaces.messages.control import Notice, Pong, ProblemCode, ProtocolError, Question
+from interfaces.messages.drive_sites import DriveOrders, DriveReport
+from interfaces.messages.fields import Message, check_normal, plain, rich, writer
 from interfaces.messages.sites import Orders, Report
-from interfaces.stream import mobile
-from interfaces.stream.wire import mobile as mobile_wires
-from interfaces.teleop.driving.messages import DriveOrders, DriveReport
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536
@@ -44,52 +42,12 @@ Value: TypeAlias = (
 """What crosses."""
 T = TypeVar("T")
 
-WIRES: dict[type, type[Wire]] = {
-    messages.Order: messages.Order,
-    messages.Ask: messages.Ask,
-    messages.Follow: messages.Follow,
-    messages.Want: messages.Want,
-    messages.Outcome: messages.Outcome,
-    messages.Answer: messages.Answer,
-    messages.Broadcast: messages.Broadcast,
-    messages.Scene: messages.Scene,
-    messages.History: messages.History,
-    messages.Change: messages.Change,
-    messages.Pulse: messages.Pulse,
-    control.Hello: control.Hello,
-    control.Welcome: control.Welcome,
-    control.Attached: control.Attached,
-    Ping: Ping,
-    Pong: Pong,
-    control.Acquire: control.Acquire,
-    control.TakeOver: control.TakeOver,
-    control.Share: control.Share,
-    control.Release: control.Release,
-    control.Resume: control.Resume,
-    control.Beat: control.Beat,
-    control.Lease: control.Lease,
-    control.Problem: control.Problem,
-    control.State: control.State,
-    control.Survey: control.Survey,
-    control.Impair: control.Impair,
-    control.Network: control.Network,
-    Orders: Orders,
-    Report: Report,
-    mobile.MobileWelcome: mobile.MobileWelcome,
-    mobile.Postures: mobile.Postures,
-    mobile.TaskOrder: mobile_wires.TaskOrderWire,
-    mobile.Tasks: mobile_wires.TasksWire,
-    mobile.Seen: mobile.Seen,
-    mobile.Plan: mobile.Plan,
-    DriveOrders: mobile_wires.DriveOrdersWire,
-    DriveReport: mobile_wires.DriveReportWire,
-}
-"""The wire form of each message."""
-ASKED = frozenset(
-    WIRES[kind] for kind in (*get_args(Request), *get_args(Question), mobile.TaskOrder, Pong, Orders, DriveOrders)
-)
+KINDS: tuple[type[Message], ...] = get_args(Value)
+"""Classes of what crosses."""
+_KNOWN = frozenset(KINDS)
+ASKED = frozenset((*get_args(Request), *get_args(Question), mobile.TaskOrder, Pong, Orders, DriveOrders))
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
-TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}
+TYPES = {kind.__struct_config__.tag: kind for kind in KINDS}
 """Messages by the type that stands in them."""
 
 
@@ -116,7 +74,7 @@ _PLAIN: dict[Encoding, Callable[[bytes], Any]] = {
     Encoding.MSGPACK: msgspec.msgpack.Decoder().decode,
     Encoding.JSON: msgspec.json.Decoder().decode,
 }
-_WRITERS: dict[Encoding, Callable[[Wire], bytes]] = {
+_WRITERS: dict[Encoding, Callable[[Message], bytes]] = {
     Encoding.MSGPACK: writer(msgspec.msgpack.Encoder(enc_hook=plain).encode),
     Encoding.JSON: writer(msgspec.json.Encoder(enc_hook=plain).encode),
 }
@@ -128,12 +86,11 @@ def encode(message: Value, encoding: Encoding) -> bytes:
     Raises:
         InvalidValueError: If it's no message.
     """
-    kind = WIRES.get(type(message))
-    if kind is None:
-        raise InvalidValueError("message", message, f"one of {', '.join(known.__name__ for known in WIRES)}")
-    packed = encoding is Encoding.MSGPACK
-    wire: Any = message.as_written(packed) if kind is type(message) else kind.of(message, packed)
-    return _WRITERS[encoding](wire)
+    if type(message) not in KINDS:
+        raise InvalidValueError(
+            "message", message, f"one of {', '.join(kind.__name__ for kind in get_args(Value))}"
+        )
+    return _WRITERS[encoding](message.as_written(encoding is Encoding.MSGPACK))
 
 
 def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARGEST) -> Any:
@@ -151,10 +108,10 @@ def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARG
     if len(data) > largest:
         raise ProtocolError(ProblemCode.TOO_LARGE, f"{len(data)} bytes; at most {largest} are read")
     try:
-        wire = _reader(encoding, allowed)(data)
-        if type(wire) in ASKED:
-            check_normal(_PLAIN[encoding](data), wire, str(wire.__struct_config__.tag))
-        return wire if type(wire) in WIRES else wire.read()
+        message = _reader(encoding, allowed)(data)
+        if type(message) in ASKED:
+            check_normal(_PLAIN[encoding](data), message, message.kind)
+        return message
     except msgspec.ValidationError as error:
         raise _invalid(data, encoding, allowed, str(error)) from None
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
@@ -180,16 +137,14 @@ def _classes(allowed: Any) -> tuple[type, ...]:
 
 
 @cache
-def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
-    packed = encoding is Encoding.MSGPACK
-    union: Any = None
-    for value in _classes(allowed):
-        kind: Any = WIRES[value]
-        union = kind if union is None else union | kind
-    reader: Callable[[bytes], Wire] = (
-        (msgspec.msgpack if packed else msgspec.json).Decoder(union, dec_hook=rich).decode
+def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Message]:
+    kinds = reduce(or_, _classes(allowed))
+    read: Callable[[bytes], Message] = (
+        msgspec.msgpack.Decoder(kinds, dec_hook=rich).decode
+        if encoding is Encoding.MSGPACK
+        else msgspec.json.Decoder(kinds, dec_hook=rich).decode
     )
-    return reader
+    return read
 
 
 FOR_ONE = (messages.Outcome, messages.Answer, messages.Scene, messages.Pulse, Pong, control.Problem)

@@ -11,7 +11,6 @@ from typing import Generic, Self, TypeVar
 from interfaces.clients.designer import Issued
 from interfaces.clients.ports import EnginePort
 from interfaces.clients.viewer import ShownFrame
-from interfaces.jobs import Forecast, JobList, ListCommand, Load
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import ViewForm, control
 from interfaces.messages.control import (
@@ -26,13 +25,14 @@ from interfaces.messages.control import (
     Survey,
     Welcome,
 )
+from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import Forecast, JobList, ListCommand
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
 from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
 from interfaces.stream.codec import Encoding
-from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks, Trial, Wanted
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
-from interfaces.teleop.driving.messages import Doing, Go
 from robots.onboard.journey import Goal
 from vrs.clock import WallClock
 from vrs.commands import DriveCommand, Stop
@@ -405,19 +405,19 @@ class MobileConnection(RobotConnection[MobileCore]):
         Returns:
             What it does then; or why not.
         """
-        return self._ask(Go(goal), wait)
+        return self._ask(RobotTask(go=goal), wait)
 
     def load(self, jobs: JobList, *, wait: float = 5.0) -> Tasks | Problem:
         """Put a list of jobs in the place of the one that's there; see `go`."""
-        return self._ask(Load(jobs), wait)
+        return self._ask(RobotTask(jobs=jobs), wait)
 
     def do(self, command: ListCommand, *, wait: float = 5.0) -> Tasks | Problem:
         """Run, pause, resume or abort the list, or press the key; see `go`."""
-        return self._ask(command, wait)
+        return self._ask(RobotTask(do=command), wait)
 
     def dry_run(self, *, wait: float = 30.0) -> Forecast | Problem:
         """Ask how long the list is likely to take; the virtual robot alone tries it."""
-        answer = self._ask(Trial.DRY_RUN, wait)
+        answer = self._ask(RobotTask(do=ListCommand.DRY_RUN), wait)
         if isinstance(answer, Problem):
             return answer
         self.wait(lambda _: self.tasks is not None and self.tasks.forecast is not None, wait)
@@ -430,8 +430,8 @@ class MobileConnection(RobotConnection[MobileCore]):
         """Wait until the robot does nothing by itself any more, or the time [s] is over; whether that's so."""
         return self.wait(lambda _: self.tasks is not None and self.tasks.doing is Doing.NOTHING, timeout)
 
-    def _ask(self, wanted: Wanted, wait: float) -> Tasks | Problem:
-        answer: Replied = self._wish(lambda number: TaskOrder(number, self._epoch, wanted), wait, leased=True)
+    def _ask(self, task: RobotTask, wait: float) -> Tasks | Problem:
+        answer: Replied = self._wish(lambda number: TaskOrder(number, task, self._epoch), wait, leased=True)
         return answer if isinstance(answer, Tasks | Problem) else ELSE
 
     @property

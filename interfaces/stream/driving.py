@@ -8,9 +8,9 @@ from collections.abc import Callable
 from interfaces.link.delivery import OrderBook
 from interfaces.messages import Order, Outcome, Request
 from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
+from interfaces.messages.mobile import MobileWelcome
 from interfaces.stream.codec import Value
 from interfaces.stream.hosted import Greeting
-from interfaces.stream.mobile import MobileWelcome
 from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.driving.operator import HOLDS
 from vrs.commands import DriveCommand, Stop

@@ -14,12 +14,13 @@ import msgspec
 from interfaces.engine_server.site import earliest
 from interfaces.messages import control
 from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role
+from interfaces.messages.drive_sites import RobotTask
+from interfaces.messages.mobile import TaskOrder, Tasks
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
 from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import LeasedRobot, Leasing
 from interfaces.stream.limits import Allowances, Bucket, ClientLimits
-from interfaces.stream.mobile import TaskOrder, Tasks, Wanted
 from interfaces.stream.session import (
     POLICY,
     RESTART,
@@ -66,7 +67,7 @@ class Emulation(Protocol):
 class Workers(Protocol):
     """What lets a robot do something by itself."""
 
-    def order(self, wanted: Wanted, *, now: float) -> str:
+    def order(self, task: RobotTask, *, now: float) -> str:
         """Let it; why it doesn't, empty if it does."""
 
     def tasks(self, answers: int | None = None) -> Tasks:
@@ -371,10 +372,10 @@ class Hub:
             return Problem(ProblemCode.NOT_ALLOWED, "this robot does nothing by itself", order.number)
         if seat.role is Role.VIEWER:
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer commands nothing", order.number)
-        if not self._leasing.admits(seat, order.epoch, now):
+        if not self._leasing.admits(seat, order.epoch or 0, now):
             text = "only who has control tells the robot what to do"
             return Problem(ProblemCode.STALE_EPOCH, text, order.number)
-        refusal = self._workers.order(order.wanted, now=now)
+        refusal = self._workers.order(order.task, now=now)
         if refusal:
             return Problem(ProblemCode.OUT_OF_RANGE, refusal, order.number)
         return self._workers.tasks(order.number)

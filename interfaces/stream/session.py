@@ -17,9 +17,9 @@ from interfaces.messages.control import (
     Role,
     Survey,
 )
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
 from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
-from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""

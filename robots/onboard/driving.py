@@ -58,6 +58,8 @@ class Posture(NamedTuple):
 
 
 STAND = Drive(0.0, 0.0)
+STILL: Final = Drive(0.02, 0.05)
+"""A robot that's told to move slower than this stands: it only keeps its place [m/s, rad/s]."""
 
 
 def kept(v: float, w: float, before: float, dt: float, limits: DriveLimits) -> Drive:
@@ -72,3 +74,8 @@ def kept(v: float, w: float, before: float, dt: float, limits: DriveLimits) -> D
     """
     v = clipped(clipped(v, limits.v_max), limits.a_max * dt, before)
     return Drive(v, clipped(w, limits.w_max))
+
+
+def is_still(drive: Drive) -> bool:
+    """Whether a robot that's told that is at rest."""
+    return abs(drive.v) <= STILL.v and abs(drive.w) <= STILL.w

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -25,7 +26,7 @@ from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import Arc, MovingPath
 from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
 from robots.onboard.routes import NoRoute, Point, Route, RouteMap
-from vrs.checks import finite, validated, within
+from vrs.checks import check_fields, finite, validated, within
 from vrs.mobile import advanced, wrapped
 
 _CURVES = (0.0, 0.6, -0.6, 1.2, -1.2, 2.0, -2.0, 3.5, -3.5)
@@ -115,9 +116,7 @@ _AWAY = 0.5
 """Who gets so far from where he waited, or was stuck, has got on [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class Goal:
+class Goal(msgspec.Struct, frozen=True, omit_defaults=True, gc=False):
     """Where the robot is to go."""
 
     x: Annotated[float, within(-1000.0, 1000.0, "m")]
@@ -126,6 +125,9 @@ class Goal:
     """[m]."""
     heading: Annotated[float, within(-1000.0, 1000.0, "rad")] | None = None
     """In which it's to end [rad]; None for any."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 class JourneyState(enum.StrEnum):

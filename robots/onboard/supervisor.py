@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robots.onboard.avoidance import SonarMount
@@ -29,14 +30,15 @@ from vrs.mobile.environment import Grid
 from vrs.model import Array
 
 _NEVER = -math.inf
+_Index = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 
 
 class CellChange(NamedTuple):
     """What was seen of a cell."""
 
-    cell: tuple[int, int]
+    cell: tuple[_Index, _Index]
     """(m, n) in the grid."""
-    seen: float
+    seen: Annotated[float, Meta(ge=-1e9, le=1e9)]
     """When it was last seen so, by the robot's clock [s]."""
     occupied: bool
     """To be added; else to be forgotten."""

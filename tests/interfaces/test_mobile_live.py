@@ -10,20 +10,20 @@ from pathlib import Path
 import pytest
 
 from interfaces import connect_mobile
-from interfaces.jobs import (
+from interfaces.jobs import JobFile, RunnerConfig
+from interfaces.link import LinkConditions
+from interfaces.messages.control import Lease, Problem, Role
+from interfaces.messages.drive_sites import Doing
+from interfaces.messages.jobs import (
     ArmJob,
-    Forecast,
-    JobFile,
     JobList,
     JobStage,
     ListCommand,
     MoveJob,
     OperatorLoss,
-    RunnerConfig,
     WaitJob,
 )
-from interfaces.link import LinkConditions
-from interfaces.messages.control import Lease, Problem, Role
+from interfaces.messages.mobile import Tasks
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
 from interfaces.runtime.live.robot_server import LARGEST
@@ -31,11 +31,9 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.connection import MobileConnection
-from interfaces.stream.mobile import Tasks
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving import DrivenConfig
-from interfaces.teleop.driving.messages import Doing
 from robots import ipr
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
@@ -111,8 +109,8 @@ def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss)
                     assert robot.tasks is not None
                     assert robot.tasks.journey is JourneyState.ENDED
                     assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
-                assert isinstance(robot.load(JobList.of(MoveJob(THERE), WaitJob())), Tasks)
-                assert isinstance(robot.dry_run(), Forecast)
+                assert isinstance(robot.load(JobList((MoveJob(1, THERE), WaitJob(2)))), Tasks)
+                assert isinstance(robot.dry_run(), tuple)
                 assert isinstance(robot.do(ListCommand.KEY), Problem)
                 assert isinstance(robot.do(ListCommand.RUN), Tasks)
                 assert watcher.wait(lambda it: it.tasks is not None and it.tasks.left > 0, 20.0)
@@ -138,7 +136,7 @@ def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss)
             off = abs(watcher.postures.real.x - THERE.x)
             assert off < 0.05 if loss is OperatorLoss.CARRY_ON else off > 0.1
         jobs, progress = JobFile(tmp_path / "jobs.json").load()
-        assert jobs.entries == JobList.of(MoveJob(THERE), WaitJob()).entries
+        assert jobs.jobs == (MoveJob(1, THERE), WaitJob(2))
         assert progress.stage is (JobStage.PAUSED if loss is OperatorLoss.STOP else JobStage.DONE)
 
 
@@ -149,7 +147,7 @@ def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> Non
         met(f"http://{serving.address}", "driver") as robot,
     ):
         controlled(robot)
-        assert isinstance(robot.load(JobList.of(ArmJob("wave", wave))), Tasks)
+        assert isinstance(robot.load(JobList((ArmJob(1, "wave", wave),))), Tasks)
         assert isinstance(robot.do(ListCommand.RUN), Tasks)
         assert robot.wait(lambda it: it.tasks is not None and it.tasks.progress.stage is JobStage.DONE, 30.0)
 

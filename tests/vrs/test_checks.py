@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
+import msgspec
 import numpy as np
 import pytest
 
-from vrs.checks import validated, within
+from vrs.checks import check_fields, validated, within
 from vrs.errors import InvalidValueError
 
 
@@ -72,3 +73,23 @@ def test_a_subclass_is_held_to_its_own_ranges_too():
         Hurry(factor=2.5)
     with pytest.raises(InvalidValueError, match="period"):
         Hurry(period=0.0)
+
+
+class Place(msgspec.Struct, frozen=True):
+    x: Annotated[float, within(-10.0, 10.0, "m")]
+    heading: Annotated[float, within(-4.0, 4.0)] | None = None
+
+    def __post_init__(self):
+        check_fields(self)
+
+
+def test_a_struct_is_held_to_its_ranges_made_and_read():
+    made = Place(2)
+    assert (type(made.x), made) == (float, Place(2.0))
+    assert msgspec.json.decode(b'{"x": 2}', type=Place) == made
+    with pytest.raises(InvalidValueError, match=r"x .*a number in \[-10, 10\] m"):
+        Place(10.5)
+    with pytest.raises(InvalidValueError, match="heading"):
+        Place(1.0, math.nan)
+    with pytest.raises(msgspec.ValidationError, match="x"):
+        msgspec.json.decode(b'{"x": 10.5}', type=Place)

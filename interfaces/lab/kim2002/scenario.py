@@ -15,31 +15,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import (
-    Done,
-    EndJob,
-    JobFailed,
-    JobList,
-    JobRunner,
-    JobStage,
-    ListCommand,
-    Load,
-    MessageJob,
-    MoveJob,
-    MoveTo,
-    Request,
-    RunArm,
-    Show,
-    SilentSpeaker,
-    Speak,
-    VoiceJob,
-    WaitJob,
-)
+from interfaces.jobs import Done, EndJob, JobFailed, JobRunner, MoveTo, Request, RunArm, Show, SilentSpeaker, Speak
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
 from interfaces.lab.output import BAD, INK, MUTED, REAL, draw
 from interfaces.lab.statistics import bootstrap
+from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.bullet.rooms import Person, Room
 from robots.ipr.body import Cargo
 from robots.ipr.chassis import IPR, Senses
@@ -58,7 +40,7 @@ HELLO: Final = "Hello!"
 """What is said at B."""
 PLEASE: Final = "Please put the book on my top side!"
 """And shown there."""
-JOBS: Final = (MoveJob("B"), VoiceJob(HELLO), MessageJob(PLEASE), WaitJob(), MoveJob("A"))
+JOBS: Final = (MoveJob(1, "B"), VoiceJob(2, HELLO), MessageJob(3, PLEASE), WaitJob(4), MoveJob(5, "A"))
 """The paper's list."""
 OPENS, BROUGHT, KEY = 18.0, 36.0, 40.0
 """When the front door opens, the book is put on top, and the key is pressed [s]."""
@@ -159,7 +141,7 @@ class ScenarioRun:
         self._pilot = TrialPilot(body)
         self._places = {one.name: Goal(one.x, one.y, one.heading) for one in room.places}
         self._runner = JobRunner()
-        self._runner.receive(Load(JobList.of(*JOBS, places=self._places)), now=0.0)
+        self._runner.load(JobList(JOBS, self._places), now=0.0)
         self._speaker = SilentSpeaker()
         self._moving = self._speaking = 0
         """Numbers of the attempts that are carried out; 0 for none."""
@@ -299,7 +281,7 @@ def _count(total: int, what: str, good: Sequence[bool]) -> Claim:
 
 
 def _at_a(one: ScenarioResult) -> bool:
-    return len(one.stops) == len([job for job in JOBS if job.word == "MOVE"]) and one.stops[-1].off <= NEAR
+    return len(one.stops) == len([job for job in JOBS if isinstance(job, MoveJob)]) and one.stops[-1].off <= NEAR
 
 
 def _posture(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:

@@ -9,12 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from interfaces.messages.drive_sites import Doing
 from interfaces.stream.meshcat import Committed, MobileScene
 from interfaces.stream.meshcat.driving import PIECE
 from interfaces.teleop.driving import DrivingOperator
-from interfaces.teleop.driving.messages import Doing, Point
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
+from robots.onboard.routes import Point
 from vrs.mobile import ArcPiece, ArcTimeline, Grid, MobileModel, wrapped
 from vrs.mobile.model import advanced, braking
 

@@ -14,11 +14,13 @@ import numpy as np
 from starlette.routing import BaseRoute
 from typing_extensions import override
 
-from interfaces.jobs import ArmJob, JobFile, OperatorLoss
+from interfaces.jobs import JobFile
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
 from interfaces.messages.control import MOST_MESSAGES, Attached, Role
-from interfaces.messages.fields import Epoch
+from interfaces.messages.drive_sites import Doing, DriveReport, RobotTask
+from interfaces.messages.jobs import ArmJob, OperatorLoss
+from interfaces.messages.mobile import Postures, Tasks
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
 from interfaces.runtime.live.mobile_tasks import TaskDesk
@@ -29,12 +31,10 @@ from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat.page import routes as view_routes
-from interfaces.stream.mobile import Postures, Tasks, Wanted
 from interfaces.stream.server import HubServer
 from interfaces.teleop.architectures import OperatorSurroundings
 from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator
-from interfaces.teleop.driving.messages import Doing, DriveReport
 from interfaces.teleop.driving.operator import BY_ITSELF, FREE, STOPPED
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
@@ -211,10 +211,10 @@ class LiveMobileOperator(LeasedRobot, Workers):
         return doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
 
     @override
-    def order(self, wanted: Wanted, *, now: float) -> str:
+    def order(self, task: RobotTask, *, now: float) -> str:
         """Let the robot do something by itself; why it doesn't, empty if it does."""
         self._turning.soon()
-        return self.desk.order(wanted)
+        return self.desk.order(task)
 
     def tasks(self, answers: int | None = None) -> Tasks:
         """How that is."""
@@ -260,7 +260,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
         real: dict[str, Any] = {}
         if report is not None:
             real = {"t": report.measured_at, "real": report.posture, "drive": report.drive, "D": report.D}
-            real |= {"starved": report.starved, "epoch": Epoch(report.epoch) if report.epoch else None}
+            real |= {"starved": report.starved, "epoch": report.epoch}
         if deviation is not None and not operator.halted:
             real |= {"path_error": deviation.path_error, "time_difference": deviation.time_difference}
         self.hub.show(

@@ -22,6 +22,8 @@ from typing_extensions import override
 from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.messages.control import PROTOCOL, Attached
+from interfaces.messages.drive_sites import DriveOrders, SensedPoints
+from interfaces.messages.fields import MOST_POINTS
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access
 from interfaces.teleop.architectures import (
@@ -34,7 +36,6 @@ from interfaces.teleop.architectures import (
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, SENSING, robot_surroundings
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands, JourneyPilot
-from interfaces.teleop.driving.messages import DriveOrders, SensedPoints
 from interfaces.timer import Turning
 from robots.bullet.rooms import Room
 from robots.ipr.body import MobileBody
@@ -102,7 +103,7 @@ class LaserSight:
             place = reckoned if localizer.posture is None else localizer.posture
             (xx, xy, _), (_, yy, _), _ = localizer.covariance.tolist()
             doubt = xx, xy, yy
-        self._sight = SensedPoints(scan.time, seen_from(scan, place), doubt)
+        self._sight = SensedPoints(scan.time, seen_from(scan, place)[:MOST_POINTS], doubt)
 
     def newest(self) -> SensedPoints | None:
         """What was seen since the last call; None if that's nothing."""

@@ -6,29 +6,25 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
-from interfaces.jobs import (
+from msgspec.structs import replace
+
+from interfaces.jobs import JobFile, JobRunner, carried_over, digest, dry_run, written_jobs
+from interfaces.jobs.runner import EMPTY, RUNS
+from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
+from interfaces.messages.jobs import (
+    LONGEST_NAME,
+    MOST_PLACES,
     ArmJob,
     Forecast,
-    JobFile,
     JobList,
-    JobRunner,
     ListCommand,
-    Load,
     Progress,
-    carried_over,
-    digest,
-    dry_run,
-    written_jobs,
 )
-from interfaces.jobs.runner import EMPTY, RUNS
-from interfaces.jobs.values import LONGEST_NAME, MOST_PLACES
-from interfaces.stream.mobile import Plan, Seen, Tasks, Trial, Wanted
+from interfaces.messages.mobile import Plan, Seen, Tasks
 from interfaces.stream.session import News
 from interfaces.teleop.driving import DrivingOperator
-from interfaces.teleop.driving.messages import Doing, Go, SensedPoints, TaskReport
 from interfaces.teleop.driving.operator import NOT_MET
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Chassis
@@ -81,7 +77,7 @@ class TaskDesk:
             if place.name not in jobs.places and room_left:
                 jobs = jobs.with_place(place.name, Goal(place.x, place.y, place.heading))
         self.jobs = jobs
-        self.progress = carried_over(jobs, progress, Load(jobs, progress))
+        self.progress = carried_over(jobs, progress, jobs, progress)
         self._digest = digest(jobs)
         self._forecast: Forecast | None = None
         self._roads: RouteMap | None = None
@@ -109,24 +105,19 @@ class TaskDesk:
         robot = outline.front, outline.rear, 2 * outline.half_width
         return Plan((room.length, room.width), rings, room.via, robot)
 
-    def order(self, wanted: Wanted) -> str:
+    def order(self, task: RobotTask) -> str:
         """Do what somebody wants; why not, empty if it's done."""
-        match wanted:
-            case Go():
-                return self._operator.order(wanted)
-            case Load(jobs):
-                return self._edit(jobs)
-            case Trial():
-                return self._try()
-            case ListCommand():
-                return self._command(wanted)
+        if task.jobs is not None:
+            return self._edit(task.jobs)
+        if task.do is ListCommand.DRY_RUN:
+            return self._try()
+        return self._operator.order(task) if task.do is None else self._command(task, task.do)
 
     def _edit(self, jobs: JobList) -> str:
         """Take another list, and keep it."""
         if self._doing is Doing.JOBS:
             return RUNS
-        load = Load(jobs)
-        progress = carried_over(self.jobs, self.progress, load)
+        progress = carried_over(self.jobs, self.progress, jobs)
         if len(written_jobs(jobs, progress)) > LARGEST:
             return TOO_LONG
         self.jobs, self.progress, self._digest, self._forecast = jobs, progress, digest(jobs), None
@@ -134,19 +125,19 @@ class TaskDesk:
         self.turn()
         return ""
 
-    def _command(self, command: ListCommand) -> str:
+    def _command(self, task: RobotTask, command: ListCommand) -> str:
         """Let the robot do something with the list, which it's given if it hasn't it."""
         refusal = JobRunner.at(self.jobs, self.progress).receive(command, now=0.0)
         if refusal:
             return refusal
         has = self._report is not None and self._report.digest == self._digest
         if has:
-            return self._operator.order(command)
-        return self._operator.order(Load(self.jobs, self.progress), command)
+            return self._operator.order(task)
+        return self._operator.order(RobotTask(jobs=self.jobs, progress=self.progress), task)
 
     def _try(self) -> str:
         """Begin a dry run of the list, from where the robot is."""
-        if not self.jobs.entries:
+        if not self.jobs.jobs:
             return EMPTY
         report = self._operator.report
         if report is None:
@@ -178,7 +169,7 @@ class TaskDesk:
         report, sight = self._operator.tasks, self._operator.sight
         if report is not None and report is not self._report:
             self._report = report
-            if report.digest == self._digest and self.jobs.entries and report.progress != self.progress:
+            if report.digest == self._digest and self.jobs.jobs and report.progress != self.progress:
                 self.progress = report.progress
                 self._keep()
         if sight is not None and sight is not self._sight:

@@ -20,32 +20,21 @@ from interfaces.teleop.architectures.controllers import (
 )
 from interfaces.teleop.architectures.sites import (
     ArchitectureOperatorSite,
-    ArchitectureReport,
     ArchitectureRobotSite,
-    ArcPacket,
     DriveController,
     PositionSource,
     Receiver,
     Sender,
     Transport,
 )
-from interfaces.teleop.architectures.surroundings import (
-    Aim,
-    CellChanges,
-    OperatorSurroundings,
-    RobotSurroundings,
-    Sonar,
-)
+from interfaces.teleop.architectures.surroundings import Aim, OperatorSurroundings, RobotSurroundings, Sonar
 
 __all__ = [
     "ARCHITECTURES",
     "Aim",
-    "ArcPacket",
     "Architecture",
     "ArchitectureOperatorSite",
-    "ArchitectureReport",
     "ArchitectureRobotSite",
-    "CellChanges",
     "Constants",
     "DriveController",
     "Filtered",

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 
 from typing_extensions import override
 
-from interfaces.teleop.architectures.sites import ArcPacket, DriveController
+from interfaces.messages.drive_sites import ArcPacket
+from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture

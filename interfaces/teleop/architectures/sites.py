@@ -5,11 +5,11 @@ from __future__ import annotations
 import enum
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from interfaces.link.conditions import Service
-from interfaces.teleop.architectures.surroundings import CellChanges, OperatorSurroundings, RobotSurroundings
+from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.operator import CommandRecord
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
@@ -18,12 +18,6 @@ from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
 from vrs.mobile.model import advanced, braking, limited
 from vrs.segment import ArcSegment, known_arc
 
-HEADER = 44
-"""Number of the first arc, time and posture at its start, and how many follow [byte]."""
-ARC = 24
-"""v, ω and duration of an arc [byte]."""
-MOST_REPEATED = 600
-"""Most arcs in a datagram's message: a minute's. With more missing, the oldest and the newest halves."""
 MOST_EARLY = 36_000
 """Most arcs that wait for those before them; what comes beyond is left out, and repeated by the sender."""
 
@@ -45,23 +39,6 @@ class Transport(enum.StrEnum):
     def service(self) -> Service:
         """What the link promises about order."""
         return Service.IN_ORDER if self is Transport.STREAM else Service.DATAGRAM
-
-
-@dataclass(frozen=True, slots=True)
-class ArcPacket:
-    """Arcs of the operator's path."""
-
-    runs: tuple[tuple[int, tuple[ArcSegment, ...]], ...]
-    """Runs of consecutive arcs, each with the number of its first."""
-    complete_until: float
-    """No later packet changes the path before this time [s]."""
-    tail: tuple[ArcSegment, ...] = ()
-    """How the virtual robot brakes from there, unless the operator goes on."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        return 8 + HEADER * len(self.runs) + ARC * (len(self.tail) + sum(len(arcs) for _, arcs in self.runs))
 
 
 class Sender:
@@ -166,27 +143,6 @@ class PositionSource(Protocol):
         """(x, y, θ) [m, m, rad], now."""
 
 
-@dataclass(frozen=True, slots=True)
-class ArchitectureReport:
-    """What the robot sends back."""
-
-    number: int
-    """It rises from report to report."""
-    executed: int
-    """j: how many commands the robot has executed."""
-    posture: Posture
-    """Where it takes itself to be."""
-    received: int
-    """How many arcs it has."""
-    changes: CellChanges | None = None
-    """What its supervisor saw change, in the extended architecture."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        return 48 + (0 if self.changes is None else self.changes.size)
-
-
 class ArchitectureOperatorSite:
     """The virtual robot, which answers at once; the posture estimator; and what is sent."""
 
@@ -263,8 +219,8 @@ class ArchitectureOperatorSite:
 
     def receive(self, report: ArchitectureReport, *, now: float) -> None:
         """Correct the estimate, repeat no more what has arrived, and learn what changed around the robot [s]."""
-        if self.surroundings is not None and report.changes is not None:
-            self.surroundings.receive(report.changes, now=now)
+        if self.surroundings is not None and report.seen_at is not None:
+            self.surroundings.receive(report.cells, report.seen_at, now=now)
         self._sender.acknowledge(report.received)
         self.estimator.feedback(report.executed, report.posture, report.number)
 
@@ -324,7 +280,7 @@ class ArchitectureRobotSite:
     def report(self, *, now: float) -> ArchitectureReport:
         """What goes back to the operator now [s]."""
         self._reports += 1
-        changes = None if self._surroundings is None else self._surroundings.changes(now=now)
-        return ArchitectureReport(
-            self._reports, self.controller.executed, self.posture, self._receiver.count, changes
-        )
+        done = self._reports, self.controller.executed, self.posture, self._receiver.count
+        if self._surroundings is None:
+            return ArchitectureReport(*done)
+        return ArchitectureReport(*done, now, self._surroundings.supervisor.changes(now=now))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from robots.onboard.avoidance import ObstacleAvoidance
@@ -16,29 +15,12 @@ from robots.onboard.movers import MoverTracker, Yielding
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor
 from vrs.mobile import Avoidance, VirtualEnvironment, wrapped
 
-CELL_BYTES = 6
-"""m with added or forgotten, n, and how long ago it was seen, two bytes each [byte]."""
 _AWAY, _BACK = 0.25, 0.05
 """A robot that avoided something further from its path than the first is back within the second [m]."""
 _ASIDE, _TURN, _SPEED = 0.5, 0.6, 0.3
 """On its way back it turns on the spot to what is further aside [rad], so fast [rad/s], and drives so [m/s]."""
 _STEERED = 1.0
 """A controller without a direction of its own is taken to want to get where its drive turns in this time [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class CellChanges:
-    """What a report says of the surroundings."""
-
-    time: float
-    """When the robot said it, by its own clock [s]."""
-    cells: tuple[CellChange, ...]
-    """Each cell once."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        return 10 + CELL_BYTES * len(self.cells)
 
 
 class OperatorSurroundings:
@@ -56,21 +38,22 @@ class OperatorSurroundings:
         self._last: dict[tuple[int, int], CellChange] = {}
         """The last observation of each cell that has come."""
 
-    def receive(self, changes: CellChanges, *, now: float) -> None:
+    def receive(self, cells: Sequence[CellChange], said_at: float, *, now: float) -> None:
         """Take in what a report says.
 
         Args:
-            changes: What it says.
+            cells: What it says changed, each cell once.
+            said_at: When the robot said it, by its own clock [s].
             now: By the operator's clock [s], not before an earlier call's.
         """
         environment = self.environment
-        self._offset = min(self._offset, now - changes.time)
+        self._offset = min(self._offset, now - said_at)
         # What was seen before this can't live any more, whatever a late report says of it.
         oldest = now - self._offset - environment.longest
         self._last = {cell: last for cell, last in self._last.items() if last.seen > oldest}
         freed, formed = [], {}
         m, n = environment.grid.shape
-        for change in changes.cells:
+        for change in cells:
             cell = change.cell
             if not (change.seen > oldest and 0 <= cell[0] < m and 0 <= cell[1] < n):
                 continue
@@ -165,10 +148,6 @@ class RobotSurroundings:
         wanted, towards, left = self._wanted(wanted, posture)
         found = self._avoidance.drive(wanted, posture, now=now, towards=towards, v_before=v_before, left=left)
         return self._yielding.drive(found, self._movers.movers(now=now), posture, now=now, v_before=v_before)
-
-    def changes(self, *, now: float) -> CellChanges:
-        """What a report says of the surroundings now [s]."""
-        return CellChanges(now, self.supervisor.changes(now=now))
 
     def _wanted(self, wanted: Drive, posture: Posture) -> tuple[Drive, float, float]:
         """What is wanted, in which direction [rad], and the way left [m]; or straight back to the path.

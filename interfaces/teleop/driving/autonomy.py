@@ -16,8 +16,6 @@ from interfaces.jobs.runner import (
     Interrupted,
     JobFailed,
     JobRunner,
-    ListCommand,
-    Load,
     MoveTo,
     OperatorLost,
     Request,
@@ -26,9 +24,10 @@ from interfaces.jobs.runner import (
     Show,
     Speak,
 )
-from interfaces.jobs.values import OperatorLoss
-from interfaces.teleop.driving.messages import Doing, Go, Halt, Task, TaskReport, is_still
-from robots.onboard.driving import STAND, Drive, Posture
+from interfaces.messages.drive_sites import Doing, RobotTask, TaskReport
+from interfaces.messages.fields import MOST_POINTS
+from interfaces.messages.jobs import ListCommand, OperatorLoss
+from robots.onboard.driving import STAND, Drive, Posture, is_still
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
 from robots.onboard.routes import Point
 
@@ -171,22 +170,21 @@ class Autonomy:
         """Way to the goal [m]."""
         return self._pilot.left
 
-    def receive(self, task: Task, *, now: float) -> None:
+    def receive(self, task: RobotTask, *, now: float) -> None:
         """Take a task; one that can't be done now changes nothing."""
-        match task:
-            case Go(goal):
-                self.runner.receive(Interrupted(DIRECT), now=now)
-                self._turn(now)
-                self._set_out(goal)
-            case Halt(reason):
-                self.stop(reason, now=now)
-            case Load():
-                self.runner.receive(task, now=now)
-                self._digest = digest(self.runner.jobs)
-            case ListCommand():
-                if task in (ListCommand.RUN, ListCommand.RESUME) and not self.runner.running:
-                    self._leave()
-                self.runner.receive(task, now=now)
+        if task.go is not None:
+            self.runner.receive(Interrupted(DIRECT), now=now)
+            self._turn(now)
+            self._set_out(task.go)
+        elif task.halt is not None:
+            self.stop(task.halt, now=now)
+        elif task.jobs is not None:
+            self.runner.load(task.jobs, task.progress, now=now)
+            self._digest = digest(self.runner.jobs)
+        elif task.do is not None:
+            if task.do in (ListCommand.RUN, ListCommand.RESUME) and not self.runner.running:
+                self._leave()
+            self.runner.receive(task.do, now=now)
         self._turn(now)
 
     def stop(self, reason: str, *, now: float) -> None:
@@ -232,7 +230,9 @@ class Autonomy:
         elif self._aside is not None:
             state, reason = self._aside
         progress, loss = self.runner.progress, self.loss
-        return TaskReport(state, reason, goal, route, self._digest, progress, loss, self._shows, self._says)
+        return TaskReport(
+            state, reason, goal, route[:MOST_POINTS], self._digest, progress, loss, self._shows, self._says
+        )
 
     def _set_out(self, goal: Goal) -> None:
         """Drive to a goal, from where the robot comes to rest."""

@@ -9,22 +9,23 @@ from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
 from interfaces.link.quantiles import SlidingQuantiles
-from interfaces.teleop.architectures import ArchitectureOperatorSite, ArcPacket, OperatorSurroundings, Transport
-from interfaces.teleop.connection import SiteLine
-from interfaces.teleop.driving.messages import (
+from interfaces.messages.drive_sites import (
+    HALT,
+    ArcPacket,
     Doing,
     DriveOrders,
     DriveReport,
     Errand,
-    Halt,
+    RobotTask,
     SensedPoints,
-    Task,
     TaskReport,
-    is_still,
-    stops,
+    arc_rows,
 )
-from robots.onboard.driving import STAND, Drive, Posture
-from vrs.checks import finite
+from interfaces.messages.fields import Epoch
+from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
+from interfaces.teleop.connection import SiteLine
+from robots.onboard.driving import STAND, Drive, Posture, is_still
+from vrs.checks import finite, normal
 from vrs.mobile import MobileModel
 from vrs.mobile.model import braking
 from vrs.segment import ArcSegment
@@ -178,7 +179,7 @@ class DrivingOperator:
         """What it saw last."""
         self._errands: list[Errand] = []
         self._errand = 0
-        self._later: tuple[tuple[float, tuple[Task, ...]], ...] = ()
+        self._later: tuple[tuple[float, tuple[RobotTask, ...]], ...] = ()
         """What it's to be told when the next drive has begun, and when that was given [s]."""
         self._now = now
         self._prompt = False
@@ -238,7 +239,7 @@ class DrivingOperator:
         """
         self._later = ()
         if self.doing is not Doing.NOTHING:
-            self._send(Halt())
+            self._send(HALT)
             self.halted = ""
         self.halt(STOPPED)
 
@@ -246,11 +247,11 @@ class DrivingOperator:
     def doing(self) -> Doing:
         """What the real robot does by itself, as far as is known; something, while it may have been told to."""
         report = self.report
-        if self.halted == BY_ITSELF and any(not stops(errand.task) for errand in self._errands):
+        if self.halted == BY_ITSELF and any(not errand.task.stops for errand in self._errands):
             return Doing.JOBS
         return Doing.NOTHING if report is None else report.doing
 
-    def order(self, *tasks: Task) -> str:
+    def order(self, *tasks: RobotTask) -> str:
         """Let the real robot do something by itself; the virtual one comes to rest, and follows it then.
 
         Args:
@@ -263,7 +264,7 @@ class DrivingOperator:
             return f"the robot doesn't follow: {self.gone}"
         if self.report is None:
             return NOT_MET
-        if not all(stops(task) for task in tasks):
+        if not all(task.stops for task in tasks):
             if self.halted == STOPPED:
                 # It's told once it has come to rest, and the next drive has begun.
                 self._later = *self._later, (self._now, tasks)
@@ -274,10 +275,10 @@ class DrivingOperator:
         self._send(*tasks)
         return ""
 
-    def _send(self, *tasks: Task) -> None:
+    def _send(self, *tasks: RobotTask) -> None:
         """Send errands, until the robot has them; one that stops everything overrules what it hasn't heard yet."""
         for task in tasks:
-            if isinstance(task, Halt):
+            if task.halt is not None:
                 self._errands.clear()
             self._errand += 1
             self._errands.append(Errand(self._errand, task))
@@ -340,7 +341,7 @@ class DrivingOperator:
                 return ()
             # That a drive is over is said at once.
             packet = ArcPacket((), 0.0)
-        if self.halted in {"", BY_ITSELF} and self.report is not None and self.report.epoch < self.epoch:
+        if self.halted in {"", BY_ITSELF} and self.report is not None and (self.report.epoch or 0) < self.epoch:
             usual = self.round_trips.quantile(0.95) or 0.0
             if now > self.began + EPOCH_TIMEOUT + 2.0 * usual:
                 self.halted = ""
@@ -350,10 +351,21 @@ class DrivingOperator:
             self._over = self._packets
         self._prompt = False
         # What it's to do by itself belongs to a drive, too: that must have begun.
-        begins = self.halted == BY_ITSELF and self.report is not None and self.report.epoch < self.epoch
+        begins = self.halted == BY_ITSELF and self.report is not None and (self.report.epoch or 0) < self.epoch
         start = None if self.halted and not begins else self.start
-        errands = tuple(self._errands[:ERRANDS])
-        return (DriveOrders(self.epoch, self._packets, now, self.began, start, packet, errands),)
+        return (
+            DriveOrders(
+                epoch=Epoch(self.epoch),
+                number=self._packets,
+                sent_at=now,
+                began=self.began,
+                complete_until=packet.complete_until,
+                start=None if start is None else Posture(*map(normal, start)),
+                runs=tuple((first, arc_rows(arcs)) for first, arcs in packet.runs),
+                tail=arc_rows(packet.tail),
+                errands=tuple(self._errands[:ERRANDS]),
+            ),
+        )
 
     @property
     def next_t(self) -> float:
@@ -407,7 +419,7 @@ class DrivingOperator:
         self._errands = [errand for errand in self._errands if errand.number > report.errand]
         if report.halted:
             # What it was told and hasn't begun isn't to begin after a stop.
-            self._errands = [errand for errand in self._errands if stops(errand.task)]
+            self._errands = [errand for errand in self._errands if errand.task.stops]
             if self.halted == BY_ITSELF:
                 self.halted = ""
             self.halt(report.halted)

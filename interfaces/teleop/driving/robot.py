@@ -9,21 +9,13 @@ from typing import Annotated
 
 from typing_extensions import override
 
+from interfaces.messages.drive_sites import Doing, DriveOrders, DriveReport, Errand, SensedPoints, TaskReport
+from interfaces.messages.fields import Epoch
 from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
 from interfaces.teleop.connection import LOST, Host, HostConfig, OrderExecutor, lost
 from interfaces.teleop.driving.autonomy import Autonomy
-from interfaces.teleop.driving.messages import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    SensedPoints,
-    TaskReport,
-    is_still,
-    stops,
-)
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
-from robots.onboard.driving import STAND, Drive, Posture, kept
+from robots.onboard.driving import STAND, Drive, Posture, is_still, kept
 from robots.onboard.following import SoundPosition
 from vrs.checks import validated, within
 from vrs.mobile import DriveLimits
@@ -150,10 +142,10 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
             self._errand = errand.number
             return
         fresh = counts and (not self.halted or self._carries_on)
-        if not fresh and not stops(errand.task):
+        if not fresh and not errand.task.stops:
             return
         self._errand = errand.number
-        if not stops(errand.task):
+        if not errand.task.stops:
             self._site = None
         self.autonomy.receive(errand.task, now=now)
 
@@ -285,7 +277,7 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
         autonomy = self.autonomy
         player = site.controller if site is not None and isinstance(site.controller, TimelineController) else None
         return DriveReport(
-            epoch=self.epoch,
+            epoch=Epoch(self.epoch) if self.epoch else None,
             number=self._reports,
             sent_at=now,
             measured_at=self._driven_at,

@@ -8,25 +8,21 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
-from interfaces.jobs import (
+from interfaces.jobs import JobFile, JobRunner, read_jobs, written_jobs
+from interfaces.messages.jobs import (
     ArmJob,
     Job,
-    JobEntry,
-    JobFile,
     JobList,
     JobProgress,
-    JobRunner,
     JobStage,
     ListCommand,
-    Load,
     MessageJob,
     MoveJob,
     Progress,
     VoiceJob,
     WaitJob,
-    read_jobs,
-    written_jobs,
 )
 from robots.onboard.journey import Goal
 from vrs.errors import FormatError
@@ -35,20 +31,20 @@ NUMBERS = st.floats(-1000, 1000)
 GOALS = st.builds(Goal, NUMBERS, NUMBERS, st.none() | NUMBERS)
 TEXTS = st.text(min_size=1, max_size=30).filter(str.strip)
 JOBS: st.SearchStrategy[Job] = st.one_of(
-    st.builds(MoveJob, GOALS | st.just("here")),
-    st.builds(VoiceJob, TEXTS),
-    st.builds(MessageJob, TEXTS),
-    st.builds(WaitJob, st.none() | st.floats(0, 86400)),
-    st.builds(ArmJob, TEXTS, st.text(max_size=100)),
+    st.builds(MoveJob, st.just(1), GOALS | st.just("here")),
+    st.builds(VoiceJob, st.just(1), TEXTS),
+    st.builds(MessageJob, st.just(1), TEXTS),
+    st.builds(WaitJob, st.just(1), st.none() | st.floats(0, 86400)),
+    st.builds(ArmJob, st.just(1), TEXTS, st.text(max_size=100)),
 )
 
 
 @given(jobs=st.lists(JOBS, max_size=8), goal=GOALS, data=st.data())
 def test_what_is_written_is_read_again_to_the_bit(jobs: list[Job], goal: Goal, data: st.DataObject) -> None:
     numbers = data.draw(st.permutations(range(1, len(jobs) + 1)))
-    entries = tuple(JobEntry(number, job) for number, job in zip(numbers, jobs, strict=True))
+    numbered = tuple(replace(job, number=number) for number, job in zip(numbers, jobs, strict=True))
     stages = data.draw(st.lists(st.sampled_from(JobStage), min_size=len(jobs), max_size=len(jobs)))
-    listed = JobList(entries, {"here": goal})
+    listed = JobList(numbered, {"here": goal})
     progress = Progress(
         JobStage.PAUSED, tuple(JobProgress(n, s, "so") for n, s in zip(numbers, stages, strict=True)), "why"
     )
@@ -57,11 +53,11 @@ def test_what_is_written_is_read_again_to_the_bit(jobs: list[Job], goal: Goal, d
 
 def test_a_list_survives_a_restart(tmp_path: Path) -> None:
     file = JobFile(tmp_path / "deep" / "jobs.json")
-    runner = JobRunner(JobList.of(MoveJob("B"), WaitJob(), places={"B": Goal(1.0, 2.0, 0.5)}))
+    runner = JobRunner(JobList((MoveJob(1, "B"), WaitJob(2)), places={"B": Goal(1.0, 2.0, 0.5)}))
     runner.receive(ListCommand.RUN, now=0.0)
     file.save(runner.jobs, runner.progress)
     again = JobRunner()
-    again.receive(Load(*JobFile(file.path).load()), now=0.0)
+    again.load(*JobFile(file.path).load(), now=0.0)
     assert again.jobs == runner.jobs
     assert again.progress.stage is JobStage.PAUSED
     assert [path.name for path in file.path.parent.iterdir()] == ["jobs.json"]
@@ -87,7 +83,7 @@ def test_what_is_damaged_says_so_and_is_kept(tmp_path: Path, text: str, says: st
     with pytest.raises(FormatError, match=says):
         file.load()
     assert path.read_text() == text
-    jobs = JobList.of(WaitJob(1.0))
+    jobs = JobList((WaitJob(1, 1.0),))
     file.save(jobs, Progress.of(jobs))
     assert (tmp_path / "jobs.json.damaged").read_text() == text
     assert JobFile(path).load() == (jobs, Progress.of(jobs))
@@ -125,7 +121,7 @@ def test_every_damaged_file_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_reason_of_any_length_can_be_read_again() -> None:
-    jobs, why = JobList.of(WaitJob()), "x" * 10_000
+    jobs, why = JobList((WaitJob(1),)), "x" * 10_000
     progress = Progress(JobStage.FAILED, (JobProgress(1, JobStage.FAILED, why),), why)
     _, found = read_jobs(written_jobs(jobs, progress), "x")
     assert found.stage is JobStage.FAILED
@@ -134,7 +130,7 @@ def test_a_reason_of_any_length_can_be_read_again() -> None:
 
 def test_a_list_that_cant_be_written_leaves_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As where the disk is full: what is in the file's place is a whole list at any time."""
-    file, jobs = JobFile(tmp_path / "jobs.json"), JobList.of(WaitJob(1.0))
+    file, jobs = JobFile(tmp_path / "jobs.json"), JobList((WaitJob(1, 1.0),))
     file.save(jobs, Progress.of(jobs))
     with file.path.open("rb") as reading:
         file.save(jobs, Progress.of(jobs))

@@ -6,20 +6,18 @@ import math
 
 import pytest
 
-from interfaces.jobs import (
-    Forecast,
+from interfaces.jobs import dry_run, time_needed
+from interfaces.messages.drive_sites import Doing, RobotTask
+from interfaces.messages.jobs import (
+    ArmJob,
     JobList,
     JobStage,
     ListCommand,
-    Load,
     MessageJob,
     MoveJob,
     VoiceJob,
     WaitJob,
-    dry_run,
 )
-from interfaces.jobs.values import ArmJob
-from interfaces.teleop.driving.messages import Doing
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteConfig, RouteMap
@@ -29,17 +27,19 @@ OPEN = RouteMap((10.0, 8.0), [], RouteConfig(0.4, 0.25))
 
 
 def test_a_move_takes_what_the_limits_say() -> None:
-    forecast = dry_run(JobList.of(MoveJob(Goal(6.0, 2.0))), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits)
+    forecast = dry_run(JobList((MoveJob(1, Goal(6.0, 2.0)),)), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits)
     # 5 m straight ahead can't take less than at 0.5 m/s, with what speeding up and braking need.
     fastest = 5.0 / 0.5 + 0.5 / 0.52
-    assert fastest <= forecast.lasts <= 1.6 * fastest
-    (move,) = forecast.jobs
+    assert fastest <= time_needed(forecast) <= 1.6 * fastest
+    (move,) = forecast
     assert move.route == ((1.0, 2.0), (6.0, 2.0))
 
 
 def test_each_move_begins_where_the_one_before_ended() -> None:
-    jobs = JobList.of(MoveJob(Goal(3.0, 2.0, math.pi)), WaitJob(2.0), WaitJob(), MoveJob(Goal(1.0, 2.0, math.pi)))
-    there, wait, key, back = dry_run(jobs, Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits).jobs
+    jobs = JobList(
+        (MoveJob(1, Goal(3.0, 2.0, math.pi)), WaitJob(2, 2.0), WaitJob(3), MoveJob(4, Goal(1.0, 2.0, math.pi)))
+    )
+    there, wait, key, back = dry_run(jobs, Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits)
     assert there.lasts is not None
     assert (wait.begins, wait.lasts) == (there.lasts, 2.0)
     assert (key.begins, key.lasts, back.begins) == (there.lasts + 2.0, None, there.lasts + 2.0)
@@ -49,20 +49,20 @@ def test_each_move_begins_where_the_one_before_ended() -> None:
 
 
 def test_a_program_takes_what_somebody_says_or_fails() -> None:
-    jobs = JobList.of(ArmJob("pick"), WaitJob(1.0))
+    jobs = JobList((ArmJob(1, "pick"), WaitJob(2, 1.0)))
     here = Posture(1.0, 2.0, 0.0)
-    assert dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda _: 7.5).lasts == 8.5
+    assert time_needed(dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda _: 7.5)) == 8.5
     failing = dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda job: f"no program {job.program}")
-    assert (failing.problem, len(failing.jobs)) == ("no program pick", 1)
-    assert Forecast().lasts == 0.0
+    assert (failing[-1].problem, len(failing)) == ("no program pick", 1)
+    assert time_needed(()) == 0.0
 
 
 def test_the_prediction_is_about_what_happens() -> None:
     rig = Rig()
     rig.begin()
-    jobs = JobList.of(VoiceJob("Good morning"), MoveJob(Goal(7.0, 1.0, 0.0)), MoveJob(Goal(2.0, 2.0)))
-    predicted = dry_run(jobs, Posture(*rig.truth), rig.roads, MODEL.limits).lasts
-    rig.operator.order(Load(jobs), ListCommand.RUN)
+    jobs = JobList((VoiceJob(1, "Good morning"), MoveJob(2, Goal(7.0, 1.0, 0.0)), MoveJob(3, Goal(2.0, 2.0))))
+    predicted = time_needed(dry_run(jobs, Posture(*rig.truth), rig.roads, MODEL.limits))
+    rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     began = rig.now - 1.0
     while rig.operator.doing is not Doing.NOTHING:
@@ -75,6 +75,6 @@ def test_the_prediction_is_about_what_happens() -> None:
 
 def test_a_message_takes_no_time() -> None:
     look, key = dry_run(
-        JobList.of(MessageJob("Look"), WaitJob(2.0)), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits
-    ).jobs
+        JobList((MessageJob(1, "Look"), WaitJob(2, 2.0))), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits
+    )
     assert (look.lasts, key.begins) == (0.0, 0.0)

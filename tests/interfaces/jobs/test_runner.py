@@ -9,30 +9,31 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from msgspec.structs import replace
 
 from interfaces.jobs import (
-    ArmJob,
     Done,
     EndJob,
     Interrupted,
-    Job,
-    JobEntry,
     JobFailed,
-    JobList,
     JobRunner,
-    JobStage,
-    ListCommand,
-    Load,
-    MessageJob,
-    MoveJob,
     MoveTo,
-    OperatorLoss,
     OperatorLost,
-    Progress,
     Request,
     RunnerConfig,
     Show,
     Speak,
+)
+from interfaces.messages.jobs import (
+    ArmJob,
+    Job,
+    JobList,
+    JobStage,
+    ListCommand,
+    MessageJob,
+    MoveJob,
+    OperatorLoss,
+    Progress,
     VoiceJob,
     WaitJob,
 )
@@ -40,10 +41,16 @@ from robots.onboard.journey import Goal
 from vrs.errors import InvalidValueError
 
 A, B = Goal(1.0, 1.0, 0.0), Goal(4.0, 2.0)
-SCENARIO = JobList.of(
-    MoveJob("B"), VoiceJob("Hello!"), MessageJob("Please put the book on my top side!"), WaitJob(), MoveJob("A"),
+SCENARIO = JobList(
+    (
+        MoveJob(1, "B"),
+        VoiceJob(2, "Hello!"),
+        MessageJob(3, "Please put the book on my top side!"),
+        WaitJob(4),
+        MoveJob(5, "A"),
+    ),
     places={"A": A, "B": B},
-)  # fmt: skip
+)
 
 
 def stages(runner: JobRunner) -> list[str]:
@@ -80,12 +87,14 @@ def test_the_papers_scenario() -> None:
     assert "done: run it" in runner.receive(ListCommand.RESUME, now=5011.0)
 
 
-@pytest.mark.parametrize("job", [MoveJob(A), VoiceJob("Hello!"), WaitJob(5.0), WaitJob(), ArmJob("pick")])
+@pytest.mark.parametrize(
+    "job", [MoveJob(2, A), VoiceJob(2, "Hello!"), WaitJob(2, 5.0), WaitJob(2), ArmJob(2, "pick")]
+)
 @pytest.mark.parametrize(
     "how", [ListCommand.ABORT, ListCommand.PAUSE, Interrupted("it touches a chair"), OperatorLost("link loss")]
 )
 def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how: Any) -> None:
-    jobs = JobList.of(MessageJob("Hm"), job, MoveJob(B))
+    jobs = JobList((MessageJob(1, "Hm"), job, MoveJob(3, B)))
     runner = JobRunner(jobs)
     runner.receive(ListCommand.RUN, now=0.0)
     begun = [request for request in runner.advance(now=0.0) if not isinstance(request, Show)]
@@ -109,7 +118,7 @@ def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how:
 
 
 def test_a_wait_that_was_paused_goes_on_with_what_was_left() -> None:
-    runner = JobRunner(JobList.of(WaitJob(10.0), VoiceJob("Now")))
+    runner = JobRunner(JobList((WaitJob(1, 10.0), VoiceJob(2, "Now"))))
     runner.receive(ListCommand.RUN, now=0.0)
     assert runner.next_deadline() == 10.0
     runner.receive(ListCommand.PAUSE, now=4.0)
@@ -121,7 +130,7 @@ def test_a_wait_that_was_paused_goes_on_with_what_was_left() -> None:
 
 
 def test_waits_end_when_they_were_to_however_late_somebody_looks() -> None:
-    runner = JobRunner(JobList.of(WaitJob(1.0), WaitJob(2.0), WaitJob(4.0)))
+    runner = JobRunner(JobList((WaitJob(1, 1.0), WaitJob(2, 2.0), WaitJob(3, 4.0))))
     runner.receive(ListCommand.RUN, now=0.0)
     runner.advance(now=3.5)
     assert stages(runner) == ["done", "done", "running"]
@@ -129,7 +138,7 @@ def test_waits_end_when_they_were_to_however_late_somebody_looks() -> None:
 
 
 def test_what_takes_too_long_has_failed_and_is_ended() -> None:
-    runner = JobRunner(JobList.of(VoiceJob("Hello!")), RunnerConfig(longest_voice=30.0))
+    runner = JobRunner(JobList((VoiceJob(1, "Hello!"),)), RunnerConfig(longest_voice=30.0))
     runner.receive(ListCommand.RUN, now=0.0)
     said = asked(runner, Speak, 0.0)
     assert runner.advance(now=30.0) == (EndJob(said.attempt),)
@@ -168,17 +177,17 @@ def test_a_list_is_edited_where_it_stands_still() -> None:
     runner = JobRunner(SCENARIO)
     runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveTo, 0.0)
-    assert "pause or abort" in runner.receive(Load(SCENARIO.removed(3)), now=0.5)
+    assert "pause or abort" in runner.load(SCENARIO.removed(3), now=0.5)
     runner.receive(Done(first.attempt), now=1.0)
     runner.receive(ListCommand.PAUSE, now=1.5)
-    edited = SCENARIO.moved(5, 0).changed(2, VoiceJob("Good day!"))
-    assert runner.receive(Load(edited), now=2.0) == ""
+    edited = SCENARIO.moved(5, 0).changed(2, VoiceJob(SCENARIO.next_number, "Good day!"))
+    assert runner.load(edited, now=2.0) == ""
     # The job that was paused is another one now: the list has nothing that's half done.
     assert runner.progress.stage is JobStage.PLANNED
     runner.receive(ListCommand.RESUME, now=3.0)
     runner.advance(now=3.0)
     # What is done stays done, wherever it was put; what was put before it comes first.
-    assert [(entry.number, job.stage) for entry, job in zip(edited.entries, runner.progress.jobs, strict=True)] == [
+    assert [(job.number, known.stage) for job, known in zip(edited.jobs, runner.progress.jobs, strict=True)] == [
         (5, JobStage.RUNNING), (1, JobStage.DONE), (6, JobStage.PLANNED), (3, JobStage.PLANNED),
         (4, JobStage.PLANNED)
     ]  # fmt: skip
@@ -188,7 +197,7 @@ def test_a_list_that_was_being_done_when_it_was_saved_is_paused() -> None:
     runner = JobRunner(SCENARIO)
     runner.receive(ListCommand.RUN, now=0.0)
     other = JobRunner()
-    assert other.receive(Load(runner.jobs, runner.progress), now=0.0) == ""
+    assert other.load(runner.jobs, runner.progress, now=0.0) == ""
     assert other.progress.stage is JobStage.PAUSED
     assert "anew" in other.progress.reason
     assert other.advance(now=1.0) == ()
@@ -199,35 +208,36 @@ def test_a_list_that_was_being_done_when_it_was_saved_is_paused() -> None:
 @pytest.mark.parametrize(
     ("command", "says"),
     [(ListCommand.RUN, "no job"), (ListCommand.PAUSE, "isn't being done"), (ListCommand.RESUME, "no job"),
-     (ListCommand.ABORT, "isn't being done"), (ListCommand.KEY, "waits for the key")],
+     (ListCommand.ABORT, "isn't being done"), (ListCommand.KEY, "waits for the key"),
+     (ListCommand.DRY_RUN, "virtual robot")],
 )  # fmt: skip
 def test_what_cant_be_done_now_says_why(command: ListCommand, says: str) -> None:
     assert says in JobRunner().receive(command, now=0.0)
 
 
 def test_edits_make_lists_that_are_whole() -> None:
-    jobs = SCENARIO.added(WaitJob(1.0), 0)
-    assert [entry.number for entry in jobs.entries] == [6, 1, 2, 3, 4, 5]
-    assert jobs.moved(6, 5).entries[5].job == WaitJob(1.0)
+    jobs = SCENARIO.added(WaitJob(SCENARIO.next_number, 1.0), 0)
+    assert [job.number for job in jobs.jobs] == [6, 1, 2, 3, 4, 5]
+    assert jobs.moved(6, 5).jobs[5] == WaitJob(6, 1.0)
     assert jobs.removed(6) == SCENARIO
     with pytest.raises(InvalidValueError, match="place of this list"):
-        jobs.added(MoveJob("C"))
+        jobs.added(MoveJob(7, "C"))
     with pytest.raises(InvalidValueError, match="of this list"):
         jobs.removed(77)
     with pytest.raises(InvalidValueError, match="at most 64"):
-        JobList.of(*[WaitJob(1.0)] * 65)
+        JobList(tuple(WaitJob(k, 1.0) for k in range(1, 66)))
 
 
 JOBS = st.sampled_from(
     [
-        MoveJob(A),
-        MoveJob("A"),
-        VoiceJob("Hi"),
-        MessageJob("Look"),
-        WaitJob(),
-        WaitJob(0.0),
-        WaitJob(3.0),
-        ArmJob("p"),
+        MoveJob(1, A),
+        MoveJob(1, "A"),
+        VoiceJob(1, "Hi"),
+        MessageJob(1, "Look"),
+        WaitJob(1),
+        WaitJob(1, 0.0),
+        WaitJob(1, 3.0),
+        ArmJob(1, "p"),
     ]
 )
 
@@ -237,7 +247,8 @@ class Doing(RuleBasedStateMachine):
 
     @initialize(jobs=st.lists(JOBS, max_size=5), loss=st.sampled_from(OperatorLoss))
     def begin(self, jobs: list[Job], loss: OperatorLoss) -> None:
-        self.runner = JobRunner(JobList.of(*jobs, places={"A": A}), RunnerConfig(loss=loss, longest_move=20.0))
+        numbered = tuple(replace(job, number=k) for k, job in enumerate(jobs, 1))
+        self.runner = JobRunner(JobList(numbered, {"A": A}), RunnerConfig(loss=loss, longest_move=20.0))
         self.now = 0.0
         self.open: set[int] = set()
         self.over: set[int] = set()
@@ -293,13 +304,14 @@ class Doing(RuleBasedStateMachine):
     @precondition(lambda self: not self.runner.running)
     @rule(job=JOBS)
     def add(self, job: Job) -> None:
-        assert not self.runner.receive(Load(self.runner.jobs.added(job)), now=self.now)
+        jobs = self.runner.jobs
+        assert not self.runner.load(jobs.added(replace(job, number=jobs.next_number)), now=self.now)
 
     @precondition(lambda self: not self.runner.running)
     @rule()
     def restart(self) -> None:
         progress = self.runner.progress
-        assert not self.runner.receive(Load(self.runner.jobs, progress), now=self.now)
+        assert not self.runner.load(self.runner.jobs, progress, now=self.now)
         assert self.runner.progress == progress
 
     @invariant()
@@ -307,7 +319,7 @@ class Doing(RuleBasedStateMachine):
         if not hasattr(self, "runner"):
             return
         progress: Progress = self.runner.progress
-        assert [job.number for job in progress.jobs] == [entry.number for entry in self.runner.jobs.entries]
+        assert [job.number for job in progress.jobs] == [job.number for job in self.runner.jobs.jobs]
         running = [job for job in progress.jobs if job.stage is JobStage.RUNNING]
         assert len(running) == (1 if self.runner.running else 0)
         assert len(self.open) <= len(running)
@@ -320,25 +332,30 @@ TestDoing.settings = settings(max_examples=60, stateful_step_count=25, deadline=
 
 
 def test_only_a_wait_has_time_left_when_it_is_paused() -> None:
-    for job, left in ((MoveJob("B"), None), (VoiceJob("Hello!"), None), (WaitJob(), None), (WaitJob(9.0), 7.0)):
-        runner = JobRunner(JobList.of(job, places={"B": B}))
+    for job, left in (
+        (MoveJob(1, "B"), None),
+        (VoiceJob(1, "Hello!"), None),
+        (WaitJob(1), None),
+        (WaitJob(1, 9.0), 7.0),
+    ):
+        runner = JobRunner(JobList((job,), places={"B": B}))
         runner.receive(ListCommand.RUN, now=0.0)
         runner.receive(ListCommand.PAUSE, now=2.0)
         assert runner.progress.jobs[0].left == left
 
 
 def test_a_list_that_was_done_isnt_when_a_job_is_added() -> None:
-    jobs = JobList.of(MessageJob("Look"))
+    jobs = JobList((MessageJob(1, "Look"),))
     runner = JobRunner(jobs)
     runner.receive(ListCommand.RUN, now=0.0)
     assert runner.progress.stage is JobStage.DONE
-    longer = JobList((*jobs.entries, JobEntry(2, MessageJob("Look again"))))
-    assert runner.receive(Load(longer), now=1.0) == ""
+    longer = JobList((*jobs.jobs, MessageJob(2, "Look again")))
+    assert runner.load(longer, now=1.0) == ""
     assert (runner.progress.stage, stages(runner)) == (JobStage.PLANNED, ["done", "planned"])
 
 
 def test_a_list_that_was_aborted_leaves_an_empty_screen() -> None:
-    runner = JobRunner(JobList.of(MessageJob("Look"), WaitJob()))
+    runner = JobRunner(JobList((MessageJob(1, "Look"), WaitJob(2))))
     runner.receive(ListCommand.RUN, now=0.0)
     runner.receive(ListCommand.ABORT, now=1.0)
     assert runner.advance(now=1.0)[-1] == Show("")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.jobs import JobStage
 from interfaces.lab import Study
 from interfaces.lab.claims import Claim, Figure
 from interfaces.lab.kim2002 import PAPER, scenario
@@ -25,6 +24,7 @@ from interfaces.lab.kim2002.scenario import (
     play,
 )
 from interfaces.lab.papers import papers
+from interfaces.messages.jobs import JobStage
 from robots.bullet.rooms import Person
 from robots.ipr.body import Cargo, MobileBody
 from robots.ipr.chassis import IPR

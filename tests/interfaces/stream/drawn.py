@@ -9,14 +9,25 @@ import numpy as np
 from hypothesis import strategies as st
 
 from interfaces import messages as m
-from interfaces.jobs import (
-    Forecast,
+from interfaces.messages import control as c
+from interfaces.messages import mobile as b
+from interfaces.messages.control import LinkFigures, Ping, Pong
+from interfaces.messages.drive_sites import ArchitectureReport as Followed
+from interfaces.messages.drive_sites import (
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    RobotTask,
+    SensedPoints,
+    TaskReport,
+)
+from interfaces.messages.jobs import (
     JobForecast,
     JobList,
     JobProgress,
     JobStage,
     ListCommand,
-    Load,
     MessageJob,
     MoveJob,
     OperatorLoss,
@@ -24,22 +35,7 @@ from interfaces.jobs import (
     VoiceJob,
     WaitJob,
 )
-from interfaces.messages import control as c
-from interfaces.messages.control import LinkFigures, Ping, Pong
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
-from interfaces.stream import mobile as b
-from interfaces.teleop.architectures import ArchitectureReport as Followed
-from interfaces.teleop.architectures import ArcPacket, CellChanges
-from interfaces.teleop.driving.messages import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    Go,
-    Halt,
-    SensedPoints,
-    TaskReport,
-)
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.lease import LeaseEnd, LeaseState
@@ -48,7 +44,7 @@ from vrs import commands as v
 from vrs.ledger import Receipt, Status
 from vrs.mobile import DriveLimits
 from vrs.model import Limits
-from vrs.segment import ArcSegment, PolynomialSegment
+from vrs.segment import PolynomialSegment
 
 floats = partial(st.floats, allow_subnormal=False)
 numbers = st.integers(1, 2**63 - 1)
@@ -168,19 +164,13 @@ postures = st.builds(Posture, times, times, times)
 drives = st.builds(Drive, floats(-1e6, 1e6), floats(-1e6, 1e6))
 positive = floats(1e-3, 1e6)
 arcs = st.lists(
-    st.builds(
-        ArcSegment,
-        times,
-        floats(1e-6, 1e3),
-        st.tuples(times, times, times),
-        floats(-1e6, 1e6),
-        floats(-9, 9),
-    ),
-    max_size=3,
+    st.tuples(times, times, times, times, floats(-1e6, 1e6), floats(-9, 9), floats(1e-6, 1e3)), max_size=3
 ).map(tuple)
-packets = st.builds(ArcPacket, st.lists(st.tuples(counts, arcs), max_size=2).map(tuple), times, arcs)
+arc_runs = st.lists(st.tuples(counts, arcs), max_size=2).map(tuple)
 cells = st.lists(st.builds(CellChange, st.tuples(counts, counts), times, st.booleans()), max_size=2).map(tuple)
-followed = st.builds(Followed, numbers, counts, postures, counts, st.none() | st.builds(CellChanges, times, cells))
+followed = st.builds(Followed, numbers, counts, postures, counts) | st.builds(
+    Followed, numbers, counts, postures, counts, times, cells
+)
 
 
 metres = floats(-1e6, 1e6)
@@ -190,12 +180,15 @@ doubts = st.tuples(metres, metres, metres)
 near = floats(-1000, 1000)
 goals = st.builds(Goal, near, near, st.none() | near)
 texts = words.filter(str.strip)
-jobs = st.one_of(
-    st.builds(MoveJob, goals), st.builds(VoiceJob, texts), st.builds(MessageJob, texts),
-    st.builds(WaitJob, st.none() | floats(0, 1e4)),
-)  # fmt: skip
-job_lists = st.builds(lambda some, goal: JobList.of(*some, places={"A": goal}), st.lists(jobs, max_size=4), goals)
 job_numbers = st.integers(1, 2**31 - 1)
+jobs = st.one_of(
+    st.builds(MoveJob, job_numbers, goals), st.builds(VoiceJob, job_numbers, texts),
+    st.builds(MessageJob, job_numbers, texts), st.builds(WaitJob, job_numbers, st.none() | floats(0, 1e4)),
+)  # fmt: skip
+job_lists = st.builds(
+    lambda some, goal: JobList(some, {"A": goal}),
+    st.lists(jobs, max_size=4, unique_by=lambda job: job.number), goals,
+)  # fmt: skip
 stages = st.sampled_from(JobStage)
 progress = st.builds(
     Progress, stages,
@@ -204,20 +197,14 @@ progress = st.builds(
     ).map(tuple),
     words,
 )  # fmt: skip
-forecasts = st.builds(
-    Forecast,
-    st.lists(
-        st.builds(JobForecast, job_numbers, positive, st.none() | positive, rows, words), max_size=3
-    ).map(tuple),
-)  # fmt: skip
-wanted = st.one_of(
-    st.builds(Go, goals),
-    st.builds(Load, job_lists, st.none() | progress),
-    st.sampled_from([*ListCommand, *b.Trial]),
-)
+forecasts = st.lists(
+    st.builds(JobForecast, job_numbers, positive, st.none() | positive, rows, words), max_size=3
+).map(tuple)
+asked = st.builds(RobotTask, go=goals) | st.builds(RobotTask, jobs=job_lists, progress=st.none() | progress)
+wanted = asked | st.builds(RobotTask, do=st.sampled_from(ListCommand))
 tasks = st.one_of(
-    st.builds(Go, goals), st.builds(Halt, words), st.builds(Load, job_lists, st.none() | progress),
-    st.sampled_from(ListCommand),
+    asked, st.builds(RobotTask, halt=words),
+    st.builds(RobotTask, do=st.sampled_from([word for word in ListCommand if word is not ListCommand.DRY_RUN])),
 )  # fmt: skip
 task_reports = st.builds(
     TaskReport, st.sampled_from(JourneyState), words, st.none() | goals, rows, words, progress,
@@ -274,9 +261,10 @@ messages = {
         stamps, st.booleans(), st.none() | positive, st.none() | positive, st.integers(0, 2**64 - 1), st.booleans(),
         words, counts, st.none() | finite, st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
     ),
-    b.TaskOrder: st.builds(b.TaskOrder, numbers, st.integers(0, 2**64 - 1), wanted),
+    b.TaskOrder: st.builds(b.TaskOrder, numbers, wanted, st.integers(0, 2**64 - 1)),
     b.Tasks: st.builds(
-        b.Tasks, st.sampled_from(Doing), st.sampled_from(JourneyState), words, st.none() | goals, rows, positive,
+        b.Tasks, st.sampled_from(Doing), st.sampled_from(JourneyState), words, st.none() | goals, rows,
+        floats(0, 1e6),
         job_lists, progress, st.none() | forecasts, st.none() | st.sampled_from(OperatorLoss), words, words, words,
         st.none() | numbers,
     ),
@@ -285,13 +273,13 @@ messages = {
         b.Plan, points, st.lists(rows, max_size=3).map(tuple), rows, st.tuples(positive, positive, positive)
     ),
     DriveOrders: st.builds(
-        DriveOrders, epochs, numbers, times, times, st.none() | postures, packets,
+        DriveOrders, epochs, numbers, times, times, times, st.none() | postures, arc_runs, arcs,
         st.lists(st.builds(Errand, numbers, tasks), max_size=4).map(tuple),
     ),
     DriveReport: st.builds(
         DriveReport, st.integers(0, 2**64 - 1), numbers, times, times, postures, drives, echoes, words, words,
         st.none() | followed, stamps, stamps, st.booleans(), st.none() | positive, stamps, counts,
-        st.sampled_from(Doing), positive, st.none() | task_reports,
+        st.sampled_from(Doing), floats(0, 1e6), st.none() | task_reports,
         st.none() | st.builds(SensedPoints, times, rows, st.none() | doubts),
     ),
     c.Survey: st.builds(c.Survey, numbers),

@@ -14,41 +14,40 @@ import numpy as np
 
 from interfaces import messages as m
 from interfaces.engine_server.site import Site
-from interfaces.jobs import (
+from interfaces.jobs import digest
+from interfaces.link import ClockSync, RoundTrip
+from interfaces.messages import control as c
+from interfaces.messages import mobile as b
+from interfaces.messages.control import LinkFigures, Ping, Pong
+from interfaces.messages.drive_sites import (
+    HALT,
+    Doing,
+    DriveOrders,
+    DriveReport,
+    Errand,
+    RobotTask,
+    SensedPoints,
+    TaskReport,
+    arc_rows,
+)
+from interfaces.messages.drive_sites import ArchitectureReport as Followed
+from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import (
     ArmJob,
-    Forecast,
     JobForecast,
     JobList,
     JobProgress,
     JobStage,
     ListCommand,
-    Load,
     MessageJob,
     MoveJob,
     OperatorLoss,
     Progress,
     VoiceJob,
     WaitJob,
-    digest,
 )
-from interfaces.link import ClockSync, RoundTrip
-from interfaces.messages import control as c
-from interfaces.messages.control import LinkFigures, Ping, Pong
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.stream import Encoding, encode
-from interfaces.stream import mobile as b
-from interfaces.teleop.architectures import ArchitectureReport as Followed
-from interfaces.teleop.architectures import ArcPacket, CellChanges
-from interfaces.teleop.driving.messages import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    Go,
-    Halt,
-    SensedPoints,
-    TaskReport,
-)
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
@@ -66,11 +65,19 @@ Q2 = frozen_array([1 / 3, -0.5, 2.0])
 POSE = np.array([[0.0, -1.0, 0.0, 0.4], [1.0, 0.0, 0.0, 0.1], [0.0, 0.0, 1.0, -0.2], [0.0, 0.0, 0.0, 1.0]])
 
 
-JOBS = JobList.of(
-    MoveJob("B"), MoveJob(Goal(1.0, 2.0)), VoiceJob("Hello!"), MessageJob("Look"), WaitJob(2.5), WaitJob(),
-    ArmJob("pick", ".PROGRAM pick"),
+LEASE = Epoch(7_730_941_132_801)
+JOBS = JobList(
+    (
+        MoveJob(1, "B"),
+        MoveJob(2, Goal(1.0, 2.0)),
+        VoiceJob(3, "Hello!"),
+        MessageJob(4, "Look"),
+        WaitJob(5, 2.5),
+        WaitJob(6),
+        ArmJob(7, "pick", ".PROGRAM pick"),
+    ),
     places={"B": Goal(4.0, 1.5, 0.25)},
-)  # fmt: skip
+)
 PROGRESS = Progress(
     JobStage.PAUSED,
     (JobProgress(1, JobStage.DONE), JobProgress(5, JobStage.PAUSED, "somebody stopped it", 1.5)),
@@ -157,36 +164,35 @@ def values() -> dict[str, Any]:
             halted="the robot hasn't been met yet",
         ),
         "drive orders": DriveOrders(
-            3, 5, 2.75, 2.5, Posture(1.5, 3.0, 0.0),
-            ArcPacket(
-                ((2, (ArcSegment(0.2, 0.1, (1.5, 3.0, 0.0), 0.05, -0.01),)),), 0.3,
-                (ArcSegment(0.3, 0.1, (1.505, 3.0, -0.001), 0.02, -0.004),),
-            ),
+            Epoch(3), 5, 2.75, 2.5, 0.3, Posture(1.5, 3.0, 0.0),
+            ((2, arc_rows([ArcSegment(0.2, 0.1, (1.5, 3.0, 0.0), 0.05, -0.01)])),),
+            arc_rows([ArcSegment(0.3, 0.1, (1.505, 3.0, -0.001), 0.02, -0.004)]),
         ),
-        "drive orders without a drive": DriveOrders(1, 1, 0.5, 0.0, None, ArcPacket((), 0.0)),
+        "drive orders without a drive": DriveOrders(Epoch(1), 1, 0.5, 0.0, 0.0),
         "drive orders with errands": DriveOrders(
-            3, 6, 2.85, 2.5, None, ArcPacket((), 0.0),
+            Epoch(3), 6, 2.85, 2.5, 0.0,
             errands=(
-                Errand(1, Go(Goal(4.0, 1.5, 0.25))), Errand(2, Halt()), Errand(3, Load(JOBS, PROGRESS)),
-                Errand(4, ListCommand.RUN),
+                Errand(1, RobotTask(go=Goal(4.0, 1.5, 0.25))), Errand(2, HALT),
+                Errand(3, RobotTask(jobs=JOBS, progress=PROGRESS)),
+                Errand(4, RobotTask(do=ListCommand.RUN)),
             ),
         ),
         "drive report of a robot that drives by itself": DriveReport(
-            3, 15, 3.1, 3.09, Posture(1.5, 3.0, 0.0), Drive(0.3, 0.0), errand=4, doing=Doing.JOBS, left=2.5,
+            Epoch(3), 15, 3.1, 3.09, Posture(1.5, 3.0, 0.0), Drive(0.3, 0.0), errand=4, doing=Doing.JOBS, left=2.5,
             tasks=TaskReport(
                 JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), digest(JOBS), PROGRESS,
                 OperatorLoss.CARRY_ON, "Look", "Hello!",
             ),
             sight=SensedPoints(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
         ),
-        "task: a goal": b.TaskOrder(7, 7_730_941_132_801, Go(Goal(4.0, 1.5))),
-        "task: a list": b.TaskOrder(8, 7_730_941_132_801, Load(JOBS)),
-        "task: run it": b.TaskOrder(9, 7_730_941_132_801, ListCommand.RUN),
-        "task: try it": b.TaskOrder(10, 7_730_941_132_801, b.Trial.DRY_RUN),
+        "task: a goal": b.TaskOrder(7, RobotTask(go=Goal(4.0, 1.5)), LEASE),
+        "task: a list": b.TaskOrder(8, RobotTask(jobs=JOBS), LEASE),
+        "task: run it": b.TaskOrder(9, RobotTask(do=ListCommand.RUN), LEASE),
+        "task: try it": b.TaskOrder(10, RobotTask(do=ListCommand.DRY_RUN), LEASE),
         "tasks": b.Tasks(
             Doing.JOBS, JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), 2.5, JOBS,
             PROGRESS,
-            Forecast((JobForecast(1, 0.0, 8.25, ((1.5, 3.0), (4.0, 1.5))), JobForecast(2, 8.25, None))),
+            (JobForecast(1, 0.0, 8.25, ((1.5, 3.0), (4.0, 1.5))), JobForecast(2, 8.25, None)),
             OperatorLoss.STOP, "Look", "", answers=9,
         ),
         "tasks before the robot is met": b.Tasks(problem="jobs.json: is no list of jobs"),
@@ -195,15 +201,16 @@ def values() -> dict[str, Any]:
             (6.0, 4.0), (((0.0, 0.0), (6.0, 0.0), (6.0, 0.1), (0.0, 0.1)),), ((3.0, 2.0),), (0.2, 0.32, 0.45),
         ),
         "drive report": DriveReport(
-            3, 12, 2.95, 2.94, Posture(1.5, 3.0, 0.0), Drive(0.04, -0.01), (5, 2.75, 2.9), "", "",
+            Epoch(3), 12, 2.95, 2.94, Posture(1.5, 3.0, 0.0), Drive(0.04, -0.01), (5, 2.75, 2.9), "", "",
             Followed(4, 2, Posture(1.5, 3.0, 0.0), 3), 0.1, -0.2, False, 0.015, 12.25,
         ),
         "drive report of a robot that sees something new": DriveReport(
-            3, 13, 3.0, 2.99, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0),
-            report=Followed(5, 3, Posture(1.5, 3.0, 0.0), 3, CellChanges(0.45, (CellChange((7, 9), 0.4, True),))),
+            Epoch(3), 13, 3.0, 2.99, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0),
+            report=Followed(5, 3, Posture(1.5, 3.0, 0.0), 3, 0.45, (CellChange((7, 9), 0.4, True),)),
         ),
         "drive report of a halted robot": DriveReport(
-            3, 14, 3.05, 3.04, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0), halted="link loss", refused="too old",
+            Epoch(3), 14, 3.05, 3.04, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0), halted="link loss",
+            refused="too old",
         ),
         "ping": Ping(1, 123.456),
         "pong": Pong(1, 123.456, 2.5, 2.5001),

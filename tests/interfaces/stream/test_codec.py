@@ -18,12 +18,15 @@ from hypothesis import strategies as st
 from interfaces import messages as m
 from interfaces.messages import control as c
 from interfaces.messages.control import ProblemCode, ProtocolError
-from interfaces.messages.fields import MOST_NAMES
+from interfaces.messages.drive_sites import DriveOrders, DriveReport, Errand, RobotTask
+from interfaces.messages.fields import LONGEST_TEXT, MOST_NAMES, Epoch
+from interfaces.messages.jobs import JobForecast
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.messages.sites import Orders, Report
 from interfaces.stream import LARGEST, Encoding, SharedEncoder, decode, encode
-from interfaces.stream.codec import TYPES, WIRES
-from interfaces.stream.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.teleop.driving.messages import DriveOrders, DriveReport
+from interfaces.stream.codec import KINDS, TYPES
+from robots.onboard.driving import Drive, Posture
+from robots.onboard.journey import Goal
 from tests.interfaces.stream.drawn import frozen, messages
 from tests.interfaces.stream.same import same
 from vrs import JointTarget, MotionCommand, PolynomialSegment
@@ -56,12 +59,12 @@ def code(data: bytes, encoding: Encoding, allowed: Any) -> ProblemCode:
 def test_every_message_has_a_wire_form_and_is_drawn() -> None:
     unions = (m.Request, m.Reply, c.Question, c.Notice)
     kinds = {kind for union in unions for kind in union.__args__} | MOBILE | {Orders, Report}
-    assert set(WIRES) == set(messages) == kinds
+    assert set(KINDS) == set(messages) == kinds
     assert set(TYPES.values()) == kinds
 
 
 @pytest.mark.parametrize("encoding", Encoding)
-@pytest.mark.parametrize("kind", WIRES, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 @QUICK
 @given(data=st.data())
 def test_messages_come_back_to_the_bit(kind: type, encoding: Encoding, data: st.DataObject) -> None:
@@ -92,6 +95,31 @@ def test_a_receipt_names_no_more_than_may_cross() -> None:
 def test_what_newer_peers_add_is_passed_over(encoding: Encoding) -> None:
     frame = write(encoding, {"new": [[{"a": 1}]], "type": "ask", "number": 3, "t": 1, "newer": None})
     assert decode(frame, encoding, allowed=m.Ask) == m.Ask(3, 1.0)
+
+
+@pytest.mark.parametrize("encoding", Encoding)
+def test_texts_too_long_within_lists_are_cut_and_what_utf_8_cant_say_is_a_question_mark(encoding: Encoding) -> None:
+    halt = RobotTask(halt="x" * (LONGEST_TEXT + 1))
+    orders = DriveOrders(
+        Epoch(1), 1, 0.0, 0.0, 0.0, errands=(Errand(1, RobotTask(go=Goal(1.0, 2.0))), Errand(2, halt))
+    )
+    back = decode(encode(orders, encoding), encoding, allowed=DriveOrders)
+    assert back.errands == (orders.errands[0], Errand(2, RobotTask(halt="x" * LONGEST_TEXT)))
+    tasks = Tasks(forecast=(JobForecast(1, 0.0, 1.0), JobForecast(2, 1.0, problem="no \udc80")))
+    back = decode(encode(tasks, encoding), encoding, allowed=Tasks)
+    assert [job.problem for job in back.forecast] == ["", "no ?"]
+
+
+@pytest.mark.parametrize("kind", [Tasks, DriveReport])
+@pytest.mark.parametrize("encoding", Encoding)
+def test_no_way_left_isnt_written(kind: type, encoding: Encoding) -> None:
+    given = {} if kind is Tasks else {
+        "epoch": None, "number": 1, "sent_at": 0.0, "measured_at": 0.0, "posture": Posture(0.0, 0.0, 0.0),
+        "drive": Drive(0.0, 0.0),
+    }  # fmt: skip
+    for left in (float("0"), float("-0")):
+        assert b"left" not in encode(kind(**given, left=left), encoding)
+    assert decode(encode(kind(**given, left=1.5), encoding), encoding, allowed=kind).left == 1.5
 
 
 @pytest.mark.parametrize("encoding", Encoding)

@@ -7,17 +7,16 @@ from typing import Any
 
 import pytest
 
-from interfaces.jobs import Load
 from interfaces.messages import Order, Outcome
 from interfaces.messages.control import Problem
+from interfaces.messages.drive_sites import RobotTask
+from interfaces.messages.mobile import Postures, Seen, Tasks
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
 from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig
-from interfaces.stream.mobile import Postures, Seen, Tasks, Wanted
 from interfaces.stream.session import HubSession
-from interfaces.teleop.driving.messages import Go
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease
@@ -128,11 +127,11 @@ class Workers:
     """Takes what is wanted, but no list."""
 
     def __init__(self) -> None:
-        self.wanted: list[Wanted] = []
+        self.wanted: list[RobotTask] = []
 
-    def order(self, wanted: Wanted, *, now: float) -> str:
-        self.wanted.append(wanted)
-        return "no list is wanted here" if isinstance(wanted, Load) else ""
+    def order(self, task: RobotTask, *, now: float) -> str:
+        self.wanted.append(task)
+        return "no list is wanted here" if task.jobs is not None else ""
 
     def tasks(self, answers: int | None = None) -> Tasks:
         return Tasks(answers=answers)
@@ -154,7 +153,7 @@ def test_only_who_has_control_lets_the_robot_do_something_and_all_are_told() -> 
     assert told["problem"]["text"] == "a viewer commands nothing"
     assert not workers.wanted
     assert said(ada, order, now=5.4)[0]["answers"] == 1
-    assert workers.wanted == [Go(Goal(1.0, 2.0))]
+    assert workers.wanted == [RobotTask(go=Goal(1.0, 2.0))]
     refused = said(ada, order | {"number": 3, "task": {"jobs": {}}}, now=5.5)[0]
     assert (refused["text"], refused["number"]) == ("no list is wanted here", 3)
     for wrong in ({}, {"go": {"x": 1, "y": 2}, "do": "run"}, {"do": "dance"}, {"halt": "so"}):

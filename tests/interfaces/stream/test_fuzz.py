@@ -12,7 +12,7 @@ import pytest
 
 from interfaces.messages import fields, segments
 from interfaces.stream import Encoding, codec
-from interfaces.stream.codec import WIRES
+from interfaces.stream.codec import KINDS
 from tests.interfaces.stream.fuzzer import Fuzzer
 from tests.interfaces.stream.make_vectors import PATH
 
@@ -20,7 +20,7 @@ RUNS = int(os.environ.get("VRS_FUZZ_RUNS", "4000"))
 """Frames in each encoding."""
 MESSAGES = json.loads(PATH.read_text(encoding="utf-8"))["messages"]
 EVERYTHING: Any = None
-for kind in WIRES:
+for kind in KINDS:
     EVERYTHING = kind if EVERYTHING is None else EVERYTHING | kind
 
 

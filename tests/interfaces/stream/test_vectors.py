@@ -13,7 +13,7 @@ import umsgpack
 from interfaces.clients.ports import RemotePort
 from interfaces.clients.viewer_sources import Mirror
 from interfaces.stream import Encoding, decode, encode
-from interfaces.stream.codec import TYPES, WIRES
+from interfaces.stream.codec import KINDS, TYPES
 from tests.interfaces.stream import make_vectors
 from tests.interfaces.stream.same import same
 from vrs import PolynomialSegment
@@ -22,14 +22,14 @@ from vrs.commands import Command
 VECTORS: dict[str, Any] = json.loads(make_vectors.PATH.read_text(encoding="utf-8"))
 VALUES = make_vectors.values()
 EVERYTHING: Any = None
-for kind in WIRES:
+for kind in KINDS:
     EVERYTHING = kind if EVERYTHING is None else EVERYTHING | kind
 
 
 def test_the_file_is_what_the_script_makes() -> None:
     assert make_vectors.messages() == VECTORS["messages"]
     assert make_vectors.evaluations() == VECTORS["evaluations"]
-    assert {type(value) for value in VALUES.values()} == set(WIRES)
+    assert {type(value) for value in VALUES.values()} == set(KINDS)
     ordered = {type(command) for command in make_vectors.ordered().values()}
     assert ordered == {*Command.__args__, type(None)}
 

@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from interfaces.jobs import ArmJob, JobList, JobStage, ListCommand, Load, WaitJob
-from interfaces.teleop.driving.messages import Doing
+from interfaces.messages.drive_sites import Doing, RobotTask
+from interfaces.messages.jobs import ArmJob, JobList, JobStage, ListCommand, WaitJob
 from interfaces.val2.val_arm import ValArm, in_a_thread, lasts
 from robots import puma560
 from tests.interfaces.teleop.driving.rig import Rig
@@ -27,7 +27,7 @@ WAVE = """.PROGRAM other()
 def test_a_program_moves_the_arm_and_takes_its_time() -> None:
     arm = ValArm()
     assert arm.run("wave", WAVE, now=100.0) == ""
-    end = lasts(ArmJob("wave", WAVE))
+    end = lasts(ArmJob(1, "wave", WAVE))
     assert isinstance(end, float)
     assert 0.5 < end < 20.0
     assert arm.outcome(now=100.0) is None
@@ -83,22 +83,24 @@ def test_what_cant_be_carried_out_says_why(program: str, source: str, says: str)
     outcome = arm.outcome(now=0.0)
     assert outcome
     assert says in outcome
-    assert lasts(ArmJob(program, source)) == outcome
+    assert lasts(ArmJob(1, program, source)) == outcome
 
 
 def test_it_is_a_job_among_others_and_can_be_aborted() -> None:
     rig = Rig(arm=ValArm())
     rig.begin()
-    rig.operator.order(Load(JobList.of(ArmJob("wave", WAVE), WaitJob(0.5))), ListCommand.RUN)
+    rig.operator.order(
+        RobotTask(jobs=JobList((ArmJob(1, "wave", WAVE), WaitJob(2, 0.5)))), RobotTask(do=ListCommand.RUN)
+    )
     rig.run(1.0)
     assert rig.operator.doing is Doing.JOBS
-    rig.operator.order(ListCommand.ABORT)
+    rig.operator.order(RobotTask(do=ListCommand.ABORT))
     rig.run(1.0)
     held = rig.hands.arm.joints(0.0)  # type: ignore[attr-defined]
     assert held is not None
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    rig.operator.order(ListCommand.RUN)
+    rig.operator.order(RobotTask(do=ListCommand.RUN))
     rig.run(15.0)
     assert rig.operator.tasks is not None
     assert rig.operator.tasks.progress.stage is JobStage.DONE

@@ -46,7 +46,7 @@ def test_an_unchanged_room_gives_no_new_cells(room: str, seed: int) -> None:
         if k % 30 == 0:
             wanted = Drive(float(rng.uniform(0.2, 0.5)), float(rng.uniform(-0.6, 0.6)))
         drive = around.drive(wanted, position.posture(), now=0.05 * k, v_before=drive.v)
-        told += len(around.changes(now=0.05 * k).cells)
+        told += len(around.supervisor.changes(now=0.05 * k))
         body.drive(drive.v, drive.w, 3)
         way += 0.05 * abs(drive.v)
     assert way > 2.0

@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from interfaces.teleop.architectures import ARCHITECTURES, ArcPacket, Constants, DriveController, controller
+from interfaces.messages.drive_sites import ArcPacket
+from interfaces.teleop.architectures import ARCHITECTURES, Constants, DriveController, controller
 from robots.onboard.driving import Posture
 from vrs.errors import InvalidValueError
 from vrs.segment import ArcSegment

@@ -6,13 +6,15 @@ import itertools
 import math
 import os
 import random
+from typing import TypeAlias
 
 import numpy as np
 import pytest
 
 from interfaces.lab.driving.run import run
+from interfaces.messages.drive_sites import ArchitectureReport
 from interfaces.runs.drive_run import DriveCase, DriveRun
-from interfaces.teleop.architectures import ArchitectureReport, CellChanges, OperatorSurroundings, RobotSurroundings
+from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.compositions import BodySonar, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
 from robots.ipr.chassis import IPR, SonarModel
@@ -49,8 +51,12 @@ def surroundings(walls: np.ndarray | None = None) -> OperatorSurroundings:
 BLOCK = [(m, n) for m in (10, 11, 12) for n in (7, 8, 9)]
 
 
-def told(time: float, seen: float, occupied: bool, cells: list[tuple[int, int]] = BLOCK) -> CellChanges:
-    return CellChanges(time, tuple(CellChange(cell, seen, occupied) for cell in cells))
+Told: TypeAlias = tuple[tuple[CellChange, ...], float]
+"""What a report says changed, and when it was said [s]."""
+
+
+def told(time: float, seen: float, occupied: bool, cells: list[tuple[int, int]] = BLOCK) -> Told:
+    return tuple(CellChange(cell, seen, occupied) for cell in cells), time
 
 
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
@@ -58,7 +64,7 @@ def test_of_each_cell_the_last_observation_counts_in_whatever_order_reports_come
     reports = [told(0.0, 0.0, True), told(1.0, 1.0, False, BLOCK[:3]), told(2.0, 2.0, True, BLOCK[1:2])]
     there = surroundings()
     for k, which in enumerate(order):
-        there.receive(reports[which], now=2.1 + 0.01 * k)
+        there.receive(*reports[which], now=2.1 + 0.01 * k)
     assert there.environment.obstacles(2.2) == tuple(sorted(set(BLOCK) - {BLOCK[0], BLOCK[2]}))
 
 
@@ -73,27 +79,27 @@ def test_any_order_with_losses_and_repeats_ends_as_the_observations_that_came() 
         rng.shuffle(come)
         there = surroundings(walls)
         for report in come:
-            there.receive(report, now=3.0)
-        last = {change.cell: change for report in sorted(come, key=lambda r: r.time) for change in report.cells}
+            there.receive(*report, now=3.0)
+        last = {change.cell: change for report in sorted(come, key=lambda r: r[1]) for change in report[0]}
         assert there.environment.obstacles(3.0) == tuple(sorted(c for c, change in last.items() if change.occupied))
 
 
 def test_a_cell_lives_from_when_it_was_seen_whatever_the_clocks_say() -> None:
     for offset in (0.0, 1000.0):
         there = surroundings()
-        there.receive(told(0.0, 0.0, True, []), now=offset + 0.1)
+        there.receive(*told(0.0, 0.0, True, []), now=offset + 0.1)
         # The report of t = 1 takes 3 s longer than the first; a corner of three by three lives 6 s.
-        there.receive(told(1.0, 1.0, True), now=offset + 4.1)
+        there.receive(*told(1.0, 1.0, True), now=offset + 4.1)
         assert len(there.environment.obstacles(offset + 7.0)) == 9
         assert there.environment.obstacles(offset + 7.2) == ()
-        there.receive(told(2.0, 2.0, True), now=offset + 50.0)
+        there.receive(*told(2.0, 2.0, True), now=offset + 50.0)
         assert there.environment.obstacles(offset + 50.0) == ()
 
 
 def test_cells_that_are_none_and_times_that_are_none_are_left_out() -> None:
     there = surroundings()
-    there.receive(told(0.0, 0.0, True, [(-1, 0), (0, 20), (30, 0)]), now=0.0)
-    there.receive(told(0.0, math.nan, True), now=0.0)
+    there.receive(*told(0.0, 0.0, True, [(-1, 0), (0, 20), (30, 0)]), now=0.0)
+    there.receive(*told(0.0, math.nan, True), now=0.0)
     assert there.environment.obstacles(0.0) == ()
 
 
@@ -104,9 +110,9 @@ def test_the_virtual_robot_stands_before_what_was_reported() -> None:
     for k in range(150):
         now = 0.1 * k
         if 5 <= k < 75 and k % 10 == 5:
-            there.receive(told(now, now, True, wall), now=now)
+            there.receive(*told(now, now, True, wall), now=now)
         elif k == 75:
-            there.receive(told(now, now, False, wall), now=now)
+            there.receive(*told(now, now, False, wall), now=now)
         before = there.command(Drive(0.3, 0.0), before, posture, now=now)
         posture = Posture(posture.x + 0.1 * before.v, posture.y, 0.0)
         if k < 75:
@@ -116,7 +122,8 @@ def test_the_virtual_robot_stands_before_what_was_reported() -> None:
 
 def test_changes_count_on_the_wire() -> None:
     plain = ArchitectureReport(1, 0, Posture(0, 0, 0), 0)
-    full = ArchitectureReport(1, 0, Posture(0, 0, 0), 0, told(0.0, 0.0, True))
+    cells, said_at = told(0.0, 0.0, True)
+    full = ArchitectureReport(1, 0, Posture(0, 0, 0), 0, said_at, cells)
     assert plain.size == 48
     assert full.size == 48 + 10 + 6 * len(BLOCK)
 

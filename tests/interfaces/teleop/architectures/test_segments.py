@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.teleop.architectures.sites import MOST_REPEATED, ArcPacket, Receiver, Sender, Transport
+from interfaces.messages.drive_sites import MOST_REPEATED, ArcPacket
+from interfaces.teleop.architectures.sites import Receiver, Sender, Transport
 from vrs.segment import ArcSegment
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.teleop.architectures import ARCHITECTURES, ArcPacket
-from interfaces.teleop.driving.messages import DriveOrders
+from interfaces.messages.drive_sites import DriveOrders
+from interfaces.messages.fields import Epoch
+from interfaces.teleop.architectures import ARCHITECTURES
 from interfaces.teleop.driving.operator import HOLDS, MOVING, NOT_MET
 from interfaces.teleop.driving.robot import TOO_FAR
 from robots.onboard.driving import IPR_LIMITS, Posture
@@ -166,7 +167,7 @@ def test_a_drive_begins_at_rest_and_where_the_robot_is() -> None:
     rig.operator.halt("for a test")
     assert rig.operator.resume(now=rig.now) == MOVING
     robot, far = rig.robot, Posture(9.0, 9.0, 0.0)
-    orders = DriveOrders(robot.epoch + 1, 1, rig.now, rig.now, far, ArcPacket((), 0.0))
+    orders = DriveOrders(Epoch(robot.epoch + 1), 1, rig.now, rig.now, 0.0, far)
     t = rig.host.site_time(rig.now + rig.AHEAD)
     epoch = robot.epoch
     robot.receive(orders, now=t)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from interfaces.messages.control import Role
+from interfaces.messages.drive_sites import DriveReport
 from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
-from interfaces.teleop.driving.messages import DriveReport
 from robots.ipr.chassis import Senses
 from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture

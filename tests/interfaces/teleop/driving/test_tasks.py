@@ -7,27 +7,28 @@ from itertools import pairwise
 
 import pytest
 
-from interfaces.jobs import (
+from interfaces.jobs import RunnerConfig
+from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
+from interfaces.messages.drive_sites import HALT, Doing, DriveOrders, Errand, RobotTask
+from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import (
     ArmJob,
     Job,
     JobList,
     JobStage,
     ListCommand,
-    Load,
     MessageJob,
     MoveJob,
     OperatorLoss,
-    RunnerConfig,
+    Progress,
     VoiceJob,
     WaitJob,
 )
-from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.teleop.architectures import ArcPacket
-from interfaces.teleop.driving.messages import Doing, DriveOrders, Go, Halt
 from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
+from vrs.errors import InvalidValueError
 
 THERE = Goal(2.0, 4.0, math.pi / 2)
 FAR = Goal(7.0, 1.0, 0.0)
@@ -54,7 +55,7 @@ def report(rig: Rig) -> tuple[JourneyState, str]:
 def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
     rig = Rig()
     rig.begin()
-    assert rig.operator.order(Go(THERE)) == ""
+    assert rig.operator.order(RobotTask(go=THERE)) == ""
     rig.run(2.0)
     assert rig.operator.halted == BY_ITSELF
     assert rig.operator.doing is Doing.GOAL
@@ -75,12 +76,12 @@ def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
 def test_a_goal_behind_a_wall_is_driven_round_it_and_one_in_it_is_refused_with_a_reason() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(Go(FAR))
+    rig.operator.order(RobotTask(go=FAR))
     rig.run(60.0)
     assert report(rig)[0] is JourneyState.ARRIVED
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    rig.operator.order(Go(Goal(4.1, 1.0)))
+    rig.operator.order(RobotTask(go=Goal(4.1, 1.0)))
     rig.run(1.0)
     state, reason = report(rig)
     assert state is JourneyState.FAILED
@@ -92,7 +93,7 @@ def test_a_goal_given_while_driving_waits_until_the_robot_rests_and_the_wheel_ta
     rig = Rig()
     rig.begin()
     rig.run(2.0, rig.wish(0.4, 0.3))
-    rig.operator.order(Go(THERE))
+    rig.operator.order(RobotTask(go=THERE))
     rig.run(4.0)
     assert rig.operator.doing is Doing.GOAL
     assert within_limits(rig)
@@ -112,8 +113,8 @@ def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None
     way = Conditions(delay=delay_profile("mon"), loss=loss_model("0.3"))
     rig.begin()
     rig.line.change(LinkConditions.symmetric(way), now=rig.now)
-    jobs = JobList.of(VoiceJob("Hello!"), MoveJob(THERE), WaitJob(1.0))
-    assert rig.operator.order(Load(jobs), ListCommand.RUN) == ""
+    jobs = JobList((VoiceJob(1, "Hello!"), MoveJob(2, THERE), WaitJob(3, 1.0)))
+    assert rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN)) == ""
     rig.run(30.0)
     tasks = rig.operator.tasks
     assert tasks is not None
@@ -122,18 +123,18 @@ def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None
 
 
 @pytest.mark.parametrize(
-    "job", [MoveJob(THERE), VoiceJob("A long text that takes a while. " * 6), WaitJob(30.0), WaitJob()]
+    "job", [MoveJob(2, THERE), VoiceJob(2, "A long text that takes a while. " * 6), WaitJob(2, 30.0), WaitJob(2)]
 )
 @pytest.mark.parametrize("stop", ["abort", "pause", "stop", "wheel", "touch"])
 def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_intact(job: Job, stop: str) -> None:
     rig = Rig()
     rig.begin()
-    jobs = JobList.of(MessageJob("Look"), job, MoveJob(FAR))
-    rig.operator.order(Load(jobs), ListCommand.RUN)
+    jobs = JobList((MessageJob(1, "Look"), job, MoveJob(3, FAR)))
+    rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
     rig.run(2.0)
     assert rig.operator.doing is Doing.JOBS
     if stop in {"abort", "pause"}:
-        rig.operator.order(ListCommand(stop))
+        rig.operator.order(RobotTask(do=ListCommand(stop)))
     elif stop == "stop":
         rig.operator.stop()
     elif stop == "wheel":
@@ -152,7 +153,7 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
     # And it goes on under a new drive.
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    assert rig.operator.order(ListCommand.RESUME) == ""
+    assert rig.operator.order(RobotTask(do=ListCommand.RESUME)) == ""
     rig.run(1.0)
     assert rig.operator.doing is Doing.JOBS
 
@@ -160,7 +161,9 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
 def test_a_job_without_an_arm_fails_and_says_so() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(Load(JobList.of(ArmJob("pick"), MoveJob(THERE))), ListCommand.RUN)
+    rig.operator.order(
+        RobotTask(jobs=JobList((ArmJob(1, "pick"), MoveJob(2, THERE)))), RobotTask(do=ListCommand.RUN)
+    )
     rig.run(1.0)
     tasks = rig.operator.tasks
     assert tasks is not None
@@ -175,8 +178,9 @@ def test_a_job_without_an_arm_fails_and_says_so() -> None:
 def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, jobs: bool) -> None:
     rig = Rig(hold=hold, jobs=RunnerConfig(loss=loss))
     rig.begin()
-    listed = JobList.of(MoveJob(THERE), WaitJob(), VoiceJob("Hi"))
-    rig.operator.order(*((Load(listed), ListCommand.RUN) if jobs else (Go(THERE),)))
+    listed = JobList((MoveJob(1, THERE), WaitJob(2), VoiceJob(3, "Hi")))
+    list_and_run = RobotTask(jobs=listed), RobotTask(do=ListCommand.RUN)
+    rig.operator.order(*(list_and_run if jobs else (RobotTask(go=THERE),)))
     rig.run(2.0)
     rig.line.connected = False
     rig.run(4.0)
@@ -198,7 +202,7 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
         if jobs:
             # It's heard again, and may end its waiting.
             assert rig.operator.doing is Doing.JOBS
-            assert rig.operator.order(ListCommand.KEY) == ""
+            assert rig.operator.order(RobotTask(do=ListCommand.KEY)) == ""
             rig.run(3.0)
             assert rig.operator.tasks is not None
             assert rig.operator.tasks.progress.stage is JobStage.DONE
@@ -208,7 +212,7 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
     assert stands(rig)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
-    assert rig.operator.order(Go(FAR)) == ""
+    assert rig.operator.order(RobotTask(go=FAR)) == ""
     rig.run(2.0)
     assert rig.operator.doing is Doing.GOAL
 
@@ -217,7 +221,7 @@ def test_what_was_told_just_before_the_link_broke_doesnt_begin_when_it_is_back()
     rig = Rig()
     rig.begin()
     rig.line.connected = False
-    rig.operator.order(Go(THERE))
+    rig.operator.order(RobotTask(go=THERE))
     rig.run(3.0)
     rig.line.connected = True
     rig.run(3.0)
@@ -231,26 +235,26 @@ def test_what_was_told_just_before_the_link_broke_doesnt_begin_when_it_is_back()
 def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_takes_long() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(Load(JobList.of(MoveJob(THERE))), ListCommand.RUN)
+    rig.operator.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
     rig.run(4.0)
-    rig.operator.order(ListCommand.PAUSE)
+    rig.operator.order(RobotTask(do=ListCommand.PAUSE))
     while rig.operator.halted != STOPPED:
         rig.run(0.05)
-    assert rig.operator.order(ListCommand.RESUME) == ""
+    assert rig.operator.order(RobotTask(do=ListCommand.RESUME)) == ""
     assert rig.operator.doing is Doing.NOTHING
     rig.run(2.0)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
     assert rig.operator.doing is Doing.JOBS
     rig.operator.stop()
-    rig.operator.order(Go(FAR))
+    rig.operator.order(RobotTask(go=FAR))
     rig.run(6.0)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
     assert rig.operator.doing is Doing.NOTHING
     # A stop forgets it.
     rig.operator.stop()
-    rig.operator.order(Go(FAR))
+    rig.operator.order(RobotTask(go=FAR))
     rig.operator.stop()
     rig.run(1.0)
     assert rig.operator.resume(now=rig.now) == ""
@@ -261,15 +265,15 @@ def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_tak
 def test_what_stops_counts_however_old_it_is_and_nothing_else_does() -> None:
     rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
     rig.begin()
-    rig.operator.order(Load(JobList.of(WaitJob(), MoveJob(FAR))), ListCommand.RUN)
+    rig.operator.order(RobotTask(jobs=JobList((WaitJob(1), MoveJob(2, FAR)))), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     rig.line.change(LinkConditions.symmetric(Conditions(delay=delay_profile("constant:1.0"))), now=rig.now)
     rig.run(4.0)
     assert rig.autonomy.doing is Doing.JOBS
-    rig.operator.order(ListCommand.KEY)
+    rig.operator.order(RobotTask(do=ListCommand.KEY))
     rig.run(3.0)
     assert rig.autonomy.report().progress.jobs[0].stage is JobStage.RUNNING, "too old to move anything"
-    rig.operator.order(ListCommand.ABORT)
+    rig.operator.order(RobotTask(do=ListCommand.ABORT))
     rig.run(3.0)
     assert rig.autonomy.report().progress.stage is JobStage.ABORTED
     assert stands(rig)
@@ -278,12 +282,12 @@ def test_what_stops_counts_however_old_it_is_and_nothing_else_does() -> None:
 def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> None:
     rig = Rig(hold=True)
     rig.begin()
-    rig.operator.order(Load(JobList.of(WaitJob())), ListCommand.RUN)
+    rig.operator.order(RobotTask(jobs=JobList((WaitJob(1),))), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     robot, (x, y, theta) = rig.robot, rig.truth
     epoch = robot.epoch
     start = Posture(x, y, theta)
-    robot.receive(DriveOrders(epoch + 1, 1, rig.now, rig.now, start, ArcPacket((), 0.0)), now=rig.now)
+    robot.receive(DriveOrders(Epoch(epoch + 1), 1, rig.now, rig.now, 0.0, start), now=rig.now)
     assert robot.epoch == epoch
     assert rig.autonomy.doing is Doing.JOBS
 
@@ -291,7 +295,7 @@ def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> 
 def test_another_operator_finds_the_list_paused() -> None:
     rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
     rig.begin()
-    rig.operator.order(Load(JobList.of(MoveJob(THERE))), ListCommand.RUN)
+    rig.operator.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
     rig.run(2.0)
     rig.line.connected = False
     rig.run(2.5)
@@ -320,21 +324,29 @@ class Busy:
         return None
 
 
-@pytest.mark.parametrize("stop", [ListCommand.ABORT, ListCommand.PAUSE, Halt()])
-def test_an_arm_that_works_is_stopped_with_its_list(stop: ListCommand | Halt) -> None:
+@pytest.mark.parametrize("stop", [*(RobotTask(do=word) for word in (ListCommand.ABORT, ListCommand.PAUSE)), HALT])
+def test_an_arm_that_works_is_stopped_with_its_list(stop: RobotTask) -> None:
     arm = Busy()
     autonomy = Rig(arm=arm).autonomy
-    autonomy.receive(Load(JobList.of(ArmJob("pick"))), now=0.0)
-    autonomy.receive(ListCommand.RUN, now=0.0)
+    autonomy.receive(RobotTask(jobs=JobList((ArmJob(1, "pick"),))), now=0.0)
+    autonomy.receive(RobotTask(do=ListCommand.RUN), now=0.0)
     assert arm.told == ["pick"]
     autonomy.receive(stop, now=1.0)
     assert arm.told == ["pick", "end"]
 
 
+def test_a_task_is_one_thing_and_a_robot_makes_no_dry_run() -> None:
+    for given in ({}, {"go": THERE, "do": ListCommand.RUN}, {"progress": Progress()}):
+        with pytest.raises(InvalidValueError, match="one of go, do, jobs and halt"):
+            RobotTask(**given)  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="what a robot does"):
+        Errand(1, RobotTask(do=ListCommand.DRY_RUN))
+
+
 def test_it_sets_out_from_rest() -> None:
     rig = Rig()
     here = Posture(1.0, 2.0, 0.5)
-    rig.autonomy.receive(Go(THERE), now=0.0)
+    rig.autonomy.receive(RobotTask(go=THERE), now=0.0)
     assert rig.autonomy.drive(here, Drive(0.3, 0.0), now=0.0) is None
     assert rig.autonomy.doing is Doing.GOAL
     assert rig.autonomy.drive(here, STAND, now=0.05) is not None

@@ -2,45 +2,41 @@
 
 from __future__ import annotations
 
-import enum
-from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, TypeAlias
+from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import force_setattr
 
-from interfaces.jobs import Forecast, JobList, ListCommand, Load, OperatorLoss, Progress
 from interfaces.messages.control import MOST_MESSAGES, Lease, Role
+from interfaces.messages.drive_sites import NONE_LEFT, Doing, RobotTask, SensedPoints
 from interfaces.messages.fields import (
     Count,
+    Distance,
     Epoch,
     Leased,
     Message,
     Number,
-    Stamp,
+    PointRow,
+    Points,
     Text,
     Time,
     Timeout,
     Value,
     Word,
-)  # fmt: skip
-from interfaces.teleop.driving.messages import MOST_POINTS, Doing, Go, Point
+)
+from interfaces.messages.jobs import Forecast, JobList, OperatorLoss, Progress
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
+from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
 
 MOST_THINGS = 1000
 """Outlines of a map."""
 MOST_CORNERS = 64
 """Of an outline."""
-Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]
-PointRow = tuple[Coordinate, Coordinate]
-Points = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_POINTS)]
 Outline = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_CORNERS)]
-Distance = Annotated[float, Meta(ge=0, le=1e9)]
 Positive = Annotated[float, Meta(gt=0, le=1e9)]
-Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
-Doubt = tuple[Variance, Variance, Variance]
 
 
 class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
@@ -118,68 +114,53 @@ class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"
     arrived [s]; None for one that was lost."""
 
 
-class Trial(enum.StrEnum):
-    """What is asked of the virtual robot alone."""
-
-    DRY_RUN = "dry-run"
-    """Say how long the list is likely to take."""
-
-
-Wanted: TypeAlias = Go | Load | ListCommand | Trial
-"""What a client asks for: a goal; a list in the place of the one before; that something is done with it."""
-
-
-@dataclass(frozen=True, slots=True)
-class TaskOrder:
+class TaskOrder(Leased, frozen=True, omit_defaults=True, gc=False, tag="task"):
     """Holder: let the robot do something by itself. The answer is a `Tasks` or a `Problem`."""
 
-    kind: ClassVar[str] = "task"
-    version: ClassVar[int] = 1
-    number: int
-    epoch: int
-    wanted: Wanted
+    number: Number
+    task: RobotTask
+    epoch: Epoch | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.task.halt is not None:
+            raise InvalidValueError("task", "halt", "go, do or jobs: the order of a stop halts")
 
 
-@dataclass(frozen=True, slots=True)
-class Tasks:
+class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
     """Server: what the robot does by itself, and the list of jobs; the newest one counts."""
 
-    kind: ClassVar[str] = "tasks"
-    version: ClassVar[int] = 1
     doing: Doing = Doing.NOTHING
     journey: JourneyState = JourneyState.IDLE
-    reason: str = ""
+    reason: Text = ""
     """Why it waits or couldn't get there."""
     goal: Goal | None = None
-    route: tuple[Point, ...] = ()
+    route: Points = ()
     """The way that's being driven [m]."""
-    left: float = 0.0
+    left: Distance = NONE_LEFT
     """Of that way [m]."""
-    jobs: JobList = field(default_factory=JobList)
-    progress: Progress = field(default_factory=Progress)
+    jobs: JobList = msgspec.field(default_factory=JobList)
+    progress: Progress = msgspec.field(default_factory=Progress)
     forecast: Forecast | None = None
     """What the dry run said of this list; None where there was none since it was changed."""
     loss: OperatorLoss | None = None
     """What follows when the operator is lost; None before the robot is met."""
-    shows: str = ""
+    shows: Text = ""
     """What stands on its screen."""
-    says: str = ""
+    says: Text = ""
     """What it's saying."""
-    problem: str = ""
+    problem: Text = ""
     """What is wrong with the file of the list; empty if nothing is."""
-    answers: int | None = None
+    answers: Count | None = None
     """Number of the receiver's order that this answers."""
 
+    def __post_init__(self) -> None:
+        if not self.left:
+            force_setattr(self, "left", NONE_LEFT)
 
-class Seen(Message, frozen=True, omit_defaults=True, gc=False, tag="seen"):
+
+class Seen(Message, SensedPoints, frozen=True, omit_defaults=True, gc=False, tag="seen"):
     """Server: what the robot sees of its surroundings; the newest one counts."""
-
-    time: Stamp
-    """By the robot's own clock [s]."""
-    points: Points = ()
-    """Where its laser's beams ended, on the map [m]."""
-    doubt: Doubt | None = None
-    """Of its place: variance of x, covariance, variance of y [m²]; None where nobody knows."""
 
 
 class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
