@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import enum
 import re
 import sys
+from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any, ClassVar, Self
 
@@ -68,6 +70,22 @@ class Epoch(int):
         return super().__new__(cls, number)
 
 
+class Sender(enum.StrEnum):
+    """Who sends a message."""
+
+    SERVER = "Server"
+    CLIENT = "Client"
+    """Any client, whatever its role."""
+    OPERATOR = "Operator"
+    """A client that may have the lease."""
+    HOLDER = "Holder"
+    """One that has it, or shares it."""
+    ADMIN = "Admin"
+    EITHER = "Either side"
+    SITE = "Operator's site"
+    ROBOT = "Robot's site"
+
+
 class Wire(msgspec.Struct, frozen=True, omit_defaults=True, gc=False):
     """A message or a part of one as it crosses: defaults are left out, unknown fields passed over."""
 
@@ -75,8 +93,12 @@ class Wire(msgspec.Struct, frozen=True, omit_defaults=True, gc=False):
 class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
     """A message, or a part that has a type."""
 
+    sender: ClassVar[Sender]
+    """Who sends it; parts of messages have none."""
     secrets: ClassVar[tuple[str, ...]] = ()
     """Fields that no log may show."""
+    absent: ClassVar[Mapping[str, str]] = {}
+    """What a field stands for that is left out, computed of others, as in `edit - 1`; defaults need no word."""
 
     @property
     def kind(self) -> str:
@@ -176,6 +198,10 @@ def rich(kind: Any, value: Any) -> Any:
         if (type(number) is not float and type(number) is not int) or not -LARGEST <= number <= LARGEST:
             raise ValueError(f"Expected `array` of numbers from -{LARGEST:g} to {LARGEST:g}")
     return frozen_array(value)
+
+
+CROSSING: Mapping[type, Any] = {np.ndarray: Joints, Epoch: Digits}
+"""What stands on the wire for what msgspec doesn't know, as `plain` writes and `rich` reads it."""
 
 
 def epoch_of(digits: object) -> Epoch:

@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-from interfaces.messages.fields import Count, Message, Number, Rate, Time, Word
+from interfaces.messages.fields import Count, Message, Number, Rate, Sender, Time, Word
 from vrs.commands import Command, finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
@@ -72,6 +72,7 @@ class Frame:
 class Order:
     """Client: carry out a command. It's sent again until its outcome comes, and carried out once."""
 
+    sender: ClassVar[Sender] = Sender.HOLDER
     kind: ClassVar[str] = "order"
     version: ClassVar[int] = 1
     number: int
@@ -88,11 +89,13 @@ class Order:
 
 
 class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
-    """Client: g(t), please. Sent again, it asks what has become of the frame."""
+    """g(t). Sent again with the same number, it asks what has become of that frame."""
 
+    sender: ClassVar[Sender] = Sender.CLIENT
     number: Number
+    """The client's own, each used once."""
     t: Time | None = None
-    """[s]; None for the engine's present, plus the servlet's lead."""
+    """[s]; absent: now."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
@@ -101,12 +104,14 @@ class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
 
 
 class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
-    """Client: the scene, please, and from now on what changes in it."""
+    """The scene, then what follows; one at a time counts, another number replaces it."""
 
+    sender: ClassVar[Sender] = Sender.CLIENT
     number: Number
     form: ViewForm
+    """`segments`: the timeline and each edit of it; `frames`: positions."""
     rate: Rate | None = None
-    """Wished rate of frames [1/s]; the broadcaster with the nearest one is taken."""
+    """Of frames [1/s]: the broadcaster with the nearest one is taken."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
@@ -115,18 +120,20 @@ class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
 
 
 class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
-    """Client: segments that it lacks."""
+    """Segments of the scene of that edit, from that one on; without `index` all edits after that one."""
 
+    sender: ClassVar[Sender] = Sender.CLIENT
     edit: Count
-    """Number of the newest edit in what it has, or of that which a `Scene` began with."""
+    """Of the newest edit that the client has, or of the scene."""
     index: Count | None = None
-    """First segment that it lacks of a history; None when it has that and lacks later edits."""
+    """First segment that it lacks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
     """Servlet: what became of an order; again when a later command changed that."""
 
+    sender: ClassVar[Sender] = Sender.SERVER
     kind: ClassVar[str] = "outcome"
     version: ClassVar[int] = 1
     number: int
@@ -144,6 +151,7 @@ class Outcome:
 class Answer:
     """Servlet: the frame that was asked for, with its status as it is now."""
 
+    sender: ClassVar[Sender] = Sender.SERVER
     kind: ClassVar[str] = "answer"
     version: ClassVar[int] = 1
     frame: Frame
@@ -169,6 +177,7 @@ class Verdicts:
 class Broadcast:
     """Servlet: the newest frame of a broadcaster, and what became of earlier ones."""
 
+    sender: ClassVar[Sender] = Sender.SERVER
     kind: ClassVar[str] = "broadcast"
     version: ClassVar[int] = 1
     frame: Frame
@@ -176,32 +185,34 @@ class Broadcast:
 
 
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
-    """Servlet: what there is to see, for one who has just come."""
+    """What there is to see, for one who has just come."""
 
+    sender: ClassVar[Sender] = Sender.SERVER
     number: Number
-    """Number of the `Follow` that it answers."""
+    """Of the `Follow`."""
     robot: Word
     """Name of the robot's model."""
     initial: Array
-    """Joints before the start of the timeline [rad], (n,)."""
+    """Joints before the start [rad]."""
     start: Time
     """Origin of the timeline [s]."""
     end: Time
     """End of what is planned [s]."""
     segments: Count
-    """How many segments the timeline has; `Want` fetches them."""
+    """How many it has; `Want` fetches them."""
     edit: Count
-    """Number of the newest edit in it."""
+    """Number of its newest edit."""
     now: Time
-    """The engine's time [s]."""
+    """Session time [s]."""
     rate: Rate | None = None
-    """Rate of the frames that follow [1/s]; None where segments do."""
+    """Of the frames that follow [1/s]; absent for segments."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class History:
     """Servlet: a part of the timeline that a `Scene` named."""
 
+    sender: ClassVar[Sender] = Sender.SERVER
     kind: ClassVar[str] = "history"
     version: ClassVar[int] = 1
     edit: int
@@ -218,6 +229,7 @@ class Change:
     `tail_start`.
     """
 
+    sender: ClassVar[Sender] = Sender.SERVER
     kind: ClassVar[str] = "change"
     version: ClassVar[int] = 1
     base: int
@@ -239,6 +251,7 @@ class Change:
 class Pulse:
     """Servlet: up to `past`, the timeline with this edit is what happened."""
 
+    sender: ClassVar[Sender] = Sender.SERVER
     kind: ClassVar[str] = "pulse"
     version: ClassVar[int] = 1
     edit: int

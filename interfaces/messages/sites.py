@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
+from interfaces.messages.fields import Sender
 from vrs.commands import Command
 from vrs.ledger import Receipt
 from vrs.model import Array
@@ -54,6 +55,7 @@ class LogEntry:
 class Orders:
     """From the operator's site: entries of the log, or a heartbeat without any."""
 
+    sender: ClassVar[Sender] = Sender.SITE
     epoch: int
     """Of the control lease."""
     number: int
@@ -94,6 +96,7 @@ class PlanPart:
 class Report:
     """From the robot's site: where it is, and what became of the entries."""
 
+    sender: ClassVar[Sender] = Sender.ROBOT
     epoch: int
     """Epoch that it follows."""
     number: int

@@ -5,7 +5,8 @@ from __future__ import annotations
 import enum
 from collections import OrderedDict
 from collections.abc import Callable
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from types import UnionType
 from typing import Any, Generic, TypeAlias, TypeVar, get_args
 
@@ -13,8 +14,17 @@ import msgspec
 
 from interfaces import messages
 from interfaces.messages import Reply, Request, control
-from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, ProtocolError, Question
-from interfaces.messages.fields import LONGEST_TEXT, check_normal, cut, plain, rich
+from interfaces.messages.control import (
+    Notice,
+    Ping,
+    Pong,
+    ProblemCode,
+    ProtocolError,
+    Question,
+    Role,
+    may_send,
+)
+from interfaces.messages.fields import LONGEST_TEXT, Sender, check_normal, cut, plain, rich
 from interfaces.messages.fields import Message as Wire
 from interfaces.messages.segments import Packed, Plain
 from interfaces.messages.sites import Orders, Report
@@ -46,6 +56,12 @@ Value: TypeAlias = (
 )
 """What crosses."""
 T = TypeVar("T")
+
+
+def _sender(kind: Any) -> Sender:
+    sender: Sender = kind.sender
+    return sender
+
 
 WIRES: dict[type, type[Wire]] = {
     messages.Order: message_wires.OrderWire,
@@ -88,12 +104,16 @@ WIRES: dict[type, type[Wire]] = {
     DriveReport: mobile_wires.DriveReportWire,
 }
 """The wire form of each message."""
-ASKED = frozenset(
-    WIRES[kind] for kind in (*get_args(Request), *get_args(Question), mobile.TaskOrder, Pong, Orders, DriveOrders)
-)
+ASKED = frozenset(wire for kind, wire in WIRES.items() if _sender(kind) not in {Sender.SERVER, Sender.ROBOT})
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}
 """Messages by the type that stands in them."""
+
+
+def sent_by(role: Role) -> Any:
+    """The messages that a client of a role may send after `Hello`, as a union."""
+    kinds = (kind for kind in WIRES if may_send(role, _sender(kind)) and kind is not control.Hello)
+    return reduce(or_, kinds)
 
 
 class Encoding(enum.StrEnum):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Generic
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Generic
 
 from msgspec import UNSET, Meta, UnsetType
 from typing_extensions import override
@@ -162,6 +163,7 @@ class HistoryWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False
 class ChangeWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False, tag="change"):
     """`Change`; `base` is left out where it's the edit before, `tail_start` where it's the end."""
 
+    absent: ClassVar[Mapping[str, str]] = {"base": "edit - 1", "tail_start": "end"}
     edit: Number
     first: Count
     end: Time
@@ -192,6 +194,7 @@ class ChangeWire(Message, Generic[C], frozen=True, omit_defaults=True, gc=False,
 class PulseWire(Message, frozen=True, omit_defaults=True, gc=False, tag="pulse"):
     """`Pulse`; `past` is left out where it's now, and null for −∞."""
 
+    absent: ClassVar[Mapping[str, str]] = {"past": "now"}
     edit: Count
     now: Time
     past: Time | UnsetType | None = UNSET

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias
+from typing import ClassVar, Final, TypeAlias
 
 from interfaces.jobs.runner import ListCommand, Load
 from interfaces.jobs.values import OperatorLoss, Progress
+from interfaces.messages.fields import Sender
 from interfaces.teleop.architectures.sites import ArchitectureReport, ArcPacket
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
@@ -112,6 +113,7 @@ class DriveOrders:
     its arcs count from when it began.
     """
 
+    sender: ClassVar[Sender] = Sender.SITE
     epoch: int
     """Of the operator's site, from 1."""
     number: int
@@ -132,6 +134,7 @@ class DriveOrders:
 class DriveReport:
     """From the robot's site: where it takes itself to be, and what it does."""
 
+    sender: ClassVar[Sender] = Sender.ROBOT
     epoch: int
     """Epoch that it follows."""
     number: int
