@@ -1,5 +1,6 @@
 // The page's connection to the server: greeted, followed, kept alive, and made again by itself.
 import { ClockSync, Reader } from "./vrs.js";
+import { decode } from "./protocol.js";
 import { Orders } from "./orders.js";
 import { Wire } from "./wire.js";
 
@@ -50,7 +51,7 @@ export class Session extends EventTarget {
     this.looked = this.heard;
     this.wire = new Wire({
       open: () => this.greet(),
-      message: (text) => this.take(JSON.parse(text)),
+      message: (text) => this.hear(text),
       close: () => this.lose(),
     });
     this.key = sessionStorage.getItem(KEY);
@@ -145,8 +146,15 @@ export class Session extends EventTarget {
     return open;
   }
 
+  /** Take a frame; what can't be taken is passed over. */
+  hear(text) {
+    this.heard = seconds();
+    const message = decode(text);
+    if (message) this.take(message);
+  }
+
   take(message) {
-    const now = (this.heard = seconds());
+    const now = seconds();
     if (message.type === "problem") this.object(message);
     else if (message.type === this.welcomes) this.begin(message, now);
     else if (message.type === "lease") this.setLease(message);
@@ -182,7 +190,7 @@ export class Session extends EventTarget {
     this.welcome = welcome;
     this.key = welcome.session;
     this.roles = [welcome.role];
-    this.orders.renew(welcome.resumed === true, now);
+    this.orders.renew(welcome.resumed, now);
     if (!same) {
       this.sync = new ClockSync();
       this.reader = this.makeReader();
