@@ -73,7 +73,12 @@ def described(kind: Any) -> MessageDescription:
     Raises:
         InvalidValueError: If it has no fields.
     """
-    found = kind if isinstance(kind, kinds.Type) else kinds.type_info(kind)
+    return _described(kind.cls if isinstance(kind, Described) else kind)
+
+
+@cache
+def _described(kind: Any) -> MessageDescription:
+    found = kinds.type_info(kind)
     if not isinstance(found, Described):
         raise InvalidValueError("kind", kind, "a class with fields")
     own: Any = getattr(found.cls, "__origin__", found.cls)
