@@ -239,12 +239,13 @@ def _check(message: MessageDescription, names: dict[tuple[Any, ...], str]) -> st
     lines = [f"function {_function(message)}(m) {{"]
     if message.is_array:
         least = sum(field.required for field in message.fields)
-        lines.append(f'  list(m, {least}, Infinity, "{label}");')
+        most = "Infinity" if message.is_open else len(message.fields)
+        lines.append(f'  list(m, {least}, {most}, "{label}");')
     else:
         lines.append(f'  map(m, "{label}");')
     if message.tag:
-        tag = json.dumps(message.tag)
-        lines.append(f"  if (m.{message.tag_field} !== {tag}) fail({json.dumps(label)}, {tag});")
+        at, tag = f"m.{message.tag_field}", json.dumps(message.tag)
+        lines.append(f'  if ({at} !== undefined && {at} !== {tag}) fail("{label}", {tag});')
     for number, field in enumerate(message.fields):
         at = f"m[{number}]" if message.is_array else f"m.{field.name}"
         lines += [f"  {line}" for line in _field_check(field, at, f"{label}.{field.name}", names)]
@@ -280,10 +281,9 @@ def _place_check(
         yield from _one_check(found[0], at, where, names, depth)
         return
     for number, one in enumerate(found):
-        last = number == len(found) - 1
-        check = list(_one_check(one, at, where, names, depth))
-        head = "else" if last else ("else if" if number else "if") + f" ({_looks_like(one, at)})"
-        yield from [f"{head} {{", *(f"  {line}" for line in check), "}"]
+        head = f"{'else if' if number else 'if'} ({_looks_like(one, at)})"
+        yield from [f"{head} {{", *(f"  {line}" for line in _one_check(one, at, where, names, depth)), "}"]
+    yield f'else fail({json.dumps(where)}, "of a kind that is known");'
 
 
 def _looks_like(kind: kinds.Type, at: str) -> str:

@@ -54,6 +54,8 @@ class MessageDescription(NamedTuple):
     """Who sends it; empty for parts."""
     is_array: bool
     """Whether its fields stand in an array, without names."""
+    is_open: bool
+    """Whether newer peers may send more of them."""
     text: str
     """The docstring of its class, on one line."""
     fields: tuple[FieldDescription, ...]
@@ -89,6 +91,7 @@ def _described(kind: Any) -> MessageDescription:
         tag_field=getattr(found, "tag_field", None) or "",
         sender=str(getattr(own, "sender", "")),
         is_array=isinstance(found, kinds.NamedTupleType) or getattr(found, "array_like", False),
+        is_open=not isinstance(found, kinds.NamedTupleType),
         text=" ".join((inspect.getdoc(own) or "").split()),
         fields=tuple(_field(own, field) for field in found.fields),
     )

@@ -706,7 +706,7 @@ function checkReceiptWire(m) {
 }
 function checkOutcomeWire(m) {
   map(m, "outcome");
-  if (m.type !== "outcome") fail("outcome", "outcome");
+  if (m.type !== undefined && m.type !== "outcome") fail("outcome", "outcome");
   whole(m.number, 1, WHOLE, "outcome.number");
   real(m.made_at, -1e9, 1e9, "outcome.made_at");
   if (m.receipt === undefined || m.receipt === null) m.receipt = null;
@@ -718,7 +718,7 @@ function checkOutcomeWire(m) {
 }
 function checkAnswerWire(m) {
   map(m, "answer");
-  if (m.type !== "answer") fail("answer", "answer");
+  if (m.type !== undefined && m.type !== "answer") fail("answer", "answer");
   whole(m.number, 0, WHOLE, "answer.number");
   real(m.t, -1e9, 1e9, "answer.t");
   real(m.made_at, -1e9, 1e9, "answer.made_at");
@@ -731,7 +731,7 @@ function checkAnswerWire(m) {
 }
 function checkBroadcastWire(m) {
   map(m, "broadcast");
-  if (m.type !== "broadcast") fail("broadcast", "broadcast");
+  if (m.type !== undefined && m.type !== "broadcast") fail("broadcast", "broadcast");
   whole(m.number, 0, WHOLE, "broadcast.number");
   real(m.t, -1e9, 1e9, "broadcast.t");
   real(m.made_at, -1e9, 1e9, "broadcast.made_at");
@@ -756,7 +756,7 @@ function checkBroadcastWire(m) {
 }
 function checkScene(m) {
   map(m, "scene");
-  if (m.type !== "scene") fail("scene", "scene");
+  if (m.type !== undefined && m.type !== "scene") fail("scene", "scene");
   whole(m.number, 1, WHOLE, "scene.number");
   text(m.robot, 0, 200, "scene.robot");
   list(m.initial, 1, 64, "scene.initial");
@@ -782,7 +782,7 @@ function checkSegmentWire(m) {
 }
 function checkHistoryWire(m) {
   map(m, "history");
-  if (m.type !== "history") fail("history", "history");
+  if (m.type !== undefined && m.type !== "history") fail("history", "history");
   whole(m.edit, 0, WHOLE, "history.edit");
   whole(m.index, 0, WHOLE, "history.index");
   if (m.dof === undefined) m.dof = 0;
@@ -797,7 +797,7 @@ function checkHistoryWire(m) {
 }
 function checkChangeWire(m) {
   map(m, "change");
-  if (m.type !== "change") fail("change", "change");
+  if (m.type !== undefined && m.type !== "change") fail("change", "change");
   whole(m.edit, 1, WHOLE, "change.edit");
   whole(m.first, 0, WHOLE, "change.first");
   real(m.end, -1e9, 1e9, "change.end");
@@ -821,7 +821,7 @@ function checkChangeWire(m) {
 }
 function checkPulseWire(m) {
   map(m, "pulse");
-  if (m.type !== "pulse") fail("pulse", "pulse");
+  if (m.type !== undefined && m.type !== "pulse") fail("pulse", "pulse");
   whole(m.edit, 0, WHOLE, "pulse.edit");
   real(m.now, -1e9, 1e9, "pulse.now");
   if (m.past === undefined) m.past = m.now;
@@ -845,7 +845,7 @@ function checkLimits(m) {
 }
 function checkLease(m) {
   map(m, "lease");
-  if (m.type !== "lease") fail("lease", "lease");
+  if (m.type !== undefined && m.type !== "lease") fail("lease", "lease");
   word(m.state, WORDS_3, "lease.state");
   if (m.epoch === undefined || m.epoch === null) m.epoch = null;
   else like(m.epoch, /^[1-9][0-9]{0,19}$/, "lease.epoch");
@@ -862,7 +862,7 @@ function checkLease(m) {
 }
 function checkWelcome(m) {
   map(m, "welcome");
-  if (m.type !== "welcome") fail("welcome", "welcome");
+  if (m.type !== undefined && m.type !== "welcome") fail("welcome", "welcome");
   whole(m.protocol, 1, WHOLE, "welcome.protocol");
   text(m.session, 0, 200, "welcome.session");
   word(m.role, WORDS_5, "welcome.role");
@@ -891,13 +891,13 @@ function checkWelcome(m) {
 }
 function checkPing(m) {
   map(m, "ping");
-  if (m.type !== "ping") fail("ping", "ping");
+  if (m.type !== undefined && m.type !== "ping") fail("ping", "ping");
   whole(m.number, 1, WHOLE, "ping.number");
   real(m.t, -1e12, 1e12, "ping.t");
 }
 function checkPong(m) {
   map(m, "pong");
-  if (m.type !== "pong") fail("pong", "pong");
+  if (m.type !== undefined && m.type !== "pong") fail("pong", "pong");
   whole(m.number, 1, WHOLE, "pong.number");
   real(m.t, -1e12, 1e12, "pong.t");
   real(m.received, -1e12, 1e12, "pong.received");
@@ -905,7 +905,7 @@ function checkPong(m) {
 }
 function checkProblem(m) {
   map(m, "problem");
-  if (m.type !== "problem") fail("problem", "problem");
+  if (m.type !== undefined && m.type !== "problem") fail("problem", "problem");
   word(m.code, WORDS_6, "problem.code");
   text(m.text, 0, 2000, "problem.text");
   if (m.number === undefined || m.number === null) m.number = null;
@@ -915,7 +915,7 @@ function checkProblem(m) {
 }
 function checkState(m) {
   map(m, "state");
-  if (m.type !== "state") fail("state", "state");
+  if (m.type !== undefined && m.type !== "state") fail("state", "state");
   whole(m.number, 1, WHOLE, "state.number");
   real(m.t, -1e9, 1e9, "state.t");
   list(m.q, 1, 64, "state.q");
@@ -982,7 +982,7 @@ function checkLinkFigures(m) {
 }
 function checkNetwork(m) {
   map(m, "network");
-  if (m.type !== "network") fail("network", "network");
+  if (m.type !== undefined && m.type !== "network") fail("network", "network");
   checkDirectionConditions(m.forward);
   checkDirectionConditions(m.backward);
   checkLinkFigures(m.there);
@@ -1022,7 +1022,7 @@ function checkDriveLimits(m) {
 }
 function checkMobileWelcome(m) {
   map(m, "mobile-welcome");
-  if (m.type !== "mobile-welcome") fail("mobile-welcome", "mobile-welcome");
+  if (m.type !== undefined && m.type !== "mobile-welcome") fail("mobile-welcome", "mobile-welcome");
   whole(m.protocol, 1, WHOLE, "mobile-welcome.protocol");
   text(m.session, 0, 200, "mobile-welcome.session");
   word(m.role, WORDS_5, "mobile-welcome.role");
@@ -1043,19 +1043,19 @@ function checkMobileWelcome(m) {
   else text(m.room, 0, 200, "mobile-welcome.room");
 }
 function checkPosture(m) {
-  list(m, 3, Infinity, "Posture");
+  list(m, 3, 3, "Posture");
   real(m[0], -1e9, 1e9, "Posture.x");
   real(m[1], -1e9, 1e9, "Posture.y");
   real(m[2], -1e9, 1e9, "Posture.theta");
 }
 function checkDrive(m) {
-  list(m, 2, Infinity, "Drive");
+  list(m, 2, 2, "Drive");
   real(m[0], -1e6, 1e6, "Drive.v");
   real(m[1], -1e6, 1e6, "Drive.w");
 }
 function checkPostures(m) {
   map(m, "postures");
-  if (m.type !== "postures") fail("postures", "postures");
+  if (m.type !== undefined && m.type !== "postures") fail("postures", "postures");
   whole(m.number, 1, WHOLE, "postures.number");
   real(m.now, -1e9, 1e9, "postures.now");
   checkPosture(m.virtual);
@@ -1104,37 +1104,38 @@ function checkGoalForm(m) {
 }
 function checkMoveForm(m) {
   map(m, "move");
-  if (m.do !== "move") fail("move", "move");
+  if (m.do !== undefined && m.do !== "move") fail("move", "move");
   whole(m.number, 1, 2147483647, "move.number");
   if (typeof m.to === "object" && m.to !== null) {
     checkGoalForm(m.to);
   }
-  else {
+  else if (typeof m.to === "string") {
     text(m.to, 1, 40, "move.to");
   }
+  else fail("move.to", "of a kind that is known");
 }
 function checkVoiceForm(m) {
   map(m, "voice");
-  if (m.do !== "voice") fail("voice", "voice");
+  if (m.do !== undefined && m.do !== "voice") fail("voice", "voice");
   whole(m.number, 1, 2147483647, "voice.number");
   text(m.text, 1, 400, "voice.text");
 }
 function checkMessageForm(m) {
   map(m, "message");
-  if (m.do !== "message") fail("message", "message");
+  if (m.do !== undefined && m.do !== "message") fail("message", "message");
   whole(m.number, 1, 2147483647, "message.number");
   text(m.text, 1, 400, "message.text");
 }
 function checkWaitForm(m) {
   map(m, "wait");
-  if (m.do !== "wait") fail("wait", "wait");
+  if (m.do !== undefined && m.do !== "wait") fail("wait", "wait");
   whole(m.number, 1, 2147483647, "wait.number");
   if (m.seconds === undefined || m.seconds === null) m.seconds = null;
   else real(m.seconds, 0, 86400, "wait.seconds");
 }
 function checkArmForm(m) {
   map(m, "arm");
-  if (m.do !== "arm") fail("arm", "arm");
+  if (m.do !== undefined && m.do !== "arm") fail("arm", "arm");
   whole(m.number, 1, 2147483647, "arm.number");
   text(m.program, 1, 40, "arm.program");
   if (m.source === undefined) m.source = "";
@@ -1158,9 +1159,10 @@ function checkJobListForm(m) {
       else if (typeof x === "object" && x !== null && x.do === "wait") {
         checkWaitForm(x);
       }
-      else {
+      else if (typeof x === "object" && x !== null && x.do === "arm") {
         checkArmForm(x);
       }
+      else fail("JobListForm.jobs", "of a kind that is known");
     }
   }
   if (m.places === undefined) m.places = {};
@@ -1209,7 +1211,7 @@ function checkJobForecastForm(m) {
 }
 function checkTasksWire(m) {
   map(m, "tasks");
-  if (m.type !== "tasks") fail("tasks", "tasks");
+  if (m.type !== undefined && m.type !== "tasks") fail("tasks", "tasks");
   if (m.doing === undefined) m.doing = "nothing";
   else word(m.doing, WORDS_8, "tasks.doing");
   if (m.journey === undefined) m.journey = "idle";
@@ -1251,7 +1253,7 @@ function checkTasksWire(m) {
 }
 function checkSeen(m) {
   map(m, "seen");
-  if (m.type !== "seen") fail("seen", "seen");
+  if (m.type !== undefined && m.type !== "seen") fail("seen", "seen");
   real(m.time, -1e12, 1e12, "seen.time");
   if (m.points === undefined) m.points = [];
   else {
@@ -1272,7 +1274,7 @@ function checkSeen(m) {
 }
 function checkPlan(m) {
   map(m, "plan");
-  if (m.type !== "plan") fail("plan", "plan");
+  if (m.type !== undefined && m.type !== "plan") fail("plan", "plan");
   list(m.size, 2, 2, "plan.size");
   real(m.size[0], -1e9, 1e9, "plan.size");
   real(m.size[1], -1e9, 1e9, "plan.size");
