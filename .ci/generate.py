@@ -117,6 +117,10 @@ function map(x, where) {{
   if (typeof x !== "object" || x === null || Array.isArray(x)) fail(where, "a map");
 }}
 """
+LEASED = """
+/** Types of messages that bear the epoch of the lease under which they're sent. */
+export const LEASED = new Set({});
+"""
 TAIL = """
 const told = new Set();
 
@@ -168,7 +172,13 @@ def script(found: Iterable[MessageDescription]) -> str:
     pieces += [_check(part, names) for part in checks]
     rows = "\n".join(f"  [{json.dumps(message.tag)}, {_function(message)}]," for message in coming)
     pieces.append(f"const CHECKS = new Map([\n{rows}\n]);")
+    leased = [message.tag for message in shown if message not in coming and "epoch" in _names(message)]
+    pieces.append(LEASED.format(json.dumps(leased)))
     return "\n".join(pieces) + TAIL.format()
+
+
+def _names(message: MessageDescription) -> set[str]:
+    return {field.name for field in message.fields}
 
 
 def _each(found: Iterable[MessageDescription]) -> list[MessageDescription]:

@@ -1,6 +1,6 @@
 // The page's connection to the server: greeted, followed, kept alive, and made again by itself.
 import { ClockSync, Reader } from "./vrs.js";
-import { decode } from "./protocol.js";
+import { decode, LEASED } from "./protocol.js";
 import { Orders } from "./orders.js";
 import { Wire } from "./wire.js";
 
@@ -15,8 +15,6 @@ const PINGS = 10;
 const KEY = "vrs-session";
 /** A token opens its own role and those below it. */
 const ROLES = ["admin", "operator", "viewer"];
-/** Requests of who has control. */
-const HOLDERS = ["release", "resume", "impair", "task"];
 
 const seconds = () => performance.now() / 1000;
 
@@ -265,7 +263,7 @@ export class Session extends EventTarget {
   /** Ask something of the lease, or of the way to the robot; the request's number, 0 where it couldn't be sent. */
   wish(type, fields = {}) {
     const message = { type, number: ++this.requests, ...fields };
-    if (HOLDERS.includes(type)) message.epoch = this.epoch ?? "1";
+    if (LEASED.has(type)) message.epoch = this.epoch ?? "1";
     const sent = this.send(message);
     if (sent) this.emit("wish", message);
     else if (type !== "survey") this.emit("problem", { code: "lease", text: "There's no connection: nothing was asked." });

@@ -1328,6 +1328,10 @@ const CHECKS = new Map([
   ["seen", checkSeen],
   ["plan", checkPlan],
 ]);
+
+/** Types of messages that bear the epoch of the lease under which they're sent. */
+export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "task"]);
+
 const told = new Set();
 
 /**
