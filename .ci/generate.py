@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+import enum
 import json
 import re
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 from msgspec import inspect as kinds
 
@@ -22,11 +23,11 @@ from interfaces.messages.description import (
     alternatives,
     bounds,
     described,
+    field_texts,
     is_nullable,
     words,
 )
-from interfaces.messages.fields import Sender
-from interfaces.messages.segments import Plain
+from interfaces.messages.fields import Party
 from interfaces.recording.channels import CHANNELS
 from interfaces.stream.codec import WIRES
 
@@ -40,9 +41,8 @@ def messages() -> list[MessageDescription]:
     """The protocol's messages, as JSON has them."""
     found = []
     for value, wire in WIRES.items():
-        kind: Any = wire[Plain] if issubclass(wire, Generic) else wire
         sender: Any = value
-        found.append(described(kind)._replace(sender=sender.sender))
+        found.append(described(wire)._replace(sender=sender.sender))
     return found
 
 
@@ -161,8 +161,8 @@ export function decode(frame, tell = console.warn) {{
 def script(found: Iterable[MessageDescription]) -> str:
     """The module that checks what comes into a page."""
     all_messages = list(found)
-    coming = [m for m in all_messages if m.sender in {Sender.SERVER, Sender.EITHER}]
-    shown = [m for m in all_messages if m.sender not in {Sender.SITE, Sender.ROBOT}]
+    coming = [m for m in all_messages if m.sender in {Party.SERVER, Party.EITHER}]
+    shown = [m for m in all_messages if m.sender not in {Party.SITE, Party.ROBOT}]
     pieces = [HEAD.format(command=COMMAND)]
     pieces += [_typedef(part) for part in _each(shown)]
     checks = _each(coming)
@@ -376,7 +376,7 @@ def _sizes(kind: Any) -> str:
 
 # The documents' tables.
 
-MARKED = re.compile(r"<!-- (fields|messages|roles)(?:: ([\w -]+))? -->\n.*?<!-- end -->", re.S)
+MARKED = re.compile(r"<!-- (fields|messages|roles|words)(?:: ([\w -]+))? -->\n.*?<!-- end -->", re.S)
 
 
 def document(text: str, found: Iterable[MessageDescription]) -> str:
@@ -388,11 +388,15 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
     known = list(found)
     tables = {name: part for part in _each(known) for name in (part.name, part.tag) if name}
     tags = {part.name: part.tag for part in _each(known) if part.tag}
+    choices = {one.cls.__name__: one.cls for part in _each(known) for field in part.fields
+               for one in alternatives(field.type) if isinstance(one, kinds.EnumType)}  # fmt: skip
 
     def table(match: re.Match[str]) -> str:
         what, name = match[1], match[2]
         if what == "roles":
             rows = _roles_table(known)
+        elif what == "words":
+            rows = _words_table(choices[name])
         elif what == "fields":
             rows = _fields_table(name, tables[name], tags)
         else:
@@ -426,10 +430,19 @@ def _told(text: str, tags: dict[str, str]) -> str:
     return re.sub(r"`(\w+)`", lambda match: f"`{tags.get(match[1], match[1])}`", text).removesuffix(".")
 
 
+def _words_table(kind: type[enum.Enum]) -> list[str]:
+    texts = field_texts(kind)
+    return [
+        "| word | |",
+        "|---|---|",
+        *(_row(f"`{one.value}`", _told(texts.get(one.name, ""), {})) for one in kind),
+    ]
+
+
 def _roles_table(known: list[MessageDescription]) -> list[str]:
     rows, before = ["| role | may send |", "|---|---|"], set[str]()
     for role in (Role.VIEWER, Role.OPERATOR, Role.ADMIN):
-        may = [m.tag for m in known if m.tag != "hello" and may_send(role, Sender(m.sender))]
+        may = [m.tag for m in known if m.tag != "hello" and may_send(role, Party(m.sender))]
         new = ", ".join(f"`{tag}`" for tag in may if tag not in before)
         rows.append(f"| `{role}` | {'the same, and ' if before else ''}{new} |")
         before |= set(may)

@@ -19,8 +19,8 @@ from interfaces.messages.fields import (
     Message,
     Name,
     Number,
+    Party,
     Rate,
-    Sender,
     Span,
     Stamp,
     Text,
@@ -38,7 +38,7 @@ from vrs.model import Array, Limits
 class Ping(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
     """An answer at once, please; it also measures the round trip."""
 
-    sender: ClassVar[Sender] = Sender.EITHER
+    sender: ClassVar[Party] = Party.EITHER
     number: Number
     t: Stamp
     """When it left, by the sender's clock [s]."""
@@ -47,7 +47,7 @@ class Ping(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
 class Pong(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
     """The answer to a `Ping`."""
 
-    sender: ClassVar[Sender] = Sender.EITHER
+    sender: ClassVar[Party] = Party.EITHER
     number: Number
     t: Stamp
     """The ping's."""
@@ -86,14 +86,14 @@ class DirectionConditions(Wire, frozen=True, omit_defaults=True, gc=False):
 class Survey(Message, frozen=True, omit_defaults=True, gc=False, tag="survey"):
     """How is the way to the robot? Another answer follows whenever the conditions change."""
 
-    sender: ClassVar[Sender] = Sender.CLIENT
+    sender: ClassVar[Party] = Party.CLIENT
     number: Number
 
 
 class Impair(Leased, frozen=True, omit_defaults=True, gc=False, tag="impair"):
     """Other conditions of the emulated way to the robot, from now on."""
 
-    sender: ClassVar[Sender] = Sender.HOLDER
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     epoch: Epoch
     forward: DirectionConditions | None = None
@@ -105,7 +105,7 @@ class Impair(Leased, frozen=True, omit_defaults=True, gc=False, tag="impair"):
 class Network(Message, frozen=True, omit_defaults=True, gc=False, tag="network"):
     """How the way to the robot is."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     forward: DirectionConditions
     """What is emulated to the robot, as in `Impair`."""
     backward: DirectionConditions
@@ -168,38 +168,38 @@ class Role(enum.StrEnum):
     """The operator's site, at the robot's."""
 
 
-_SENDERS = {
-    Role.VIEWER: {Sender.EITHER, Sender.CLIENT},
-    Role.OPERATOR: {Sender.EITHER, Sender.CLIENT, Sender.OPERATOR, Sender.HOLDER},
-    Role.ADMIN: {Sender.EITHER, Sender.CLIENT, Sender.OPERATOR, Sender.HOLDER, Sender.ADMIN},
-    Role.SITE: {Sender.EITHER, Sender.SITE},
+_PARTIES = {
+    Role.VIEWER: {Party.EITHER, Party.CLIENT},
+    Role.OPERATOR: {Party.EITHER, Party.CLIENT, Party.OPERATOR, Party.HOLDER},
+    Role.ADMIN: {Party.EITHER, Party.CLIENT, Party.OPERATOR, Party.HOLDER, Party.ADMIN},
+    Role.SITE: {Party.EITHER, Party.SITE},
 }
 
 
-def may_send(role: Role, sender: Sender) -> bool:
+def may_send(role: Role, sender: Party) -> bool:
     """Whether a client of a role may send what such a sender sends."""
-    return sender in _SENDERS[role]
+    return sender in _PARTIES[role]
 
 
 class ProblemCode(enum.StrEnum):
     """Why a message wasn't taken, or a connection ends."""
 
     MALFORMED = "malformed"
-    """No msgpack, no JSON, or no map with a type."""
+    """No msgpack or JSON, no map with a `type`, or the wrong kind of frame."""
     UNKNOWN_TYPE = "unknown-type"
     """A type that this version doesn't know."""
     NOT_ALLOWED = "not-allowed"
     """A type that may not come here, or not from this role."""
     OUT_OF_RANGE = "out-of-range"
-    """A field that's missing, of the wrong type, or out of its range."""
+    """A field is missing, of the wrong type, or out of its range; the text says which."""
     TOO_LARGE = "too-large"
-    """Longer than messages may be."""
+    """Longer than messages may be; see below."""
     TOO_FAST = "too-fast"
-    """More messages a second than are looked at."""
+    """More messages a second than are looked at; see below."""
     HELLO_EXPECTED = "hello-expected"
-    """The first message wasn't `Hello`."""
+    """The first message wasn't `hello`."""
     HELLO_LATE = "hello-late"
-    """`Hello` didn't come in time."""
+    """`hello` didn't come in 2 s."""
     VERSION = "version"
     """No common version of the protocol."""
     REFUSED = "refused"
@@ -207,19 +207,19 @@ class ProblemCode(enum.StrEnum):
     FULL = "full"
     """Too many clients."""
     LEASE = "lease"
-    """The lease is held, is ending, or can't be had; the text says which."""
+    """It's held, it's ending, or only an admin may do that; the text says which."""
     STALE_EPOCH = "stale-epoch"
-    """The epoch isn't that of the lease in force."""
+    """The epoch isn't the one in force."""
     STOPPING = "stopping"
     """The server goes."""
     FAILED = "failed"
-    """The server failed at this client's message; nobody else is affected."""
+    """The server failed at this client's message, and closes its connection: connect again."""
 
 
 class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     """Who it is; its first message."""
 
-    sender: ClassVar[Sender] = Sender.CLIENT
+    sender: ClassVar[Party] = Party.CLIENT
     secrets: ClassVar[tuple[str, ...]] = ("token", "session")
     protocol: Number
     """Highest version that the client speaks."""
@@ -240,7 +240,7 @@ class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
 class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
     """Who may command; sent when it changes."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     state: LeaseState
     """`ending`: it's over, and the robot isn't at rest yet; ask again later."""
     epoch: Epoch | None = None
@@ -265,7 +265,7 @@ class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
 class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="welcome"):
     """The client may go on; what there is."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     secrets: ClassVar[tuple[str, ...]] = ("session",)
     protocol: Number
     """Version of the protocol that is spoken."""
@@ -306,7 +306,7 @@ class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
 class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="attached"):
     """Follows the operator's site that said hello; what it is and how it behaves."""
 
-    sender: ClassVar[Sender] = Sender.ROBOT
+    sender: ClassVar[Party] = Party.ROBOT
     protocol: Number
     """Version of the protocol that is spoken."""
 
@@ -335,21 +335,21 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
 class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):
     """The lease, if it's free."""
 
-    sender: ClassVar[Sender] = Sender.OPERATOR
+    sender: ClassVar[Party] = Party.OPERATOR
     number: Number
 
 
 class TakeOver(Message, frozen=True, omit_defaults=True, gc=False, tag="take-over"):
     """The lease, whoever has it; the robot is stopped first."""
 
-    sender: ClassVar[Sender] = Sender.ADMIN
+    sender: ClassVar[Party] = Party.ADMIN
     number: Number
 
 
 class Release(Leased, frozen=True, omit_defaults=True, gc=False, tag="release"):
     """Gives it back; who shares it leaves it, and the robot goes on."""
 
-    sender: ClassVar[Sender] = Sender.HOLDER
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     epoch: Epoch
 
@@ -357,7 +357,7 @@ class Release(Leased, frozen=True, omit_defaults=True, gc=False, tag="release"):
 class Share(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
     """Commands under the lease of that session, too."""
 
-    sender: ClassVar[Sender] = Sender.OPERATOR
+    sender: ClassVar[Party] = Party.OPERATOR
     secrets: ClassVar[tuple[str, ...]] = ("session",)
 
     number: Number
@@ -368,7 +368,7 @@ class Share(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
 class Resume(Leased, frozen=True, omit_defaults=True, gc=False, tag="resume"):
     """The robot goes on after it stopped by itself."""
 
-    sender: ClassVar[Sender] = Sender.HOLDER
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     epoch: Epoch
 
@@ -376,14 +376,14 @@ class Resume(Leased, frozen=True, omit_defaults=True, gc=False, tag="resume"):
 class Beat(Leased, frozen=True, omit_defaults=True, gc=False, tag="beat"):
     """Keeps it; send one every 0.5 s. It expires after `lease_timeout` without beat or order."""
 
-    sender: ClassVar[Sender] = Sender.HOLDER
+    sender: ClassVar[Party] = Party.HOLDER
     epoch: Epoch
 
 
 class Problem(Message, frozen=True, omit_defaults=True, gc=False, tag="problem"):
     """What can't be taken, to its sender."""
 
-    sender: ClassVar[Sender] = Sender.EITHER
+    sender: ClassVar[Party] = Party.EITHER
     code: ProblemCode
     """Why; see below."""
     text: Text
@@ -397,7 +397,7 @@ class Problem(Message, frozen=True, omit_defaults=True, gc=False, tag="problem")
 class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):
     """The real robot as it was last heard of; the newest one counts."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
     """Counts up."""
     t: Time

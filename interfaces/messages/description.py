@@ -11,13 +11,14 @@ import math
 import re
 import sys
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple
 
 import msgspec
 from msgspec import NODEFAULT
 from msgspec import inspect as kinds
 
 from interfaces.messages.fields import CROSSING, plain
+from interfaces.messages.segments import Plain
 from vrs.errors import InvalidValueError
 
 
@@ -78,9 +79,15 @@ def described(kind: Any) -> MessageDescription:
     return _described(kind.cls if isinstance(kind, Described) else kind)
 
 
+def type_of(kind: Any) -> kinds.Type:
+    """The type of a class of messages, with coefficients as JSON has them."""
+    generic = isinstance(kind, type) and issubclass(kind, Generic)
+    return kinds.type_info(kind[Plain] if generic else kind)
+
+
 @cache
 def _described(kind: Any) -> MessageDescription:
-    found = kinds.type_info(kind)
+    found = type_of(kind)
     if not isinstance(found, Described):
         raise InvalidValueError("kind", kind, "a class with fields")
     own: Any = getattr(found.cls, "__origin__", found.cls)
@@ -164,7 +171,7 @@ def _plain_data(value: Any) -> Any:
 
 @cache
 def field_texts(kind: type) -> dict[str, str]:
-    """The docstrings of a class's own fields, each on one line; none where its source isn't known."""
+    """The docstrings of a class's own fields or words, each on one line; none where its source isn't known."""
     return _texts_of(kind.__module__).get(kind.__name__, {})
 
 
@@ -184,5 +191,8 @@ def _texts_of(module: str) -> dict[str, dict[str, str]]:
 def _own_texts(node: ast.ClassDef) -> Any:
     for field, text in zip(node.body, node.body[1:], strict=False):
         match field, text:
-            case ast.AnnAssign(target=ast.Name(name)), ast.Expr(value=ast.Constant(value=str(said))):
+            case (
+                ast.AnnAssign(target=ast.Name(name)) | ast.Assign(targets=[ast.Name(name)]),
+                ast.Expr(value=ast.Constant(value=str(said))),
+            ):
                 yield name, re.sub(r"\s+", " ", said).strip()

@@ -70,7 +70,7 @@ class Epoch(int):
         return super().__new__(cls, number)
 
 
-class Sender(enum.StrEnum):
+class Party(enum.StrEnum):
     """Who sends a message."""
 
     SERVER = "Server"
@@ -93,7 +93,7 @@ class Wire(msgspec.Struct, frozen=True, omit_defaults=True, gc=False):
 class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
     """A message, or a part that has a type."""
 
-    sender: ClassVar[Sender]
+    sender: ClassVar[Party]
     """Who sends it; parts of messages have none."""
     secrets: ClassVar[tuple[str, ...]] = ()
     """Fields that no log may show."""

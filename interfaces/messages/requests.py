@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-from interfaces.messages.fields import Count, Message, Number, Rate, Sender, Time, Word
+from interfaces.messages.fields import Count, Message, Number, Party, Rate, Time, Word
 from vrs.commands import Command, finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
@@ -72,7 +72,7 @@ class Frame:
 class Order:
     """Client: carry out a command. It's sent again until its outcome comes, and carried out once."""
 
-    sender: ClassVar[Sender] = Sender.HOLDER
+    sender: ClassVar[Party] = Party.HOLDER
     kind: ClassVar[str] = "order"
     version: ClassVar[int] = 1
     number: int
@@ -91,7 +91,7 @@ class Order:
 class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
     """g(t). Sent again with the same number, it asks what has become of that frame."""
 
-    sender: ClassVar[Sender] = Sender.CLIENT
+    sender: ClassVar[Party] = Party.CLIENT
     number: Number
     """The client's own, each used once."""
     t: Time | None = None
@@ -106,7 +106,7 @@ class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
 class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
     """The scene, then what follows; one at a time counts, another number replaces it."""
 
-    sender: ClassVar[Sender] = Sender.CLIENT
+    sender: ClassVar[Party] = Party.CLIENT
     number: Number
     form: ViewForm
     """`segments`: the timeline and each edit of it; `frames`: positions."""
@@ -122,7 +122,7 @@ class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
 class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
     """Segments of the scene of that edit, from that one on; without `index` all edits after that one."""
 
-    sender: ClassVar[Sender] = Sender.CLIENT
+    sender: ClassVar[Party] = Party.CLIENT
     edit: Count
     """Of the newest edit that the client has, or of the scene."""
     index: Count | None = None
@@ -133,7 +133,7 @@ class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
 class Outcome:
     """Servlet: what became of an order; again when a later command changed that."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "outcome"
     version: ClassVar[int] = 1
     number: int
@@ -151,7 +151,7 @@ class Outcome:
 class Answer:
     """Servlet: the frame that was asked for, with its status as it is now."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "answer"
     version: ClassVar[int] = 1
     frame: Frame
@@ -177,7 +177,7 @@ class Verdicts:
 class Broadcast:
     """Servlet: the newest frame of a broadcaster, and what became of earlier ones."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "broadcast"
     version: ClassVar[int] = 1
     frame: Frame
@@ -187,7 +187,7 @@ class Broadcast:
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
     """What there is to see, for one who has just come."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
     """Of the `Follow`."""
     robot: Word
@@ -212,7 +212,7 @@ class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="s
 class History:
     """Servlet: a part of the timeline that a `Scene` named."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "history"
     version: ClassVar[int] = 1
     edit: int
@@ -229,7 +229,7 @@ class Change:
     `tail_start`.
     """
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "change"
     version: ClassVar[int] = 1
     base: int
@@ -251,7 +251,7 @@ class Change:
 class Pulse:
     """Servlet: up to `past`, the timeline with this edit is what happened."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "pulse"
     version: ClassVar[int] = 1
     edit: int

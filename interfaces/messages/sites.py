@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Final, NamedTuple
 
-from interfaces.messages.fields import Sender
+from interfaces.messages.fields import Party
 from vrs.commands import Command
 from vrs.ledger import Receipt
 from vrs.model import Array
@@ -55,7 +55,7 @@ class LogEntry:
 class Orders:
     """From the operator's site: entries of the log, or a heartbeat without any."""
 
-    sender: ClassVar[Sender] = Sender.SITE
+    sender: ClassVar[Party] = Party.SITE
     epoch: int
     """Of the control lease."""
     number: int
@@ -96,7 +96,7 @@ class PlanPart:
 class Report:
     """From the robot's site: where it is, and what became of the entries."""
 
-    sender: ClassVar[Sender] = Sender.ROBOT
+    sender: ClassVar[Party] = Party.ROBOT
     epoch: int
     """Epoch that it follows."""
     number: int

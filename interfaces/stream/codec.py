@@ -24,7 +24,7 @@ from interfaces.messages.control import (
     Role,
     may_send,
 )
-from interfaces.messages.fields import LONGEST_TEXT, Sender, check_normal, cut, plain, rich
+from interfaces.messages.fields import LONGEST_TEXT, Party, check_normal, cut, plain, rich
 from interfaces.messages.fields import Message as Wire
 from interfaces.messages.segments import Packed, Plain
 from interfaces.messages.sites import Orders, Report
@@ -58,8 +58,8 @@ Value: TypeAlias = (
 T = TypeVar("T")
 
 
-def _sender(kind: Any) -> Sender:
-    sender: Sender = kind.sender
+def _sender(kind: Any) -> Party:
+    sender: Party = kind.sender
     return sender
 
 
@@ -104,7 +104,7 @@ WIRES: dict[type, type[Wire]] = {
     DriveReport: mobile_wires.DriveReportWire,
 }
 """The wire form of each message."""
-ASKED = frozenset(wire for kind, wire in WIRES.items() if _sender(kind) not in {Sender.SERVER, Sender.ROBOT})
+ASKED = frozenset(wire for kind, wire in WIRES.items() if _sender(kind) not in {Party.SERVER, Party.ROBOT})
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: value for value, kind in WIRES.items()}
 """Messages by the type that stands in them."""

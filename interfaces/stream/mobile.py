@@ -17,7 +17,7 @@ from interfaces.messages.fields import (
     Leased,
     Message,
     Number,
-    Sender,
+    Party,
     Stamp,
     Text,
     Time,
@@ -47,7 +47,7 @@ Doubt = tuple[Variance, Variance, Variance]
 class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
     """The client may go on; what there is."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     secrets: ClassVar[tuple[str, ...]] = ("session",)
     protocol: Number
     """Version of the protocol that is spoken."""
@@ -83,7 +83,7 @@ class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mob
 class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"):
     """Where both robots are; the newest one counts."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
     """Counts up."""
     now: Time
@@ -141,7 +141,7 @@ Wanted: TypeAlias = Go | Load | ListCommand | Trial
 class TaskOrder:
     """Holder: let the robot do something by itself. The answer is a `Tasks` or a `Problem`."""
 
-    sender: ClassVar[Sender] = Sender.HOLDER
+    sender: ClassVar[Party] = Party.HOLDER
     kind: ClassVar[str] = "task"
     version: ClassVar[int] = 1
     number: int
@@ -153,7 +153,7 @@ class TaskOrder:
 class Tasks:
     """Server: what the robot does by itself, and the list of jobs; the newest one counts."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     kind: ClassVar[str] = "tasks"
     version: ClassVar[int] = 1
     doing: Doing = Doing.NOTHING
@@ -184,7 +184,7 @@ class Tasks:
 class Seen(Message, frozen=True, omit_defaults=True, gc=False, tag="seen"):
     """What the robot sees of its surroundings; the newest one counts."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     time: Stamp
     """By the robot's own clock [s]."""
     points: Points = ()
@@ -196,7 +196,7 @@ class Seen(Message, frozen=True, omit_defaults=True, gc=False, tag="seen"):
 class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
     """The known map of where the robot drives."""
 
-    sender: ClassVar[Sender] = Sender.SERVER
+    sender: ClassVar[Party] = Party.SERVER
     size: PointRow
     """Length and width of the floor [m]."""
     things: Annotated[tuple[Outline, ...], Meta(max_length=MOST_THINGS)] = ()

@@ -11,7 +11,7 @@ from typing import ClassVar, Final, TypeAlias
 
 from interfaces.jobs.runner import ListCommand, Load
 from interfaces.jobs.values import OperatorLoss, Progress
-from interfaces.messages.fields import Sender
+from interfaces.messages.fields import Party
 from interfaces.teleop.architectures.sites import ArchitectureReport, ArcPacket
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
@@ -113,7 +113,7 @@ class DriveOrders:
     its arcs count from when it began.
     """
 
-    sender: ClassVar[Sender] = Sender.SITE
+    sender: ClassVar[Party] = Party.SITE
     epoch: int
     """Of the operator's site, from 1."""
     number: int
@@ -134,7 +134,7 @@ class DriveOrders:
 class DriveReport:
     """From the robot's site: where it takes itself to be, and what it does."""
 
-    sender: ClassVar[Sender] = Sender.ROBOT
+    sender: ClassVar[Party] = Party.ROBOT
     epoch: int
     """Epoch that it follows."""
     number: int

@@ -9,16 +9,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 from types import ModuleType
-from typing import Any, Generic
+from typing import Any
 
 import msgspec
 import pytest
 
 from interfaces.messages import control
 from interfaces.messages.control import Role
-from interfaces.messages.description import described
-from interfaces.messages.fields import Sender
-from interfaces.messages.segments import Plain
+from interfaces.messages.description import described, type_of
+from interfaces.messages.fields import Party
 from interfaces.recording.channels import CHANNELS, RecordingChannel
 from interfaces.stream import Encoding, codec, decode, encode
 from interfaces.stream.codec import TYPES, WIRES, sent_by
@@ -85,7 +84,7 @@ def test_what_is_stale_is_named_with_the_command_that_mends_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert generate.main(["--check"]) == 0
-    monkeypatch.setattr(control.State, "sender", Sender.ROBOT)
+    monkeypatch.setattr(control.State, "sender", Party.ROBOT)
     assert generate.main(["--check"]) == 1
     told = capsys.readouterr().out
     assert "interfaces/stream/static/protocol.js" in told
@@ -184,6 +183,15 @@ def test_a_field_that_is_added_is_in_the_documents_table(newer: Any) -> None:
     assert "| `warmth` | real from −50 to 150 (20) | Of the motors [°C] |" in stored
 
 
+def test_a_documents_tables_say_who_may_send_what_and_what_words_mean() -> None:
+    text = "<!-- roles -->\n<!-- end -->\n<!-- words: ProblemCode -->\n<!-- end -->"
+    found = generate.document(text, generate.messages())
+    assert "\n| `admin` | the same, and `take-over` |\n<!-- end -->" in found
+    assert "\n| `version` | No common version of the protocol |\n" in found
+    with pytest.raises(KeyError, match="warp"):
+        generate.document("<!-- fields: warp -->\n<!-- end -->", generate.messages())
+
+
 def test_a_field_that_is_added_is_drawn(newer: Any) -> None:
     drawn = [plain(newer.State, Random(seed)).get("warmth") for seed in range(40)]
     assert None in drawn
@@ -212,8 +220,8 @@ def full(message: Any) -> Any:
 
 def read(frame: str) -> Any:
     """A frame as the codec's own types have it."""
-    kind: Any = WIRES[TYPES[json.loads(frame)["type"]]]
-    return msgspec.json.decode(frame, type=kind[Plain] if issubclass(kind, Generic) else kind, dec_hook=codec.rich)
+    kind: Any = type_of(WIRES[TYPES[json.loads(frame)["type"]]])
+    return msgspec.json.decode(frame, type=kind.cls, dec_hook=codec.rich)
 
 
 COMING = [
@@ -301,7 +309,7 @@ def test_what_cant_be_taken_is_said_once_and_harms_nothing(browser: Any) -> None
 
 
 def test_roles_and_what_a_server_takes_follow_from_the_messages() -> None:
-    assert {kind.sender for kind in WIRES} <= set(Sender)  # type: ignore[attr-defined]
+    assert {kind.sender for kind in WIRES} <= set(Party)  # type: ignore[attr-defined]
     may = {role: {kind for kind in WIRES if kind in sent_by(role).__args__} for role in Role}
     assert may[Role.VIEWER] < may[Role.OPERATOR] < may[Role.ADMIN]
     assert may[Role.ADMIN] - may[Role.OPERATOR] == {control.TakeOver}

@@ -10,15 +10,14 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from random import Random
-from typing import Any, Generic
+from typing import Any
 
 import msgspec
 import numpy as np
 from hypothesis import strategies as st
 from msgspec import inspect as kinds
 
-from interfaces.messages.description import Described, alternatives, bounds, described, is_nullable, words
-from interfaces.messages.segments import Plain
+from interfaces.messages.description import Described, alternatives, bounds, described, is_nullable, type_of, words
 from interfaces.stream import Encoding, decode
 from interfaces.stream.codec import WIRES
 
@@ -30,8 +29,7 @@ LONGEST = 1 << 22
 
 def plain(kind: type, random: Random) -> dict[str, Any]:
     """A message of a kind, as JSON has it, drawn."""
-    wire: Any = WIRES[kind]
-    found: dict[str, Any] = _fields(kinds.type_info(wire[Plain] if issubclass(wire, Generic) else wire), random)
+    found: dict[str, Any] = _fields(type_of(WIRES[kind]), random)
     return found
 
 
@@ -232,8 +230,7 @@ def edges() -> tuple[Any, ...]:
     """What is at the edge of some field's range, and just beyond."""
     found: dict[str, Any] = {}
     for wire in WIRES.values():
-        kind: Any = wire
-        for one in _inner(kinds.type_info(kind[Plain] if issubclass(kind, Generic) else kind)):
+        for one in _inner(type_of(wire)):
             found |= {repr(value): value for value in _edges(one)}
     return tuple(found.values())
 
