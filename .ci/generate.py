@@ -402,7 +402,8 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         else:
             rows = _messages_table([tables[one] for one in name.split()], tags)
         head = f"<!-- {what}{f': {name}' if name else ''} -->"
-        return "\n".join([head, *rows, "<!-- end -->"])
+        # A table is one to Markdown between blank lines.
+        return "\n".join([head, "", *rows, "", "<!-- end -->"])
 
     return MARKED.sub(table, text)
 

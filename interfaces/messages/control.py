@@ -222,7 +222,7 @@ class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     sender: ClassVar[Party] = Party.CLIENT
     secrets: ClassVar[tuple[str, ...]] = ("token", "session")
     protocol: Number
-    """Highest version that the client speaks."""
+    """Highest version that the client speaks: 1."""
 
     role: Role
     """What it wants to do; `site` is for sites."""

@@ -292,7 +292,7 @@ function map(x, where) {
  * Client: Who it is; its first message.
  * @typedef {object} Hello
  * @property {"hello"} type
- * @property {number} protocol number. Highest version that the client speaks.
+ * @property {number} protocol number. Highest version that the client speaks: 1.
  * @property {"viewer"|"operator"|"admin"|"site"} role `viewer`, `operator`, `admin`, `site`. What it wants to do; `site` is for sites.
  * @property {string} name text of 1 to 100 characters. For people.
  * @property {string|null} [token] text of up to 200 characters (absent). Of the role. Needed off loopback, and always for `admin`.

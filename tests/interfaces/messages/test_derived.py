@@ -174,9 +174,9 @@ def test_a_field_that_is_added_is_checked_in_the_page(newer: Any, browser: Any) 
 def test_a_field_that_is_added_is_in_the_documents_table(newer: Any) -> None:
     text = "before\n<!-- fields: state -->\nold\n<!-- end -->\nafter"
     found = generate.document(text, generate.messages())
-    assert found.startswith("before\n<!-- fields: state -->\n| `state` | | |\n")
+    assert found.startswith("before\n<!-- fields: state -->\n\n| `state` | | |\n")
     assert (
-        "\n| `warmth` | real from −50 to 150 (20) | Of the motors, as `hello` has it [°C] |\n<!-- end -->\nafter"
+        "\n| `warmth` | real from −50 to 150 (20) | Of the motors, as `hello` has it [°C] |\n\n<!-- end -->\nafter"
         in found
     )
     stored = generate.document("<!-- fields: Event -->\n<!-- end -->", [described(newer.Event)])
@@ -186,7 +186,7 @@ def test_a_field_that_is_added_is_in_the_documents_table(newer: Any) -> None:
 def test_a_documents_tables_say_who_may_send_what_and_what_words_mean() -> None:
     text = "<!-- roles -->\n<!-- end -->\n<!-- words: ProblemCode -->\n<!-- end -->"
     found = generate.document(text, generate.messages())
-    assert "\n| `admin` | the same, and `take-over` |\n<!-- end -->" in found
+    assert "\n| `admin` | the same, and `take-over` |\n\n<!-- end -->" in found
     assert "\n| `version` | No common version of the protocol |\n" in found
     with pytest.raises(KeyError, match="warp"):
         generate.document("<!-- fields: warp -->\n<!-- end -->", generate.messages())
