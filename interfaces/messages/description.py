@@ -125,14 +125,14 @@ def is_nullable(kind: kinds.Type) -> bool:
 
 
 def alternatives(kind: kinds.Type) -> tuple[kinds.Type, ...]:
-    """What may stand in a place, as it crosses, null left out.
+    """What may stand in a place, as it crosses in JSON, null and the bytes of msgpack left out.
 
     Raises:
         InvalidValueError: If nothing says how it crosses.
     """
     if isinstance(kind, kinds.UnionType):
         return tuple(one for part in kind.types for one in alternatives(part))
-    if isinstance(kind, kinds.NoneType):
+    if isinstance(kind, kinds.NoneType | kinds.BytesType):
         return ()
     if isinstance(kind, kinds.Metadata):
         return alternatives(kind.type)
