@@ -6,7 +6,7 @@ DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test contract lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test contract generate lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
@@ -18,9 +18,14 @@ test: $(DEV_STAMP) lint types
 contract: $(DEV_STAMP)
 	VRS_CONTRACT_SLOW=1 $(PY) -m pytest -n 2 --no-loadscope-reorder --durations=5 tests/contract
 
+# What is derived from the definitions of messages: the script that checks them in pages, the documents' tables.
+generate: $(STAMP)
+	$(PY) .ci/generate.py
+
 lint: $(DEV_STAMP)
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
+	$(PY) .ci/generate.py --check
 
 types: $(DEV_STAMP)
 	.venv/bin/mypy

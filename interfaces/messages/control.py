@@ -19,6 +19,7 @@ from interfaces.messages.fields import (
     Message,
     Name,
     Number,
+    Party,
     Rate,
     Span,
     Stamp,
@@ -35,16 +36,18 @@ from vrs.model import Array, Limits
 
 
 class Ping(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
-    """Either side: an answer at once, please; it also measures the round trip."""
+    """An answer at once, please; it also measures the round trip."""
 
+    sender: ClassVar[Party] = Party.EITHER
     number: Number
     t: Stamp
     """When it left, by the sender's clock [s]."""
 
 
 class Pong(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
-    """Either side: the answer to a `Ping`."""
+    """The answer to a `Ping`."""
 
+    sender: ClassVar[Party] = Party.EITHER
     number: Number
     t: Stamp
     """The ping's."""
@@ -58,15 +61,15 @@ class LinkFigures(Wire, frozen=True, omit_defaults=True, gc=False):
     """Sums over the newest packets."""
 
     packets: Count = 0
-    """So many were sent, those that are still under way among them."""
+    """Sent in the last `span`, those still under way among them."""
     lost: fields.Share | None = None
-    """Share of them that was lost; None of none."""
+    """Share of them; absent: nothing is known."""
     median: Span | None = None
-    """Of the time between sending and delivery of those that arrived [s]; None where none did."""
+    """Delay of those that arrived [s]."""
     p95: Span | None = None
     """Delay that 95 % of those kept within [s]."""
     span: Span | None = None
-    """Over how long they were sent, up to now [s]; None where that isn't known."""
+    """How long they were sent, up to now [s]."""
 
 
 class DirectionConditions(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -81,47 +84,52 @@ class DirectionConditions(Wire, frozen=True, omit_defaults=True, gc=False):
 
 
 class Survey(Message, frozen=True, omit_defaults=True, gc=False, tag="survey"):
-    """Client: how is the way to the robot? Changes of it are told from then on."""
+    """How is the way to the robot? Another answer follows whenever the conditions change."""
 
+    sender: ClassVar[Party] = Party.CLIENT
     number: Number
 
 
 class Impair(Leased, frozen=True, omit_defaults=True, gc=False, tag="impair"):
-    """Holder: other conditions of the emulated way to the robot, from now on."""
+    """Other conditions of the emulated way to the robot, from now on."""
 
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     epoch: Epoch
     forward: DirectionConditions | None = None
-    """To the robot; None leaves them as they are."""
+    """To the robot; absent: as it is."""
     backward: DirectionConditions | None = None
-    """Back."""
+    """Back, the same."""
 
 
 class Network(Message, frozen=True, omit_defaults=True, gc=False, tag="network"):
-    """Server: how the way to the robot is."""
+    """How the way to the robot is."""
 
+    sender: ClassVar[Party] = Party.SERVER
     forward: DirectionConditions
-    """What is emulated to the robot."""
+    """What is emulated to the robot, as in `Impair`."""
     backward: DirectionConditions
     """What is emulated back."""
     there: LinkFigures
-    """What was measured of the emulation to the robot, since it changed last."""
+    """What it did to the packets of the last 30 s, since it changed: `packets` sent in the last `span` [s], those
+    still under way among them; `lost`: share of them; `median`, `p95`: delay of those that arrived [s]. Absent
+    where nothing is known."""
     back: LinkFigures
     """The same of the way back."""
     round_trip: LinkFigures
-    """Of whole round trips between the sites, with the network beneath; nothing is known of losses."""
+    """The same, without `lost` and `span`, of round trips between the sites with the network beneath."""
     seed: Count = 0
     """Of what is random in the emulation."""
     changed_at: Time | None = None
-    """Session time when the conditions changed last [s]; None if they never did."""
+    """Session time of the last change [s]; absent: there was none."""
     changed_by: Word = ""
-    """Name of who changed them."""
+    """Name of who made it."""
     robot: Word = ""
     """Where the robot's site is."""
     problem: Text = ""
-    """Why there's no connection to it; empty while there is one."""
+    """Why there's no connection to it."""
     clock: Span | None = None
-    """Bound on the error of what the robot takes for session time [s]."""
+    """By how much the robot may err about session time [s]."""
     link_loss: Word = ""
     """What the robot does when nothing is heard, `halt` or `hold`; empty while that isn't known."""
     timeout: Span | None = None
@@ -129,7 +137,7 @@ class Network(Message, frozen=True, omit_defaults=True, gc=False, tag="network")
     max_age: Span | None = None
     """Older messages don't count under `halt` [s]."""
     offset: Time | None = None
-    """D, where it's fixed [s]; None where it adapts, or isn't known."""
+    """D, where it's fixed [s]; absent: it adapts, or isn't known."""
     advice: Text = ""
     """What is likely to go wrong under these conditions, for people."""
     answers: Number | None = None
@@ -160,25 +168,38 @@ class Role(enum.StrEnum):
     """The operator's site, at the robot's."""
 
 
+_PARTIES = {
+    Role.VIEWER: {Party.EITHER, Party.CLIENT},
+    Role.OPERATOR: {Party.EITHER, Party.CLIENT, Party.OPERATOR, Party.HOLDER},
+    Role.ADMIN: {Party.EITHER, Party.CLIENT, Party.OPERATOR, Party.HOLDER, Party.ADMIN},
+    Role.SITE: {Party.EITHER, Party.SITE},
+}
+
+
+def may_send(role: Role, sender: Party) -> bool:
+    """Whether a client of a role may send what such a sender sends."""
+    return sender in _PARTIES[role]
+
+
 class ProblemCode(enum.StrEnum):
     """Why a message wasn't taken, or a connection ends."""
 
     MALFORMED = "malformed"
-    """No msgpack, no JSON, or no map with a type."""
+    """No msgpack or JSON, no map with a `type`, or the wrong kind of frame."""
     UNKNOWN_TYPE = "unknown-type"
     """A type that this version doesn't know."""
     NOT_ALLOWED = "not-allowed"
     """A type that may not come here, or not from this role."""
     OUT_OF_RANGE = "out-of-range"
-    """A field that's missing, of the wrong type, or out of its range."""
+    """A field is missing, of the wrong type, or out of its range; the text says which."""
     TOO_LARGE = "too-large"
-    """Longer than messages may be."""
+    """Longer than messages may be; see below."""
     TOO_FAST = "too-fast"
-    """More messages a second than are looked at."""
+    """More messages a second than are looked at; see below."""
     HELLO_EXPECTED = "hello-expected"
-    """The first message wasn't `Hello`."""
+    """The first message wasn't `hello`."""
     HELLO_LATE = "hello-late"
-    """`Hello` didn't come in time."""
+    """`hello` didn't come in 2 s."""
     VERSION = "version"
     """No common version of the protocol."""
     REFUSED = "refused"
@@ -186,47 +207,52 @@ class ProblemCode(enum.StrEnum):
     FULL = "full"
     """Too many clients."""
     LEASE = "lease"
-    """The lease is held, is ending, or can't be had; the text says which."""
+    """It's held, it's ending, or only an admin may do that; the text says which."""
     STALE_EPOCH = "stale-epoch"
-    """The epoch isn't that of the lease in force."""
+    """The epoch isn't the one in force."""
     STOPPING = "stopping"
     """The server goes."""
     FAILED = "failed"
-    """The server failed at this client's message; nobody else is affected."""
+    """The server failed at this client's message, and closes its connection: connect again."""
 
 
 class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
-    """Client: who it is; its first message."""
+    """Who it is; its first message."""
 
+    sender: ClassVar[Party] = Party.CLIENT
     secrets: ClassVar[tuple[str, ...]] = ("token", "session")
     protocol: Number
-    """Highest version that it speaks."""
+    """Highest version that the client speaks: 1."""
 
     role: Role
+    """What it wants to do; `site` is for sites."""
     name: Name
-    """For people, 1 to 100 characters."""
+    """For people."""
     token: Word | None = None
+    """Of the role. Needed off loopback, and always for `admin`."""
     session: Word | None = None
-    """An earlier session of this client, to go on with."""
+    """Of an earlier `Welcome`, to go on with it."""
     link_loss: Word | None = None
-    """Of an operator's site: what the robot is to do when nothing is heard, `halt` or `hold`; None leaves it to the
-    robot."""
+    """Of an operator's site: what the robot is to do when nothing fresh is heard, `halt` or `hold`; absent: the
+    robot's own."""
 
 
 class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
-    """Server: who may command; sent when it changes."""
+    """Who may command; sent when it changes."""
 
+    sender: ClassVar[Party] = Party.SERVER
     state: LeaseState
+    """`ending`: it's over, and the robot isn't at rest yet; ask again later."""
     epoch: Epoch | None = None
-    """Of the lease in force; told to its holder only, and to those who share it."""
+    """Of the lease in force; told to the holder, and to who shares it."""
     holder: Name | None = None
-    """Name of who has it."""
+    """Name of the holder."""
     yours: bool = False
-    """Whether the receiver has it, and keeps it."""
+    """Whether the receiver holds it."""
     answers: Number | None = None
     """Number of the receiver's request that this answers."""
     ended: LeaseEnd | None = None
-    """How the lease before ended; None if there was none."""
+    """How the one before ended; absent: there was none."""
     shared: bool = False
     """Whether the receiver shares it: it commands under the epoch, but doesn't keep it."""
 
@@ -237,33 +263,37 @@ class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
 
 
 class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="welcome"):
-    """Server: the client may go on; what there is."""
+    """The client may go on; what there is."""
 
+    sender: ClassVar[Party] = Party.SERVER
     secrets: ClassVar[tuple[str, ...]] = ("session",)
     protocol: Number
     """Version of the protocol that is spoken."""
 
     session: Word
-    """Names this session, for a later `Hello`; nobody else may know it."""
+    """Secret: names this session, for a later `Hello`."""
     role: Role
+    """What the client may do."""
     robot: Word
-    """Name of the robot's model."""
+    """Name of its model."""
     dof: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
     """Its joints, n."""
     limits: Limits
+    """Position [rad], speed, acceleration, jerk [rad/s, /s², /s³]."""
     poses: Poses
-    """Named poses, joints [rad], (n,)."""
+    """Named joint values [rad]."""
     now: Time
-    """Session time [s]."""
+    """Session time when this was sent [s]."""
     lease: Lease
+    """As it is now."""
     lease_timeout: Timeout
-    """A lease expires so long after the last beat [s]."""
+    """It expires so long after the last beat or order [s]."""
     rates: Annotated[tuple[Rate, ...], Meta(max_length=100)] = ()
-    """Rates of the broadcasters [1/s]."""
+    """Rates at which frames are broadcast [1/s]."""
     resumed: bool = False
     """Whether the session that was asked for goes on."""
     instance: Word = ""
-    """Names this run of the server; with another one, there's another timeline."""
+    """Names this run of the server; with another one the timeline is another: forget all."""
     server: Word = ""
     """Name and version of the program."""
 
@@ -274,27 +304,28 @@ class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
 
 
 class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="attached"):
-    """Robot: follows the operator's site that said hello; what it is and how it behaves."""
+    """Follows the operator's site that said hello; what it is and how it behaves."""
 
+    sender: ClassVar[Party] = Party.ROBOT
     protocol: Number
     """Version of the protocol that is spoken."""
 
     robot: Word
     """Name of the robot's model."""
     q: Array
-    """Measured joints [rad], (n,); of a mobile robot its posture, x, y, θ [m, m, rad]."""
+    """Measured joints [rad]; of a mobile robot its posture, x, y, θ [m, m, rad]."""
     link_loss: Word
-    """What it does when nothing is heard: `halt` or `hold`."""
+    """What it does when nothing is heard, `halt` or `hold`."""
     timeout: Timeout
     """So long after the last message that counts it begins to stop under `halt` [s]."""
     offset: Time | None = None
-    """The robot's timeline less the session's time, where it's fixed [s]; None where it adapts."""
+    """The robot's timeline less session time [s]; absent: it adapts."""
     instance: Word = ""
     """Names this run of the robot's site."""
     server: Word = ""
     """Name and version of the program."""
     max_age: Timeout | None = None
-    """Older messages don't count under `halt` [s]; None where that isn't known, or under `hold`."""
+    """Older messages don't count under `halt` [s]; absent: not known, or `hold`."""
     architecture: Word = ""
     """Of a mobile robot: what it does with the operator's path, by name."""
     room: Word = ""
@@ -302,27 +333,31 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
 
 
 class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):
-    """Client: the lease, please, if it's free."""
+    """The lease, if it's free."""
 
+    sender: ClassVar[Party] = Party.OPERATOR
     number: Number
 
 
 class TakeOver(Message, frozen=True, omit_defaults=True, gc=False, tag="take-over"):
-    """Admin: the lease, please, whoever has it. The robot stops in between."""
+    """The lease, whoever has it; the robot is stopped first."""
 
+    sender: ClassVar[Party] = Party.ADMIN
     number: Number
 
 
 class Release(Leased, frozen=True, omit_defaults=True, gc=False, tag="release"):
-    """Holder: gives the lease back."""
+    """Gives it back; who shares it leaves it, and the robot goes on."""
 
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     epoch: Epoch
 
 
 class Share(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
-    """Client: the epoch of the lease that a session of the same person has, please."""
+    """Commands under the lease of that session, too."""
 
+    sender: ClassVar[Party] = Party.OPERATOR
     secrets: ClassVar[tuple[str, ...]] = ("session",)
 
     number: Number
@@ -331,63 +366,71 @@ class Share(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
 
 
 class Resume(Leased, frozen=True, omit_defaults=True, gc=False, tag="resume"):
-    """Holder: the robot may go on after it stopped by itself."""
+    """The robot goes on after it stopped by itself."""
 
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     epoch: Epoch
 
 
 class Beat(Leased, frozen=True, omit_defaults=True, gc=False, tag="beat"):
-    """Holder: is still there."""
+    """Keeps it; send one every 0.5 s. It expires after `lease_timeout` without beat or order."""
 
+    sender: ClassVar[Party] = Party.HOLDER
     epoch: Epoch
 
 
 class Problem(Message, frozen=True, omit_defaults=True, gc=False, tag="problem"):
-    """Either side: what can't be taken, to its sender."""
+    """What can't be taken, to its sender."""
 
+    sender: ClassVar[Party] = Party.EITHER
     code: ProblemCode
+    """Why; see below."""
     text: Text
     """For people."""
     number: Number | None = None
-    """Number of what it's about, where that's known."""
+    """Of what it's about, where that's known."""
     fatal: bool = False
     """Whether the connection ends."""
 
 
 class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):
-    """Server: the real robot as it was last heard of; the newest one counts."""
+    """The real robot as it was last heard of; the newest one counts."""
 
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
+    """Counts up."""
     t: Time
-    """Session time when it was measured [s]."""
+    """Session time of the measurement [s]."""
     q: Array
-    """Measured joints [rad], (n,)."""
+    """Measured joints [rad]."""
     play: Time
-    """Time on the robot's timeline that it plays [s]."""
+    """Time on the timeline that it plays [s]."""
     pace: Value
-    """How fast it plays; 1 is as planned."""
+    """How fast; 1: as planned, 0: it waits."""
     D: Time
     """The robot's timeline less session time [s]."""
     following_error: Value
-    """Largest difference of a joint from its reference [rad]."""
+    """Largest deviation of a joint from its reference [rad]."""
     epoch: Epoch | None = None
-    """That it follows; None for none."""
+    """Of the lease that it follows; absent: none."""
     connected: bool = True
-    """Whether the robot's site is heard of."""
+    """Whether the robot is heard of."""
     halted: Text = ""
-    """Why it stopped by itself; empty while it follows."""
+    """Why it stopped by itself: it takes no command until the holder sends `Resume`, once it's at rest."""
     corrections: Count = 0
     """How often the virtual robot was put where the real one goes."""
     reference: Array | None = None
-    """What the robot's own timeline asked for at t [rad], (n,); None where it hasn't said."""
+    """What the robot's own timeline asked for at `t` [rad]; absent: it hasn't said. Equal to the virtual robot at
+    `play` unless the two plans have parted."""
     round_trip: Value | None = None
-    """Newest time that a message to the robot and the answer were under way [s]; None before the first."""
+    """Newest time that a message to the robot and the answer were under way, what the robot took in between left
+    out [s]; absent before the first."""
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
-    """Messages to the robot of which the emulated link told since the state before: when each was sent, and when it
-    arrived [s]; None for one that was lost."""
+    """[sent, arrived]: messages to the robot that the emulated link has delivered or lost (null) since the state
+    before, session time [s]. What the real network adds isn't in it."""
     late: Annotated[tuple[tuple[Time, Array], ...], Meta(max_length=MOST_LATE)] = ()
-    """Measurements that came late: session time [s], and joints [rad], (n,). Some are told twice."""
+    """[t, joints]: measurements that came after later ones, one of six; each for 0.2 s, so some come twice."""
 
 
 Question: TypeAlias = (

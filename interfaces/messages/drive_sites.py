@@ -8,7 +8,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 import msgspec
 from msgspec import Meta
@@ -21,6 +21,7 @@ from interfaces.messages.fields import (
     Epoch,
     Leased,
     Number,
+    Party,
     Points,
     Seconds,
     Stamp,
@@ -176,6 +177,7 @@ class DriveOrders(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     its arcs count from when it began.
     """
 
+    sender: ClassVar[Party] = Party.SITE
     epoch: Epoch
     """Of the operator's site, from 1."""
     number: Number
@@ -227,6 +229,7 @@ class ArchitectureReport(Wire, frozen=True, omit_defaults=True, gc=False):
 class DriveReport(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-report"):
     """From the robot's site: where it takes itself to be, and what it does."""
 
+    sender: ClassVar[Party] = Party.ROBOT
     epoch: Epoch | None
     """Epoch that it follows; None before the first."""
     number: Number

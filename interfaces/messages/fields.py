@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import enum
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Annotated, Any, ClassVar, Self
 
@@ -71,11 +72,31 @@ class Epoch(int):
         return super().__new__(cls, number)
 
 
+class Party(enum.StrEnum):
+    """Who sends a message."""
+
+    SERVER = "Server"
+    CLIENT = "Client"
+    """Any client, whatever its role."""
+    OPERATOR = "Operator"
+    """A client that may have the lease."""
+    HOLDER = "Holder"
+    """One that has it, or shares it."""
+    ADMIN = "Admin"
+    EITHER = "Either side"
+    SITE = "Operator's site"
+    ROBOT = "Robot's site"
+
+
 class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
     """A message, or a part that has a type."""
 
+    sender: ClassVar[Party]
+    """Who sends it; parts of messages have none."""
     secrets: ClassVar[tuple[str, ...]] = ()
     """Fields that no log may show."""
+    absent: ClassVar[Mapping[str, str]] = {}
+    """What a field stands for that is left out, computed of others, as in `edit - 1`; defaults need no word."""
 
     @property
     def kind(self) -> str:
@@ -169,16 +190,19 @@ def _numbers(value: Any, least: int, most: int, largest: float) -> list[float]:
     return value
 
 
+_Row = Annotated[list[Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]], Meta(min_length=4, max_length=4)]
+CROSSING: Mapping[type, Any] = {
+    np.ndarray: Joints,
+    Twist: Annotated[list[Value], Meta(min_length=6, max_length=6)],
+    Pose: Annotated[list[_Row], Meta(min_length=4, max_length=4)],
+    Epoch: Annotated[str, Meta(pattern=r"\A[1-9][0-9]{0,19}\Z")],
+}
+"""What stands on the wire for what msgspec doesn't know, as `plain` writes and `rich` reads it."""
+
+
 def json_schema(kind: Any) -> dict[str, Any]:
     """JSON Schema of what crosses by hooks."""
-    if kind is Epoch:
-        return {"type": "string", "pattern": _DIGITS.pattern}
-    number = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
-    if kind is Pose:
-        row = {"type": "array", "items": number, "minItems": 4, "maxItems": 4}
-        return {"type": "array", "items": row, "minItems": 4, "maxItems": 4}
-    least, most = (6, 6) if kind is Twist else (1, MOST_JOINTS)
-    return {"type": "array", "items": number, "minItems": least, "maxItems": most}
+    return msgspec.json.schema(CROSSING[kind])
 
 
 def epoch_of(digits: object) -> Epoch:

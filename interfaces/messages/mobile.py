@@ -17,6 +17,7 @@ from interfaces.messages.fields import (
     Leased,
     Message,
     Number,
+    Party,
     PointRow,
     Points,
     Text,
@@ -40,83 +41,91 @@ Positive = Annotated[float, Meta(gt=0, le=1e9)]
 
 
 class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
-    """Server: the client may go on; what there is."""
+    """The client may go on; what there is."""
 
+    sender: ClassVar[Party] = Party.SERVER
     secrets: ClassVar[tuple[str, ...]] = ("session",)
     protocol: Number
     """Version of the protocol that is spoken."""
 
     session: Word
-    """Names this session, for a later `Hello`; nobody else may know it."""
+    """Secret: names this session, for a later `Hello`."""
     role: Role
+    """What the client may do."""
     robot: Word
     """Name of the robot's model."""
     limits: DriveLimits
-    """Of what it may be asked."""
+    """`v_max` [m/s], `w_max` [rad/s], `a_max` [m/s²], `alpha_max` [rad/s²]."""
     period: Positive
-    """T: time between two commands of the virtual robot [s]."""
+    """T: the virtual robot takes a command so often [s]."""
     holds: Positive
-    """A drive order counts for so long after it was issued [s]."""
+    """A `drive` order counts for so long after it was issued [s]."""
     now: Time
     """Session time [s]."""
     lease: Lease
+    """As it is now."""
     lease_timeout: Timeout
-    """A lease expires so long after the last beat [s]."""
+    """It expires so long after the last beat or order [s]."""
     resumed: bool = False
     """Whether the session that was asked for goes on."""
     instance: Word = ""
-    """Names this run of the server."""
+    """Names this run of the server; with another one forget all."""
     server: Word = ""
     """Name and version of the program."""
     room: Word = ""
-    """Where it drives, for people."""
+    """Name of the room."""
 
 
 class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"):
-    """Server: where both robots are; the newest one counts."""
+    """Where both robots are; the newest one counts."""
 
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
+    """Counts up."""
     now: Time
     """Session time when it was made [s]."""
     virtual: Posture
-    """Of the virtual robot, now."""
+    """Of the virtual robot, now [m, m, rad]."""
     command: Drive
-    """What it drives."""
+    """What it drives [m/s, rad/s]."""
     estimate: Posture
-    """Where the real robot is thought to come to with all commands so far. Source: Han et al., eq. (8)–(10)."""
+    """Where the real robot is thought to come to with all commands so far (the posture estimator). Source: Han et
+    al., eq. (8)–(10)."""
     t: Time | None = None
-    """When the real robot was measured [s]; None before the first report, as all that follows."""
+    """Session time of the newest measurement [s]; absent before the first, as the next two."""
     real: Posture | None = None
-    """Where it took itself to be."""
+    """Where the real robot took itself to be."""
     drive: Drive | None = None
     """What its motors are told."""
     D: Time | None = None
-    """The time of the operator's path that it's to play less his clock, as the robot takes it to be, without what
-    braking needs: negative [s]; None where its architecture has none."""
+    """The time of the path that it's to play less session time, by the clock as the robot has it, without what
+    braking needs [s]; absent where its architecture has none."""
     starved: bool = False
-    """Whether it's slower than it should be, as nothing newer is known there."""
+    """Whether it's slower than it should be, as it knows nothing newer."""
     path_error: Distance | None = None
-    """How far it is from the virtual robot's path [m]."""
+    """Distance from the nearest place of the virtual robot's path near the one before [m]; absent while it doesn't
+    follow."""
     time_difference: Distance | None = None
-    """How much later than the virtual robot it is there [s]."""
+    """How much later it is there [s]; 0 where both stand."""
     epoch: Epoch | None = None
-    """That it follows; None for none."""
+    """Of the drive that it follows; absent: none."""
     connected: bool = True
-    """Whether the robot's site is heard of."""
+    """Whether the robot is heard of."""
     halted: Text = ""
-    """Why it doesn't follow; empty while it does."""
+    """As in `state`."""
     drives: Count = 0
-    """How often the virtual robot was put where the real one stood, to begin a drive."""
+    """How often the virtual robot was put where the real one stood: a drive begins with each lease and `Resume`,
+    and after a stop."""
     round_trip: Value | None = None
-    """Newest time that a message to the robot and the answer were under way [s]; None before the first."""
+    """As in `state`."""
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
-    """Messages to the robot of which the emulated link told since the one before: when each was sent, and when it
-    arrived [s]; None for one that was lost."""
+    """As in `state`."""
 
 
 class TaskOrder(Leased, frozen=True, omit_defaults=True, gc=False, tag="task"):
-    """Holder: let the robot do something by itself. The answer is a `Tasks` or a `Problem`."""
+    """Let the robot do something by itself. The answer is a `Tasks` or a `Problem`."""
 
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     task: RobotTask
     epoch: Epoch | None = None
@@ -128,8 +137,9 @@ class TaskOrder(Leased, frozen=True, omit_defaults=True, gc=False, tag="task"):
 
 
 class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
-    """Server: what the robot does by itself, and the list of jobs; the newest one counts."""
+    """What the robot does by itself, and the list of jobs; the newest one counts."""
 
+    sender: ClassVar[Party] = Party.SERVER
     doing: Doing = Doing.NOTHING
     journey: JourneyState = JourneyState.IDLE
     reason: Text = ""
@@ -160,17 +170,20 @@ class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
 
 
 class Seen(Message, SensedPoints, frozen=True, omit_defaults=True, gc=False, tag="seen"):
-    """Server: what the robot sees of its surroundings; the newest one counts."""
+    """What the robot sees of its surroundings; the newest one counts."""
+
+    sender: ClassVar[Party] = Party.SERVER
 
 
 class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
-    """Server: the known map of where the robot drives."""
+    """The known map of where the robot drives."""
 
+    sender: ClassVar[Party] = Party.SERVER
     size: PointRow
-    """Of the floor, 0 ≤ x ≤ length and 0 ≤ y ≤ width [m]."""
+    """Length and width of the floor [m]."""
     things: Annotated[tuple[Outline, ...], Meta(max_length=MOST_THINGS)] = ()
-    """Outlines of what stands there [m]."""
+    """Outlines of what the map knows [m]."""
     via: Points = ()
     """Via points [m]."""
     robot: tuple[Distance, Distance, Distance] = msgspec.field(default_factory=lambda: (0.0, 0.0, 0.0))
-    """What the robot's rectangle reaches ahead and back from its driving axle, and its width [m]."""
+    """What it reaches ahead and back from its axle, and its width [m]."""

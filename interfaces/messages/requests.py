@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, TypeAlias
@@ -25,6 +26,7 @@ from interfaces.messages.fields import (
     Leased,
     Message,
     Number,
+    Party,
     Rate,
     Text,
     Time,
@@ -98,8 +100,9 @@ class Frame:
 
 
 class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):
-    """Client: carry out a command. It's sent again until its outcome comes, and carried out once."""
+    """Carry out a command. It's sent again until its outcome comes, and carried out once."""
 
+    sender: ClassVar[Party] = Party.HOLDER
     number: Number
     """Orders are carried out in the order of their numbers; a stop doesn't wait."""
     command: Command | None = None
@@ -115,11 +118,13 @@ class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):
 
 
 class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
-    """Client: g(t), please. Sent again, it asks what has become of the frame."""
+    """g(t). Sent again with the same number, it asks what has become of that frame."""
 
+    sender: ClassVar[Party] = Party.CLIENT
     number: Number
+    """The client's own, each used once."""
     t: Time | None = None
-    """[s]; None for the engine's present, plus the servlet's lead."""
+    """[s]; absent: now."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
@@ -128,12 +133,14 @@ class Ask(Message, frozen=True, omit_defaults=True, gc=False, tag="ask"):
 
 
 class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
-    """Client: the scene, please, and from now on what changes in it."""
+    """The scene, then what follows; one at a time counts, another number replaces it."""
 
+    sender: ClassVar[Party] = Party.CLIENT
     number: Number
     form: ViewForm
+    """`segments`: the timeline and each edit of it; `frames`: positions."""
     rate: Rate | None = None
-    """Wished rate of frames [1/s]; the broadcaster with the nearest one is taken."""
+    """Of frames [1/s]: the broadcaster with the nearest one is taken."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
@@ -142,17 +149,19 @@ class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
 
 
 class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
-    """Client: segments that it lacks."""
+    """Segments of the scene of that edit, from that one on; without `index` all edits after that one."""
 
+    sender: ClassVar[Party] = Party.CLIENT
     edit: Count
-    """Number of the newest edit in what it has, or of that which a `Scene` began with."""
+    """Of the newest edit that the client has, or of the scene."""
     index: Count | None = None
-    """First segment that it lacks of a history; None when it has that and lacks later edits."""
+    """First segment that it lacks."""
 
 
 class Outcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="outcome"):
-    """Servlet: what became of an order; again when a later command changed that."""
+    """What became of an order; again when a later command changed that."""
 
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
     made_at: Time
     """The engine's time [s]."""
@@ -171,8 +180,9 @@ class Outcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
 
 
 class Answer(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="answer"):
-    """Servlet: the frame that was asked for, with its status as it is now."""
+    """The frame that was asked for, with its status as it is now."""
 
+    sender: ClassVar[Party] = Party.SERVER
     number: Count
     t: Time
     made_at: Time
@@ -208,8 +218,9 @@ class Verdicts:
 
 
 class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="broadcast"):
-    """Servlet: the newest frame of a broadcaster, and what became of earlier ones."""
+    """The newest frame of a broadcaster, and what became of earlier ones."""
 
+    sender: ClassVar[Party] = Party.SERVER
     number: Count
     t: Time
     made_at: Time
@@ -238,31 +249,33 @@ class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, ta
 
 
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
-    """Servlet: what there is to see, for one who has just come."""
+    """What there is to see, for one who has just come."""
 
+    sender: ClassVar[Party] = Party.SERVER
     number: Number
-    """Number of the `Follow` that it answers."""
+    """Of the `Follow`."""
     robot: Word
     """Name of the robot's model."""
     initial: Array
-    """Joints before the start of the timeline [rad], (n,)."""
+    """Joints before the start [rad]."""
     start: Time
     """Origin of the timeline [s]."""
     end: Time
     """End of what is planned [s]."""
     segments: Count
-    """How many segments the timeline has; `Want` fetches them."""
+    """How many it has; `Want` fetches them."""
     edit: Count
-    """Number of the newest edit in it."""
+    """Number of its newest edit."""
     now: Time
-    """The engine's time [s]."""
+    """Session time [s]."""
     rate: Rate | None = None
-    """Rate of the frames that follow [1/s]; None where segments do."""
+    """Of the frames that follow [1/s]; absent for segments."""
 
 
 class History(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="history"):
-    """Servlet: a part of the timeline that a `Scene` named."""
+    """A part of the timeline that a `Scene` named."""
 
+    sender: ClassVar[Party] = Party.SERVER
     edit: Count
     index: Count
     """Index of the first segment."""
@@ -274,12 +287,14 @@ class History(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=
 
 
 class Change(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change"):
-    """Servlet: an edit of the timeline, as the segments that it put in.
+    """An edit of the timeline, as the segments that it put in.
 
     The first `first` segments stay, then come `segments`, then those of the base from `tail` on, beginning at
     `tail_start`.
     """
 
+    absent: ClassVar[Mapping[str, str]] = {"base": "edit - 1", "tail_start": "end"}
+    sender: ClassVar[Party] = Party.SERVER
     edit: Number
     """Its number."""
     first: Count
@@ -316,8 +331,10 @@ class Change(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=F
 
 
 class Pulse(Message, frozen=True, omit_defaults=True, gc=False, tag="pulse"):
-    """Servlet: up to `past`, the timeline with this edit is what happened."""
+    """Up to `past`, the timeline with this edit is what happened."""
 
+    absent: ClassVar[Mapping[str, str]] = {"past": "now"}
+    sender: ClassVar[Party] = Party.SERVER
     edit: Count
     now: Time
     """The engine's time [s]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 import msgspec
 from msgspec import Meta
@@ -14,6 +14,7 @@ from interfaces.messages.fields import (
     Epoch,
     Leased,
     Number,
+    Party,
     Stamp,
     Text,
     Time,
@@ -71,6 +72,7 @@ class LogEntry(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
 class Orders(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="orders"):
     """From the operator's site: entries of the log, or a heartbeat without any."""
 
+    sender: ClassVar[Party] = Party.SITE
     epoch: Epoch
     """Of the control lease."""
     number: Number
@@ -113,6 +115,7 @@ class PlanPart(Segmented, frozen=True, omit_defaults=True, gc=False, eq=False):
 class Report(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="report"):
     """From the robot's site: where it is, and what became of the entries."""
 
+    sender: ClassVar[Party] = Party.ROBOT
     epoch: Epoch
     """Epoch that it follows."""
     number: Number

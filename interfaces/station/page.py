@@ -24,7 +24,8 @@ from interfaces.station.panels import PANELS, Panel, PanelPlace
 from interfaces.stream.server import HEADERS, KeptFile
 
 _TYPES: Final = {"css": "text/css", "js": "text/javascript"}
-_READER: Final = "vrs.js"
+_READER: Final = frozenset({"vrs.js", "protocol.js"})
+"""What the protocol has for pages: its reader, and what checks its messages."""
 _TERMINAL: Final = {"xterm.js": "index.js", "xterm.css": "xterm.css"}
 """What NiceGUI has of xterm.js, by the names under which it's served here."""
 
@@ -33,7 +34,7 @@ _TERMINAL: Final = {"xterm.js": "index.js", "xterm.css": "xterm.css"}
 def names() -> frozenset[str]:
     """What is served below `/station/`."""
     own = resources.files("interfaces.station").joinpath("static").iterdir()
-    return frozenset({_READER, *_TERMINAL, *(file.name for file in own if file.name.rpartition(".")[2] in _TYPES)})
+    return frozenset({*_READER, *_TERMINAL, *(file.name for file in own if file.name.rpartition(".")[2] in _TYPES)})
 
 
 def route() -> Route:
@@ -53,7 +54,7 @@ def _file(name: str) -> KeptFile:
     if name in _TERMINAL:
         content = resources.files("nicegui").joinpath(f"elements/xterm/dist/{_TERMINAL[name]}").read_bytes()
     else:
-        package = "interfaces.stream" if name == _READER else "interfaces.station"
+        package = "interfaces.stream" if name in _READER else "interfaces.station"
         content = resources.files(package).joinpath(f"static/{name}").read_bytes()
     return KeptFile.of(content)
 

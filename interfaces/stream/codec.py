@@ -14,9 +14,9 @@ import msgspec
 
 from interfaces import messages
 from interfaces.messages import Reply, Request, control, mobile
-from interfaces.messages.control import Notice, Pong, ProblemCode, ProtocolError, Question
+from interfaces.messages.control import Notice, Pong, ProblemCode, ProtocolError, Question, Role, may_send
 from interfaces.messages.drive_sites import DriveOrders, DriveReport
-from interfaces.messages.fields import Message, check_normal, plain, rich, writer
+from interfaces.messages.fields import Message, Party, check_normal, plain, rich, writer
 from interfaces.messages.sites import Orders, Report
 from vrs.errors import InvalidValueError
 
@@ -44,11 +44,16 @@ T = TypeVar("T")
 
 KINDS: tuple[type[Message], ...] = get_args(Value)
 """Classes of what crosses."""
-_KNOWN = frozenset(KINDS)
-ASKED = frozenset((*get_args(Request), *get_args(Question), mobile.TaskOrder, Pong, Orders, DriveOrders))
+KNOWN = frozenset(KINDS)
+ASKED = frozenset(kind for kind in KINDS if kind.sender not in {Party.SERVER, Party.ROBOT})
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: kind for kind in KINDS}
 """Messages by the type that stands in them."""
+
+
+def sent_by(role: Role) -> Any:
+    """The messages that a client of a role may send after `Hello`, as a union."""
+    return reduce(or_, (kind for kind in KINDS if may_send(role, kind.sender) and kind is not control.Hello))
 
 
 class Encoding(enum.StrEnum):

@@ -13,7 +13,7 @@ import msgspec
 
 from interfaces.engine_server.site import earliest
 from interfaces.messages import control
-from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role
+from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role, may_send
 from interfaces.messages.drive_sites import RobotTask
 from interfaces.messages.mobile import TaskOrder, Tasks
 from interfaces.stream.access import Access
@@ -351,7 +351,7 @@ class Hub:
         """Let the holder of the lease change the way to the robot; why not, None where it's done."""
         if self.emulation is None:
             return Problem(ProblemCode.NOT_ALLOWED, "no way to a robot is emulated here", wish.number)
-        if seat.role is Role.VIEWER:
+        if not may_send(seat.role, wish.sender):
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer changes nothing", wish.number)
         if not self._leasing.admits(seat, wish.epoch, now):
             text = "only who has control changes the way to the robot"
@@ -370,7 +370,7 @@ class Hub:
         """Let the holder of the lease have the robot do something by itself: how it is then, or why not."""
         if self._workers is None:
             return Problem(ProblemCode.NOT_ALLOWED, "this robot does nothing by itself", order.number)
-        if seat.role is Role.VIEWER:
+        if not may_send(seat.role, order.sender):
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer commands nothing", order.number)
         if not self._leasing.admits(seat, order.epoch or 0, now):
             text = "only who has control tells the robot what to do"

@@ -6,7 +6,7 @@ import hmac
 from typing import Protocol
 
 from interfaces.messages import Order, control
-from interfaces.messages.control import OVERRULED, Problem, ProblemCode, Role
+from interfaces.messages.control import OVERRULED, Problem, ProblemCode, may_send
 from interfaces.messages.fields import Epoch
 from interfaces.stream.session import SessionState, Wish
 from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
@@ -103,7 +103,7 @@ class Leasing:
     def wish(self, seat: SessionState, wish: Wish, now: float) -> control.Lease | Problem | None:
         """Do what a client asks of the lease; the answer, None for a beat that counts."""
         number = None if isinstance(wish, control.Beat) else wish.number
-        if seat.role is Role.VIEWER:
+        if not may_send(seat.role, control.Acquire.sender):
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer has no lease", number)
         if isinstance(wish, control.Share):
             return self._share(seat, wish, now)
@@ -139,7 +139,7 @@ class Leasing:
     def _ask(self, seat: SessionState, force: bool, now: float) -> LeaseRefusal | None:
         """Ask for the lease; who has it already keeps it."""
         self.turn(now)
-        admin = seat.role is Role.ADMIN
+        admin = may_send(seat.role, control.TakeOver.sender)
         if force and not admin:
             return LeaseRefusal.NOT_ADMIN
         if seat is self.holder:

@@ -16,9 +16,10 @@ from interfaces.messages.control import (
     ProtocolError,
     Role,
     Survey,
+    may_send,
 )
 from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode
+from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode, sent_by
 from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
 
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
@@ -31,12 +32,13 @@ _MUTE = 1.0
 
 _LOG = logging.getLogger(__name__)
 
+_SENT = sent_by(Role.ADMIN)
+"""What some client may send."""
+
 Closing = tuple[int, str]
 """Close code and reason."""
 Wish = control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | control.Beat
 """What a client asks of the lease."""
-_ALLOWED = Ping | Pong | control.Problem | Wish | Survey | Impair | TaskOrder | Order | Ask | Follow | Want
-"""What may come once the client is welcome."""
 
 
 Welcome: TypeAlias = control.Welcome | MobileWelcome
@@ -222,7 +224,8 @@ class HubSession:
             if isinstance(data, str) is not (self.encoding is Encoding.JSON):
                 raise ProtocolError(ProblemCode.MALFORMED, "JSON comes as text, msgpack as bytes")
             raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-            allowed = control.Hello if self.seat is None else _ALLOWED
+            # Who may send what of it in which role is for those to say who answer.
+            allowed = control.Hello if self.seat is None else _SENT
             message = decode(raw, self.encoding, allowed=allowed, largest=self._limits.size)
         except ProtocolError as error:
             self._complain(Problem(error.code, error.text), now)
@@ -276,7 +279,7 @@ class HubSession:
                 if message in self._wanted:
                     return
                 self._wanted.add(message)
-        elif seat.role is Role.VIEWER:
+        elif not may_send(seat.role, message.sender):
             text = "a viewer commands nothing"
             self._complain(Problem(ProblemCode.NOT_ALLOWED, text, message.number), now)
             return

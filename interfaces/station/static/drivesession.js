@@ -24,7 +24,6 @@ export class DriveSession extends Session {
       super.take(message);
       return;
     }
-    this.heard = performance.now() / 1000;
     this.state = message;
     this.become("live");
     this.emit("state", message);

@@ -27,7 +27,7 @@ export function mount(station, box) {
   function standing() {
     const { link, state } = session;
     if (link !== "live" || !state) return ["help", "Nothing known", "none"];
-    if (!state.connected && state.connected !== undefined) return ["cloud_off", "Real robot not heard", "lost"];
+    if (!state.connected) return ["cloud_off", "Real robot not heard", "lost"];
     if (state.halted) return ["pause_circle", "Real robot waits", "none"];
     if (busy(session)) return ["route", "Drives by itself", "confirmed"];
     if (state.starved) return ["hourglass_empty", "Real robot waits for news", "none"];

@@ -25,11 +25,11 @@ export class Happenings {
       if (!resumed) corrections = null;
     });
     station.on("state", (state) => {
-      const count = state.corrections ?? 0;
+      const count = state.corrections;
       if (corrections !== null && count > corrections) this.note("corrected");
       if (state.halted && !halted) this.note("halted");
-      if (heard && state.connected === false) this.note("halted");
-      [corrections, halted, heard] = [count, state.halted ?? "", state.connected !== false];
+      if (heard && !state.connected) this.note("halted");
+      [corrections, halted, heard] = [count, state.halted, state.connected];
     });
     station.on("link", (link) => link === "lost" && this.note("halted"));
   }

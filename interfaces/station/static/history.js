@@ -17,7 +17,7 @@ export class History {
   }
 
   add({ t, q, late }) {
-    for (const [then, joints] of late ?? []) this.put(then, joints);
+    for (const [then, joints] of late) this.put(then, joints);
     this.put(t, q);
     if (this.rows.length > KEPT + 1000) this.rows.splice(0, 1000);
   }

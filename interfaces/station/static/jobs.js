@@ -100,9 +100,9 @@ export function mount(station, box) {
   /** The list as it was edited here, until the server has answered the last edit; edits come faster than answers. */
   let draft = null;
   let edits = 0;
-  const listed = () => draft ?? session.tasks?.jobs ?? {};
-  const jobs = () => listed().jobs ?? [];
-  const places = () => listed().places ?? {};
+  const listed = () => draft ?? session.tasks?.jobs ?? { jobs: [], places: {} };
+  const jobs = () => listed().jobs;
+  const places = () => listed().places;
   const say = (words) => {
     write(fault, words);
     station.refuse(words);
@@ -186,14 +186,14 @@ export function mount(station, box) {
   function show() {
     const tasks = session.tasks;
     if (!tasks) return;
-    const { progress = {}, forecast } = tasks;
-    const stageNow = progress.stage ?? "planned";
+    const { progress, forecast } = tasks;
+    const stageNow = progress.stage;
     const running = stageNow === "running";
     const ready = session.holds && session.link === "live";
     const text = JSON.stringify([listed(), progress, forecast, ready]);
     if (text !== shown) {
       shown = text;
-      const by = new Map((progress.jobs ?? []).map((one) => [one.number, one]));
+      const by = new Map(progress.jobs.map((one) => [one.number, one]));
       const focus = document.activeElement?.closest?.("#jobs") && document.activeElement.getAttribute("aria-label");
       list.replaceChildren(...jobs().map((job, at, all) => row(job, at, all, by.get(job.number), forecast, running)));
       if (focus) list.querySelector(`[aria-label="${CSS.escape(focus)}"]`)?.focus();
@@ -201,7 +201,7 @@ export function mount(station, box) {
     empty.hidden = jobs().length > 0;
     list.hidden = jobs().length === 0;
     const waits = running && jobs().some((job) => job.do === "wait" && job.seconds == null
-      && (progress.jobs ?? []).some((one) => one.number === job.number && one.stage === "running"));
+      && progress.jobs.some((one) => one.number === job.number && one.stage === "running"));
     const many = jobs().length > 0;
     const can = { "dry-run": many, run: many && !running, pause: running, abort: running || stageNow === "paused",
       resume: many && ["paused", "failed", "aborted"].includes(stageNow), key: waits };
@@ -211,9 +211,9 @@ export function mount(station, box) {
     const says = tasks.says ? ` Says: “${tasks.says}”` : "";
     write(stage, `${STAGES[stageNow][1]}${progress.reason ? ": " + progress.reason : ""}.${predicted}${says}`);
     stage.dataset.state = stageNow;
-    write(screen, tasks.shows ?? "");
+    write(screen, tasks.shows);
     screen.hidden = !tasks.shows;
-    write(policy, [LOSSES[tasks.loss] ?? "", tasks.problem ?? ""].filter(Boolean).join(" "));
+    write(policy, [LOSSES[tasks.loss] ?? "", tasks.problem].filter(Boolean).join(" "));
     mark(policy, "data-bad", tasks.problem ? true : null);
   }
 

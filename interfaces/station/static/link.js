@@ -46,7 +46,7 @@ export function mount(station, box) {
     const live = session.link === "live";
     const halted = live && state?.halted;
     if (!live || !state) robot.show("none", body, "Real robot unknown");
-    else if (!state.connected && state.connected !== undefined) robot.show("bad", "cloud_off", "Real robot not heard");
+    else if (!state.connected) robot.show("bad", "cloud_off", "Real robot not heard");
     else if (halted) robot.show("warn", "pause_circle", "Real robot waits");
     else if (busy(session)) robot.show("good", "route", "Drives by itself");
     else robot.show("good", body, "Real robot follows");

@@ -50,7 +50,7 @@ export function mount(station, box) {
 
   let named = "";
   function showPlaces() {
-    const all = session.tasks?.jobs?.places ?? {};
+    const all = session.tasks?.jobs.places ?? {};
     const text = JSON.stringify(all);
     if (text === named) return;
     named = text;
@@ -64,14 +64,14 @@ export function mount(station, box) {
     const tasks = session.tasks;
     if (!tasks) return;
     showPlaces();
-    const journey = tasks.journey ?? "idle";
+    const journey = tasks.journey;
     const to = tasks.goal && journey !== "idle" ? ` (${goalText(tasks.goal)})` : "";
     const left = journey === "driving" && tasks.left ? `, ${tasks.left.toFixed(1)} m to go` : "";
     write(state, `${STATES[journey]}${to}${tasks.reason ? ": " + tasks.reason : left}`);
     state.dataset.state = journey;
     const going = journey === "driving" || journey === "waiting";
-    chart.route(going ? tasks.route ?? [] : [], going ? tasks.goal ?? null : null);
-    const news = `${journey} ${tasks.reason ?? ""}`;
+    chart.route(going ? tasks.route : [], going ? tasks.goal : null);
+    const news = `${journey} ${tasks.reason}`;
     if (said && news !== said && ["arrived", "failed", "waiting"].includes(journey)) {
       station.announce(`${STATES[journey]}${tasks.reason ? ": " + tasks.reason : ""}.`);
     }
@@ -83,7 +83,7 @@ export function mount(station, box) {
     const { state: now, seen, plan } = session;
     if (plan) chart.plan(plan);
     if (now) chart.robots(now.virtual, now.real);
-    if (seen) chart.seen(seen, now?.real ?? null);
+    if (seen) chart.seen(seen, now && now.real);
     const centimetres = seen?.doubt ? 200 * Math.sqrt(Math.max(seen.doubt[0], seen.doubt[2])) : null;
     write(doubt, centimetres == null ? "" : `Place known to ${centimetres.toFixed(1)} cm (2σ).`);
   }

@@ -17,11 +17,11 @@ export class Marks {
     let corrections = null;
     let halted = "";
     station.on("state", (state) => {
-      const count = state.corrections ?? 0;
+      const count = state.corrections;
       if (corrections !== null && count > corrections) this.note("sync_problem", "The virtual robot was put right");
       if (state.halted && state.halted !== halted) this.note("pause_circle", state.halted, "warn");
       corrections = count;
-      halted = state.halted ?? "";
+      halted = state.halted;
     });
     station.on("outcome", ({ command, outcome }) => {
       if (outcome.revision) return;

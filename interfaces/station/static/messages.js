@@ -22,7 +22,7 @@ export class Messages {
 
   /** @param {?Array<[number, ?number]>} messages when each was sent and arrived [s]; null for a lost one */
   hear(messages) {
-    for (const [sent, arrived] of messages ?? []) this.take(sent, arrived ?? null);
+    for (const [sent, arrived] of messages) this.take(sent, arrived);
   }
 
   take(sent, arrived) {

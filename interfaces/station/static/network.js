@@ -175,7 +175,7 @@ export function mount(station, box) {
     const age = state?.t != null && session.now !== null ? session.now - state.t : null;
     write(cells.age, age === null ? "–" : time(Math.max(0, age)));
     write(cells.robot, network.problem ? `${network.robot || "not known yet"}: ${network.problem}` : network.robot.replace(/^wss?:\/\//, ""));
-    write(cells.seed, String(network.seed ?? 0));
+    write(cells.seed, String(network.seed));
     write(advice, network.advice ? network.advice[0].toUpperCase() + network.advice.slice(1) : "");
     const when = network.changed_at == null || session.now === null ? null : session.now - network.changed_at;
     write(by, when === null ? "" : `Changed by ${network.changed_by} ${Math.max(0, Math.round(when))} s ago`);

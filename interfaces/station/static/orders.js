@@ -44,7 +44,7 @@ export class Orders {
   /** Take an outcome; the entry that it's of, or undefined. */
   answer(outcome) {
     const entry = this.entries.find((known) => known.number === outcome.number && !known.forgotten);
-    if (!entry || (entry.outcome && (outcome.revision ?? 0) < (entry.outcome.revision ?? 0))) return undefined;
+    if (!entry || (entry.outcome && outcome.revision < entry.outcome.revision)) return undefined;
     entry.outcome = outcome;
     return entry;
   }

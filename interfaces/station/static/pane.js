@@ -64,11 +64,11 @@ export function mount(station, box) {
   station.on("edit", ({ before, after, change }) => {
     dress();
     // Who looks at now sees each command at once: only who looks ahead had been shown something else.
-    if (cursor === null || !before || !change || cursor <= Math.max(session.now ?? 0, change.start ?? change.end)) return;
+    if (cursor === null || !before || !change || cursor <= Math.max(session.now ?? 0, change.segments.length ? change.start : change.end)) return;
     const [then, now] = [before.joints(cursor), after.joints(cursor)];
     if (then.some((x, k) => Math.abs(x - now[k]) > 1e-9)) {
       changedAt = performance.now() / 1000;
-      changedBy = change.command_id ?? null;
+      changedBy = change.command_id;
     }
   });
 

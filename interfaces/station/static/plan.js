@@ -53,8 +53,8 @@ export class FloorPlan {
     this.world.setAttribute("transform", `matrix(1 0 0 -1 0 ${width})`);
     this.floor.setAttribute("width", length);
     this.floor.setAttribute("height", width);
-    this.things.setAttribute("d", (plan.things ?? []).map((ring) => path(ring) + "Z").join(""));
-    this.vias.replaceChildren(...(plan.via ?? []).map(([x, y]) => s("circle", { cx: x, cy: y, r: 0.05 })));
+    this.things.setAttribute("d", plan.things.map((ring) => path(ring) + "Z").join(""));
+    this.vias.replaceChildren(...plan.via.map(([x, y]) => s("circle", { cx: x, cy: y, r: 0.05 })));
   }
 
   /** Show where both robots are; the real one only where that's known. */
@@ -77,7 +77,7 @@ export class FloorPlan {
   seen(seen, real) {
     if (seen !== this.lastSeen) {
       this.lastSeen = seen;
-      this.points.setAttribute("d", (seen.points ?? []).map(([x, y]) => `M${x} ${y}h0`).join(""));
+      this.points.setAttribute("d", seen.points.map(([x, y]) => `M${x} ${y}h0`).join(""));
     }
     this.doubt.style.display = seen.doubt && real ? "" : "none";
     if (!seen.doubt || !real) return;

@@ -122,8 +122,7 @@ export class Samples {
 
   settle({ state, age, delay }, timeline) {
     const { chain } = this;
-    const { t, play, q } = state;
-    const reference = state.reference ?? null;
+    const { t, play, q, reference } = state;
     const [matched, shown] = [timeline.joints(play), timeline.joints(t)];
     const last = (joints) => chain.links(joints).at(-1);
     const [real, then, now] = [q, matched, shown].map(last);
@@ -135,8 +134,8 @@ export class Samples {
     if (!reference) parts.fill(NaN, 1);
     const toolServo = reference ? Math.hypot(...less(placeOf(real), asked)) : NaN;
     // A robot that has stopped by itself plays nothing until it follows a new epoch: it isn't behind.
-    if (state.halted) this.stopped = state.epoch ?? null;
-    const D = state.halted || (state.epoch ?? null) === this.stopped ? NaN : state.D;
+    if (state.halted) this.stopped = state.epoch;
+    const D = state.halted || state.epoch === this.stopped ? NaN : state.D;
     this.table.push([
       t,
       play,

@@ -1,5 +1,6 @@
 // The page's connection to the server: greeted, followed, kept alive, and made again by itself.
 import { ClockSync, Reader } from "./vrs.js";
+import { decode, LEASED } from "./protocol.js";
 import { Orders } from "./orders.js";
 import { Wire } from "./wire.js";
 
@@ -14,8 +15,6 @@ const PINGS = 10;
 const KEY = "vrs-session";
 /** A token opens its own role and those below it. */
 const ROLES = ["admin", "operator", "viewer"];
-/** Requests of who has control. */
-const HOLDERS = ["release", "resume", "impair", "task"];
 
 const seconds = () => performance.now() / 1000;
 
@@ -50,7 +49,7 @@ export class Session extends EventTarget {
     this.looked = this.heard;
     this.wire = new Wire({
       open: () => this.greet(),
-      message: (text) => this.take(JSON.parse(text)),
+      message: (text) => this.hear(text),
       close: () => this.lose(),
     });
     this.key = sessionStorage.getItem(KEY);
@@ -145,8 +144,15 @@ export class Session extends EventTarget {
     return open;
   }
 
+  /** Take a frame; what can't be taken is passed over. */
+  hear(text) {
+    this.heard = seconds();
+    const message = decode(text);
+    if (message) this.take(message);
+  }
+
   take(message) {
-    const now = (this.heard = seconds());
+    const now = seconds();
     if (message.type === "problem") this.object(message);
     else if (message.type === this.welcomes) this.begin(message, now);
     else if (message.type === "lease") this.setLease(message);
@@ -182,7 +188,7 @@ export class Session extends EventTarget {
     this.welcome = welcome;
     this.key = welcome.session;
     this.roles = [welcome.role];
-    this.orders.renew(welcome.resumed === true, now);
+    this.orders.renew(welcome.resumed, now);
     if (!same) {
       this.sync = new ClockSync();
       this.reader = this.makeReader();
@@ -257,7 +263,7 @@ export class Session extends EventTarget {
   /** Ask something of the lease, or of the way to the robot; the request's number, 0 where it couldn't be sent. */
   wish(type, fields = {}) {
     const message = { type, number: ++this.requests, ...fields };
-    if (HOLDERS.includes(type)) message.epoch = this.epoch ?? "1";
+    if (LEASED.has(type)) message.epoch = this.epoch ?? "1";
     const sent = this.send(message);
     if (sent) this.emit("wish", message);
     else if (type !== "survey") this.emit("problem", { code: "lease", text: "There's no connection: nothing was asked." });

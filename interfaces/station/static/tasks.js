@@ -33,7 +33,7 @@ export function ask(station, task, refused) {
 
 /** Whether the robot does something by itself. */
 export function busy(session) {
-  return (session.tasks?.doing ?? "nothing") !== "nothing";
+  return Boolean(session.tasks) && session.tasks.doing !== "nothing";
 }
 
 /** Metres and degrees of a goal, for people. */

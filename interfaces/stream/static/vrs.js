@@ -1,5 +1,8 @@
 // A reader of the stream of segments: the timeline's copy, its evaluation at any time, and the session's clock.
 // It speaks the JSON form of docs/protocol.md, opens no socket and reads no clock: whoever uses it does both.
+import { decode } from "./protocol.js";
+
+export { decode };
 
 /** Requests of history are answered by so many segments; then the next are to be asked for. */
 const PORTION = 256;
@@ -32,8 +35,8 @@ export function evaluate(segment, u, derivative = 0) {
 
 /** The segments of a `history`, a `change` or a plan, with the start of each [s]. */
 export function segmentsOf(message) {
-  let start = message.start ?? 0;
-  return (message.segments ?? []).map(([duration, commandId, coefficients, own]) => {
+  let start = message.start;
+  return message.segments.map(([duration, commandId, coefficients, own]) => {
     const segment = { start: own ?? start, duration, commandId, coefficients };
     start = segment.start + duration;
     return segment;
@@ -90,12 +93,12 @@ export class Timeline {
 
   /** The timeline that a `change` makes of this one; null if it doesn't fit. */
   changed(change) {
-    const { first, tail = null, end } = change;
+    const { first, tail, end } = change;
     if (first > this.segments.length || (tail !== null && tail > this.segments.length)) return null;
     const segments = this.segments.slice(0, first).concat(segmentsOf(change));
     if (tail !== null) {
       const from = this.startOf(tail);
-      const to = change.tail_start ?? end;
+      const to = change.tail_start;
       for (const segment of this.segments.slice(tail)) {
         segments.push({ ...segment, start: to + (segment.start - from) });
       }
@@ -138,9 +141,10 @@ export class Reader {
     this.ask(now);
   }
 
-  /** Take a message, as text or as an object; those of other kinds are passed over. */
+  /** Take a message, as text or as `decode` gives it; those of other kinds are passed over. */
   receive(data, now) {
-    const message = typeof data === "string" ? JSON.parse(data) : data;
+    const message = typeof data === "string" ? decode(data) : data;
+    if (message === null) return null;
     if (message.type === "scene") this.begin(message, now);
     else if (message.type === "history") this.add(message, now);
     else if (message.type === "change") this.hold(message, now);
@@ -195,7 +199,7 @@ export class Reader {
 
   hold(change, now) {
     if (this.timeline && change.edit <= this.edit) return;
-    this.held.set(change.base ?? change.edit - 1, change);
+    this.held.set(change.base, change);
     if (this.held.size > HELD) this.held.delete(Math.min(...this.held.keys()));
     this.apply(now);
     if (this.timeline && this.held.size) this.lack(now);
@@ -227,8 +231,7 @@ export class Reader {
       this.lack(now);
       return;
     }
-    const past = pulse.past === undefined ? pulse.now : pulse.past;
-    if (past !== null) this.past = Math.max(this.past, past);
+    if (pulse.past !== null) this.past = Math.max(this.past, pulse.past);
   }
 
   lack(now) {

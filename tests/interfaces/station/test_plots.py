@@ -164,7 +164,7 @@ LOOKED_BACK = """async (states) => {
 
 def test_a_look_back_finds_what_was_measured_late(page: Page) -> None:
     states = [
-        {"t": 1.0, "q": [1.0]}, {"t": 5.0, "q": [5.0]},
+        {"t": 1.0, "q": [1.0], "late": []}, {"t": 5.0, "q": [5.0], "late": []},
         {"t": 6.0, "q": [6.0], "late": [[2.5, [2.5]], [1.5, [1.5]], [3.5, [3.5]]]},
         {"t": 6.1, "q": [6.1], "late": [[3.5, [3.5]]]},
     ]  # fmt: skip

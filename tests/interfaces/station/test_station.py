@@ -310,6 +310,21 @@ def test_everyone_can_use_it(browser: Any, server: Child, scheme: str, width: in
         page.page.keyboard.press("Space")
 
 
+def test_a_message_that_cant_be_taken_is_said_once_and_the_page_lives(page: Page) -> None:
+    number, said = page.get("""() => {
+        const [{ session }, said] = [station, []];
+        const bad = JSON.stringify({ ...session.state, q: ["0"] });
+        const warn = console.warn;
+        console.warn = (text) => said.push(text);
+        for (const frame of [bad, bad, "{", '{"type":"warp"}']) session.hear(frame);
+        console.warn = warn;
+        return [session.state.number, said];
+    }""")
+    assert said == ["state.q isn't a number from -1000000000 to 1000000000", "a message isn't a map"]
+    page.wait(f"station.session.state.number > {number}")
+    assert page.errors == []
+
+
 def test_strangers_are_turned_away(server: Child) -> None:
     base = station(server).rstrip("/")
     port = base.rpartition(":")[2]

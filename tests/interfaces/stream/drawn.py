@@ -1,292 +1,263 @@
-"""Messages of every kind, drawn by hypothesis."""
+"""Messages of every kind, drawn from what their definitions say: types, ranges, lengths, defaults.
+
+What types can't say stands in `RULES`: which fields must go together.
+"""
 
 from __future__ import annotations
 
 import math
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from random import Random
+from typing import Any
 
+import msgspec
 import numpy as np
 from hypothesis import strategies as st
+from msgspec import inspect as kinds
 
-from interfaces import messages as m
-from interfaces.messages import control as c
-from interfaces.messages import mobile as b
-from interfaces.messages.control import LinkFigures, Ping, Pong
-from interfaces.messages.drive_sites import ArchitectureReport as Followed
-from interfaces.messages.drive_sites import (
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    RobotTask,
-    SensedPoints,
-    TaskReport,
-)
-from interfaces.messages.jobs import (
-    JobForecast,
-    JobList,
-    JobProgress,
-    JobStage,
-    ListCommand,
-    MessageJob,
-    MoveJob,
-    OperatorLoss,
-    Progress,
-    VoiceJob,
-    WaitJob,
-)
-from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
-from robots.onboard.driving import Drive, Posture
-from robots.onboard.journey import Goal, JourneyState
-from robots.onboard.lease import LeaseEnd, LeaseState
-from robots.onboard.supervisor import CellChange
-from vrs import commands as v
-from vrs.ledger import Receipt, Status
-from vrs.mobile import DriveLimits
-from vrs.model import Limits
-from vrs.segment import PolynomialSegment
+from interfaces.messages.description import Described, alternatives, bounds, described, is_nullable, type_of, words
+from interfaces.stream import Encoding, decode
+from interfaces.stream.codec import KINDS
 
-floats = partial(st.floats, allow_subnormal=False)
-numbers = st.integers(1, 2**63 - 1)
-counts = st.integers(0, 2**63 - 1)
-epochs = st.integers(1, 2**64 - 1)
-ids = st.none() | st.integers(-(2**63), 2**63 - 1)
-times = floats(-1e9, 1e9)
-stamps = st.none() | times
-finite = floats(-1e9, 1e9)
-coefficients = st.floats(allow_nan=False, allow_infinity=False)
-words = st.text(max_size=40)
-names = st.text(min_size=1, max_size=40)
-small = st.integers(1, 8)
+LETTERS = 'abcxyzABC019 _-.,:/é€θ−\U0001f916\0\n"\\'
+EPOCHS = 2**64 - 1
+LONGEST = 1 << 22
+"""Messages are drawn up to this size [B]."""
 
 
-def array_of(n):
-    return st.lists(finite, min_size=n, max_size=n).map(frozen)
+def plain(kind: type, random: Random) -> dict[str, Any]:
+    """A message of a kind, as JSON has it, drawn."""
+    found: dict[str, Any] = _fields(type_of(kind), random)
+    return found
 
 
-def frozen(values):
+def value(kind: type, seed: int) -> Any:
+    """A message of a kind, as programs have it, drawn."""
+    return decode(msgspec.json.encode(plain(kind, Random(seed))), Encoding.JSON, allowed=kind, largest=LONGEST)
+
+
+def frozen(values: Any) -> Any:
     """A read-only array."""
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
 
 
-arrays = small.flatmap(array_of)
+class _Messages(Mapping[type, st.SearchStrategy[Any]]):
+    """What draws each message; of one that is added, too."""
+
+    def __getitem__(self, kind: type) -> st.SearchStrategy[Any]:
+        return st.integers(0, 2**32 - 1).map(partial(value, kind))
+
+    def __iter__(self) -> Iterator[type]:
+        return iter(KINDS)
+
+    def __len__(self) -> int:
+        return len(KINDS)
 
 
-@st.composite
-def runs(draw):
-    """Segments one after the other, or with starts that rounding has moved."""
-    n, found, start = draw(small), [], draw(times)
-    for _ in range(draw(st.integers(0, 4))):
-        rows = draw(st.integers(1, 6))
-        a = frozen(draw(st.lists(coefficients, min_size=n * rows, max_size=n * rows))).reshape(rows, n)
-        duration = draw(floats(1e-12, 1e3))
-        found.append(PolynomialSegment(start, duration, a, draw(ids)))
-        start = found[-1].end if draw(st.booleans()) else draw(times)
-    return tuple(found)
+messages = _Messages()
 
 
-@st.composite
-def poses(draw):
-    """A pose target with a proper rotation."""
+def _fields(kind: Any, random: Random) -> Any:
+    message = described(kind)
+    found = {message.tag_field: message.tag} if message.tag else {}
+    for field in message.fields:
+        if not field.required and not message.is_array and random.random() < 0.4:
+            continue
+        null = field.nullable and random.random() < 0.2
+        found[field.name] = None if null else _one_of(alternatives(field.type), random)
+    for needed, rule in RULES:
+        if needed <= {field.name for field in message.fields}:
+            rule(found, random)
+    return list(found.values()) if message.is_array else found
+
+
+def _place(kind: kinds.Type, random: Random) -> Any:
+    if is_nullable(kind) and random.random() < 0.3:
+        return None
+    return _one_of(alternatives(kind), random)
+
+
+def _one_of(found: tuple[kinds.Type, ...], random: Random) -> Any:
+    return _draw(random.choice(found), random)
+
+
+def _draw(kind: kinds.Type, random: Random) -> Any:
+    match kind:
+        case kinds.BoolType():
+            return random.random() < 0.5
+        case kinds.IntType():
+            low, high = (int(end) for end in _ends(kind))
+            ends = low, high, low + 1, high - 1
+            return random.choice((*ends, random.randint(low, high), random.randint(low, min(low + 9, high))))
+        case kinds.FloatType():
+            return _real(*_ends(kind), random)
+        case kinds.StrType(pattern=str()):
+            return str(random.choice((1, EPOCHS, random.randint(1, EPOCHS))))
+        case kinds.StrType(least, most):
+            longest = random.choice((1, 12, 12, 40, most or 40))
+            size = random.randint(least or 0, max(least or 0, min(most or 40, longest)))
+            return "".join(random.choices(LETTERS, k=size))
+        case kinds.EnumType() | kinds.LiteralType():
+            return random.choice(words(kind))
+        case kinds.ListType(item, least, most) | kinds.VarTupleType(item, least, most):
+            return [_place(item, random) for _ in range(_size(least, most, random))]
+        case kinds.TupleType(items):
+            return [_place(item, random) for item in items]
+        case kinds.DictType(key, item, least, most):
+            return {_place(key, random): _place(item, random) for _ in range(_size(least, most, random))}
+        case _:
+            return _fields(kind, random)
+
+
+def _ends(kind: kinds.IntType | kinds.FloatType) -> tuple[float, float]:
+    low, high = bounds(kind)
+    return -1e6 if low is None else low, 1e6 if high is None else high
+
+
+def _real(low: float, high: float, random: Random) -> float:
+    """A number of a range, none of them subnormal: that's for programs to refuse."""
+    size = 10 ** random.uniform(-300, math.log10(max(abs(low), abs(high))))
+    usual = random.uniform(max(low, -10.0), min(high, 10.0))
+    drawn = random.choice((low, high, 0.0, -0.0, size, -size, usual, usual))
+    kept = min(max(drawn, low), high)
+    return float(kept) if kept == 0 or abs(kept) >= sys.float_info.min else max(low, sys.float_info.min)
+
+
+def _size(least: int | None, most: int | None, random: Random) -> int:
+    low = least or 0
+    return random.randint(low, min(low + 4, low + 4 if most is None else most))
+
+
+# What types can't say.
+
+Rule = Callable[[dict[str, Any], Random], None]
+
+
+def _widths(found: dict[str, Any], random: Random) -> None:
+    """Segments have a coefficient for each joint, and the width stands beside them."""
+    found["dof"] = n = random.randint(1, 8)
+    for row in found.get("segments", ()):
+        row[2] = [[_real(-1e300, 1e300, random) for _ in range(n)] for _ in range(random.randint(1, 6))]
+
+
+def _one_width(found: dict[str, Any], random: Random) -> None:
+    """A robot has one number of joints."""
+    found["dof"] = n = random.randint(1, 8)
+    found["limits"] = {name: [low] * n for name, low in LIMITS.items()}
+    found["poses"] = {name: [_real(-9, 9, random) for _ in range(n)] for name in found["poses"]}
+
+
+LIMITS = {"q_min": -3.0, "q_max": 3.0, "qd_max": 2.0, "qdd_max": 4.0, "qddd_max": 40.0}
+
+
+def _drives(found: dict[str, Any], random: Random) -> None:
+    found.update({name: 10 ** random.uniform(-3, 3) for name in found})
+
+
+def _pose(found: dict[str, Any], random: Random) -> None:
+    """A pose has a proper rotation."""
+    for name in {"X", "tool"} & found.keys():
+        if found[name] is not None:
+            found[name] = _proper(random)
+
+
+def _proper(random: Random) -> list[list[float]]:
     X = np.eye(4)
-    X[:3, :3] = np.linalg.qr(np.random.default_rng(draw(st.integers(0, 999))).normal(size=(3, 3)))[0]
-    X[:3, :3] *= np.sign(np.linalg.det(X[:3, :3]))
-    X[:3, 3] = draw(st.lists(floats(-10, 10), min_size=3, max_size=3))
-    return v.PoseTarget(X, draw(st.none() | words))
+    turned = np.linalg.qr(np.random.default_rng(random.randrange(1000)).normal(size=(3, 3)))[0]
+    X[:3, :3] = turned * np.sign(np.linalg.det(turned))
+    X[:3, 3] = [_real(-10, 10, random) for _ in range(3)]
+    rows: list[list[float]] = X.tolist()
+    return rows
 
 
-targets = arrays.map(v.JointTarget) | poses()
-deviations = floats(0, 1e6)
-shares = floats(1e-3, 1)
-one = st.integers(1, 2**63 - 1)
-commands = st.one_of(
-    st.builds(
-        v.MotionCommand, targets, stamps, stamps, shares, st.sampled_from(v.Motion), st.sampled_from(v.Profile),
-        st.sampled_from(v.Insertion), deviations | st.just(math.inf), shares, floats(1e-2, 1),
-        st.none() | poses().map(lambda pose: pose.X),
-    ),
-    st.builds(v.SteerCommand, arrays, st.none(), st.sampled_from(v.Frame), stamps, stamps),
-    st.builds(v.SteerCommand, st.none(), array_of(6), st.sampled_from(v.Frame), stamps, stamps),
-    st.builds(v.DriveCommand, finite, finite, floats(1e-6, 1e9), stamps, stamps),
-    st.builds(v.Retime, one, times, stamps),
-    st.builds(v.Cancel, one, stamps, stamps),
-    st.builds(v.InsertVia, one, targets, deviations, stamps, stamps),
-    st.builds(v.ScaleTime, floats(1e-3, 1e3), stamps, stamps),
-    st.builds(v.Stop, stamps, stamps),
-    st.builds(v.Resume, stamps, stamps),
-    st.builds(v.PositionQuery, stamps),
-    st.builds(v.ParameterChange, words, st.none() | st.booleans() | st.integers(1, 10**9) | finite | words),
-)  # fmt: skip
-several = st.lists(one, max_size=5).map(tuple)
-receipts = st.builds(
-    Receipt, counts, st.sampled_from(Status), stamps, stamps, stamps, stamps, st.none() | arrays, words, counts,
-    finite, st.none() | one, st.booleans(), several, several,
-)  # fmt: skip
-rates = st.sampled_from([None, 60.0])
-statuses = st.sampled_from(m.FrameStatus)
-frames = st.builds(m.Frame, counts, times, times, arrays, statuses, ids)
-verdicts = st.builds(m.Verdicts, counts, counts, st.lists(st.tuples(counts, counts, ids), max_size=4).map(tuple))
-leases = st.builds(
-    c.Lease, st.sampled_from(LeaseState), st.none() | epochs, st.none() | names, st.booleans(), st.none() | one,
-    st.none() | st.sampled_from(LeaseEnd), st.booleans(),
-)  # fmt: skip
+def _either(found: dict[str, Any], random: Random) -> None:
+    """Steering is by joints or by the tool."""
+    found.pop(random.choice(("rates", "twist")), None)
+    if found.get("rates") is None and found.get("twist") is None:
+        found["rates"] = [0.5, -0.25]
 
 
-@st.composite
-def welcomes(draw):
-    """What a server has, of one width."""
-    n = draw(small)
-    low = draw(floats(-10, 0))
-    limits = Limits(*[np.full(n, x) for x in (low, low + 1, 2.0, 3.0, 4.0)])
-    named = draw(st.dictionaries(names, array_of(n), max_size=3))
-    role, rates = draw(st.sampled_from(c.Role)), draw(st.lists(floats(0.1, 1e3), max_size=3))
-    known = (
-        draw(times),
-        draw(leases),
-        draw(floats(0.1, 60)),
-        tuple(rates),
-        draw(st.booleans()),
-        draw(words),
-        draw(words),
-    )
-    return c.Welcome(c.PROTOCOL, draw(words), role, draw(words), n, limits, named, *known)
+def _one_task(found: dict[str, Any], random: Random) -> None:
+    """One thing is asked at a time."""
+    given = [name for name in ("go", "jobs") if found.get(name) is not None]
+    name = random.choice([*given, "do"])
+    value, progress = found.get(name), found.get("progress")
+    found.clear()
+    found[name] = random.choice(("run", "pause", "resume", "abort", "key")) if name == "do" else value
+    if name == "jobs" and progress is not None:
+        found["progress"] = progress
 
 
-ways = st.builds(c.DirectionConditions, words, words, words)
-spans = st.none() | floats(0, 1e9)
-measured = st.builds(LinkFigures, counts, st.none() | floats(0, 1), spans, spans)
-plans = st.builds(PlanPart, counts, times, arrays, segments=runs())
-entries = st.builds(LogEntry, numbers, times, counts, st.none() | commands)
-echoes = st.none() | st.tuples(numbers, times, times)
-postures = st.builds(Posture, times, times, times)
-drives = st.builds(Drive, floats(-1e6, 1e6), floats(-1e6, 1e6))
-positive = floats(1e-3, 1e6)
-arcs = st.lists(
-    st.tuples(times, times, times, times, floats(-1e6, 1e6), floats(-9, 9), floats(1e-6, 1e3)), max_size=3
-).map(tuple)
-arc_runs = st.lists(st.tuples(counts, arcs), max_size=2).map(tuple)
-cells = st.lists(st.builds(CellChange, st.tuples(counts, counts), times, st.booleans()), max_size=2).map(tuple)
-followed = st.builds(Followed, numbers, counts, postures, counts) | st.builds(
-    Followed, numbers, counts, postures, counts, times, cells
+def _jobs(found: dict[str, Any], random: Random) -> None:
+    """Each job has a number of its own, words that can be read, and a goal that's known."""
+    for number, job in enumerate(found.get("jobs") or (), random.randint(1, 9)):
+        job["number"] = number
+        for name in {"text", "program"} & job.keys():
+            job[name] = "said " + job[name][:9].replace("\0", "")
+        if isinstance(job.get("to"), str):
+            job["to"] = {"x": 1.0, "y": -2.0}
+    if "places" in found:
+        found["places"] = {f"place {number}": goal for number, goal in enumerate(found["places"].values())}
+
+
+def _signs(found: dict[str, Any], random: Random) -> None:
+    """Of times that are equal, 0.0 and −0.0, one stands for both."""
+    for name, other in (("tail_start", "end"), ("past", "now")):
+        if name in found and found[name] == found.get(other):
+            found[name] = found[other]
+
+
+RULES: tuple[tuple[set[str], Rule], ...] = (
+    ({"dof", "segments"}, _widths),
+    ({"dof", "limits", "poses"}, _one_width),
+    ({"v_max", "alpha_max"}, _drives),
+    ({"X"}, _pose),
+    ({"tool", "speed"}, _pose),
+    ({"rates", "twist"}, _either),
+    ({"go", "do", "jobs"}, _one_task),
+    ({"jobs", "places"}, _jobs),
+    ({"tail_start", "end"}, _signs),
+    ({"past", "now"}, _signs),
 )
+"""Fields that must be there, and what puts them right together."""
 
 
-metres = floats(-1e6, 1e6)
-points = st.tuples(metres, metres)
-rows = st.lists(points, max_size=4).map(tuple)
-doubts = st.tuples(metres, metres, metres)
-near = floats(-1000, 1000)
-goals = st.builds(Goal, near, near, st.none() | near)
-texts = words.filter(str.strip)
-job_numbers = st.integers(1, 2**31 - 1)
-jobs = st.one_of(
-    st.builds(MoveJob, job_numbers, goals), st.builds(VoiceJob, job_numbers, texts),
-    st.builds(MessageJob, job_numbers, texts), st.builds(WaitJob, job_numbers, st.none() | floats(0, 1e4)),
-)  # fmt: skip
-job_lists = st.builds(
-    lambda some, goal: JobList(some, {"A": goal}),
-    st.lists(jobs, max_size=4, unique_by=lambda job: job.number), goals,
-)  # fmt: skip
-stages = st.sampled_from(JobStage)
-progress = st.builds(
-    Progress, stages,
-    st.lists(
-        st.builds(JobProgress, job_numbers, stages, words, st.none() | floats(0, 1e4)), max_size=3
-    ).map(tuple),
-    words,
-)  # fmt: skip
-forecasts = st.lists(
-    st.builds(JobForecast, job_numbers, positive, st.none() | positive, rows, words), max_size=3
-).map(tuple)
-asked = st.builds(RobotTask, go=goals) | st.builds(RobotTask, jobs=job_lists, progress=st.none() | progress)
-wanted = asked | st.builds(RobotTask, do=st.sampled_from(ListCommand))
-tasks = st.one_of(
-    asked, st.builds(RobotTask, halt=words),
-    st.builds(RobotTask, do=st.sampled_from([word for word in ListCommand if word is not ListCommand.DRY_RUN])),
-)  # fmt: skip
-task_reports = st.builds(
-    TaskReport, st.sampled_from(JourneyState), words, st.none() | goals, rows, words, progress,
-    st.sampled_from(OperatorLoss), words, words,
-)  # fmt: skip
+def edges() -> tuple[Any, ...]:
+    """What is at the edge of some field's range, and just beyond."""
+    found: dict[str, Any] = {}
+    for wire in KINDS:
+        for one in _inner(type_of(wire)):
+            found |= {repr(value): value for value in _edges(one)}
+    return tuple(found.values())
 
-messages = {
-    m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
-    m.Ask: st.builds(m.Ask, numbers, stamps),
-    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.ViewForm), st.none() | floats(0.1, 1e3)),
-    m.Want: st.builds(m.Want, counts, st.none() | counts),
-    m.Outcome: st.builds(m.Outcome, numbers, times, st.none() | receipts, words, counts),
-    m.Answer: st.builds(m.Answer.showing, frames, times),
-    m.Broadcast: st.builds(m.Broadcast.showing, frames, verdicts),
-    m.Scene: st.builds(m.Scene, numbers, words, arrays, times, times, counts, counts, times, rates),
-    m.History: st.builds(m.History, counts, counts, segments=runs()),
-    m.Change: st.builds(m.Change, numbers, counts, times, ids, counts, st.none() | counts, times, segments=runs()),
-    m.Pulse: st.builds(m.Pulse, counts, times, times | st.just(-math.inf)),
-    c.Hello: st.builds(c.Hello, numbers, st.sampled_from(c.Role), names, st.none() | words, st.none() | words),
-    c.Welcome: welcomes(),
-    c.Attached: st.builds(
-        c.Attached, numbers, words, arrays, words, floats(0.1, 60), stamps, words, words,
-        st.none() | floats(0.01, 2), words, words,
-    ),
-    Ping: st.builds(Ping, numbers, times),
-    Pong: st.builds(Pong, numbers, times, times, times),
-    c.Acquire: st.builds(c.Acquire, numbers),
-    c.TakeOver: st.builds(c.TakeOver, numbers),
-    c.Share: st.builds(c.Share, numbers, words),
-    c.Release: st.builds(c.Release, numbers, epochs),
-    c.Resume: st.builds(c.Resume, numbers, epochs),
-    c.Beat: st.builds(c.Beat, epochs),
-    c.Lease: leases,
-    c.Problem: st.builds(c.Problem, st.sampled_from(c.ProblemCode), words, st.none() | numbers, st.booleans()),
-    c.State: st.builds(
-        c.State, numbers, times, arrays, times, finite, times, finite, st.none() | epochs, st.booleans(),
-        words, counts, st.none() | arrays, st.none() | finite,
-        st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
-    ),
-    Orders: st.builds(
-        Orders, epochs, numbers, times, counts, times, times, counts, st.lists(entries, max_size=3).map(tuple)
-    ),
-    Report: st.builds(
-        Report, epochs, numbers, times, counts, times, finite, arrays, times, times, echoes, words,
-        st.lists(st.tuples(numbers, receipts), max_size=2).map(tuple), st.none() | plans, st.none() | arrays,
-        st.none() | floats(0, 1e3),
-    ),
-    b.MobileWelcome: st.builds(
-        b.MobileWelcome, numbers, words, st.sampled_from(c.Role), words, st.builds(DriveLimits, *[positive] * 4),
-        positive, positive, times, leases, floats(0.1, 60), st.booleans(), words, words, words,
-    ),
-    b.Postures: st.builds(
-        b.Postures, numbers, times, postures, drives, postures, stamps, st.none() | postures, st.none() | drives,
-        stamps, st.booleans(), st.none() | positive, st.none() | positive, st.integers(0, 2**64 - 1), st.booleans(),
-        words, counts, st.none() | finite, st.lists(st.tuples(times, st.none() | times), max_size=3).map(tuple),
-    ),
-    b.TaskOrder: st.builds(b.TaskOrder, numbers, wanted, st.integers(0, 2**64 - 1)),
-    b.Tasks: st.builds(
-        b.Tasks, st.sampled_from(Doing), st.sampled_from(JourneyState), words, st.none() | goals, rows,
-        floats(0, 1e6),
-        job_lists, progress, st.none() | forecasts, st.none() | st.sampled_from(OperatorLoss), words, words, words,
-        st.none() | numbers,
-    ),
-    b.Seen: st.builds(b.Seen, times, rows, st.none() | doubts),
-    b.Plan: st.builds(
-        b.Plan, points, st.lists(rows, max_size=3).map(tuple), rows, st.tuples(positive, positive, positive)
-    ),
-    DriveOrders: st.builds(
-        DriveOrders, epochs, numbers, times, times, times, st.none() | postures, arc_runs, arcs,
-        st.lists(st.builds(Errand, numbers, tasks), max_size=4).map(tuple),
-    ),
-    DriveReport: st.builds(
-        DriveReport, st.integers(0, 2**64 - 1), numbers, times, times, postures, drives, echoes, words, words,
-        st.none() | followed, stamps, stamps, st.booleans(), st.none() | positive, stamps, counts,
-        st.sampled_from(Doing), floats(0, 1e6), st.none() | task_reports,
-        st.none() | st.builds(SensedPoints, times, rows, st.none() | doubts),
-    ),
-    c.Survey: st.builds(c.Survey, numbers),
-    c.Impair: st.builds(c.Impair, numbers, epochs, st.none() | ways, st.none() | ways),
-    c.Network: st.builds(
-        c.Network, ways, ways, measured, measured, measured, counts, stamps, words, words, words,
-        spans, words, spans, spans, stamps, words, st.none() | numbers,
-    ),
-}  # fmt: skip
-"""What draws each message."""
+
+def _inner(kind: kinds.Type) -> Iterator[kinds.Type]:
+    for one in alternatives(kind):
+        yield one
+        if isinstance(one, Described):
+            for field in one.fields:
+                yield from _inner(field.type)
+        for name in ("item_type", "item_types", "key_type", "value_type"):
+            inner = getattr(one, name, ())
+            for part in inner if isinstance(inner, tuple) else (inner,):
+                yield from _inner(part)
+
+
+def _edges(kind: kinds.Type) -> Iterator[Any]:
+    match kind:
+        case kinds.IntType():
+            low, high = (int(end) for end in _ends(kind))
+            yield from (low - 1, low, high, high + 1)
+        case kinds.FloatType():
+            low, high = _ends(kind)
+            yield from (math.nextafter(low, -math.inf), low, high, math.nextafter(high, math.inf))
+        case kinds.StrType(pattern=str()):
+            yield from ("0", "01", "1", str(EPOCHS), str(EPOCHS + 1), "9" * 20, "1\n")
+        case kinds.StrType(max_length=int(most)):
+            yield from ("", "é" * most, "é" * (most + 1))
+        case kinds.EnumType() | kinds.LiteralType():
+            yield words(kind)[-1]

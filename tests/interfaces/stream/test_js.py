@@ -15,7 +15,7 @@ from tests.interfaces.stream.make_vectors import PATH
 
 MODULE = Path(interfaces.stream.__file__).parent / "static" / "vrs.js"
 VECTORS: dict[str, Any] = json.loads(PATH.read_text(encoding="utf-8"))
-NAMES = "evaluate, segmentsOf, Timeline, Reader, ClockSync"
+NAMES = "decode, evaluate, segmentsOf, Timeline, Reader, ClockSync"
 PLAY = """({ steps, lost, doubled }) => {
   const asked = [], reader = new vrs.Reader((m) => asked.push(m));
   const give = (text, now) => reader.receive(text, now);
@@ -31,13 +31,26 @@ PLAY = """({ steps, lost, doubled }) => {
 SAMPLES = "(samples) => samples.map(({ t, derivative }) => reader.joints(t, derivative))"
 
 
+def served(route: Any) -> None:
+    """Answer a page's request for a script that stands beside the reader."""
+    name = route.request.url.rpartition("/")[2]
+    if name:
+        route.fulfill(content_type="text/javascript", body=(MODULE.parent / name).read_text(encoding="utf-8"))
+    else:
+        route.fulfill(content_type="text/html", body="<!doctype html>")
+
+
 @pytest.fixture(scope="module")
 def page(browser: Any) -> Iterator[Any]:
     seen: list[str] = []
     opened = browser.new_page()
     opened.on("pageerror", lambda error: seen.append(str(error)))
-    source = MODULE.read_text(encoding="utf-8")
-    opened.add_script_tag(content=f"{source}\nwindow.vrs = {{ {NAMES} }};", type="module")
+    opened.on("console", lambda said: seen.append(said.text))
+    opened.route("http://vrs.test/**", served)
+    opened.goto("http://vrs.test/")
+    opened.add_script_tag(
+        content=f'import {{ {NAMES} }} from "/vrs.js"; window.vrs = {{ {NAMES} }};', type="module"
+    )
     opened.wait_for_function("window.vrs !== undefined")
     yield opened
     opened.close()
@@ -54,7 +67,7 @@ def test_segments_are_evaluated_to_the_bit(page: Any) -> None:
 
 def test_segments_are_read_to_the_bit(page: Any) -> None:
     text = next(v["json"] for v in VECTORS["messages"] if v["name"] == "history")
-    found = page.evaluate("(text) => vrs.segmentsOf(JSON.parse(text))", text)
+    found = page.evaluate("(text) => vrs.segmentsOf(vrs.decode(text))", text)
     assert [segment["start"] for segment in found] == [2.5, 3.25, np.nextafter(3.35, 4)]
     assert [segment["commandId"] for segment in found] == [None, 7, 7]
     assert [segment["coefficients"] for segment in found] == [row[2] for row in json.loads(text)["segments"]]
@@ -98,10 +111,11 @@ def test_a_new_scene_costs_only_what_hasnt_passed(page: Any) -> None:
     sent = page.evaluate(
         """() => { const sent = [], old = reader.timeline; reader.send = (m) => sent.push(m);
         const { initial, start, segments } = old, edit = reader.edit + 5;
+        const give = (message, now) => reader.receive(JSON.stringify({ robot: 'arm', ...message }), now);
         const scene = { type: 'scene', number: 1, initial, start, end: 9, segments: segments.length, edit, now: 1 };
-        reader.receive(scene, 50); const index = reader.passed();
+        give(scene, 50); const index = reader.passed();
         const rows = segments.slice(index).map((s) => [s.duration, s.commandId, s.coefficients, s.start]);
-        reader.receive({ type: 'history', edit, index, dof: 6, start: 0, segments: rows }, 51);
+        give({ type: 'history', edit, index, dof: 6, start: 0, segments: rows }, 51);
         const kept = segments[index - 1], end = kept.start + kept.duration;
         const same = segments.every((s, k) => s.start === reader.timeline.segments[k].start);
         return [sent, index, end, reader.past, reader.edit - edit, same]; }"""
@@ -121,7 +135,7 @@ def test_an_edit_that_doesnt_fit_makes_it_begin_again(page: Any, first: str) -> 
     sent = page.evaluate(
         f"""() => {{ const sent = []; reader.send = (m) => sent.push(m);
         const change = {{ type: 'change', edit: reader.edit + 1, first: {first}, end: 3 }};
-        reader.receive(change, 50); return sent; }}"""
+        reader.receive(JSON.stringify(change), 50); return sent; }}"""
     )
     assert sent == [{"type": "follow", "number": 2, "form": "segments"}]
     assert page.evaluate("() => reader.joints(0)") is None

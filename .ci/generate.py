@@ -1,0 +1,570 @@
+"""Write what is derived from the definitions of messages: the script that checks them in pages, documents' tables.
+
+`make generate` writes them, `python .ci/generate.py --check` says which are stale.
+"""
+
+from __future__ import annotations
+
+import enum
+import json
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from msgspec import inspect as kinds
+
+from interfaces.messages.control import Role, may_send
+from interfaces.messages.description import (
+    Described,
+    FieldDescription,
+    MessageDescription,
+    alternatives,
+    bounds,
+    described,
+    field_texts,
+    is_nullable,
+    words,
+)
+from interfaces.messages.fields import Party
+from interfaces.recording.channels import CHANNELS
+from interfaces.stream.codec import KINDS
+
+HOME = Path(__file__).resolve().parents[1]
+SCRIPT = HOME / "interfaces" / "stream" / "static" / "protocol.js"
+DOCUMENTS = HOME / "docs" / "protocol.md", HOME / "docs" / "recording.md"
+COMMAND = "make generate"
+
+
+def messages() -> list[MessageDescription]:
+    """The protocol's messages, as JSON has them."""
+    return [described(kind)._replace(sender=kind.sender) for kind in KINDS]
+
+
+def recorded() -> list[MessageDescription]:
+    """The messages of a recording."""
+    return [described(kind) for channel in CHANNELS for kind in channel.kinds]
+
+
+def parts(message: MessageDescription) -> Iterator[MessageDescription]:
+    """What has fields of its own within a message, innermost first, and the message."""
+    for field in message.fields:
+        yield from _within(field.type)
+    yield message
+
+
+def _within(kind: kinds.Type) -> Iterator[MessageDescription]:
+    for one in alternatives(kind):
+        if isinstance(one, Described):
+            yield from parts(described(one))
+        for name in ("item_type", "item_types", "key_type", "value_type"):
+            inner = getattr(one, name, ())
+            for part in inner if isinstance(inner, tuple) else (inner,):
+                yield from _within(part)
+
+
+# The script.
+
+HEAD = """// Generated from the definitions of messages by `{command}`: don't edit.
+// What may cross between a page and the server (docs/protocol.md), and what checks it where it comes in.
+
+/** The ends of whole numbers and of real ones: JSON has no infinity. */
+const WHOLE = 2 ** 63;
+const REAL = Number.MAX_VALUE;
+
+/** A message that can't be taken. */
+class Misfit extends Error {{}}
+
+function fail(where, wanted) {{
+  throw new Misfit(`${{where}} isn't ${{wanted}}`);
+}}
+
+function whole(x, low, high, where) {{
+  if (!Number.isInteger(x) || x < low || x > high) fail(where, `a whole number from ${{low}} to ${{high}}`);
+}}
+
+function real(x, low, high, where) {{
+  if (typeof x !== "number" || !(x >= low && x <= high)) fail(where, `a number from ${{low}} to ${{high}}`);
+}}
+
+function text(x, least, most, where) {{
+  if (typeof x !== "string" || x.length < least || (x.length > most && [...x].length > most))
+    fail(where, `a text of ${{least}} to ${{most}} characters`);
+}}
+
+function like(x, pattern, where) {{
+  if (typeof x !== "string" || !pattern.test(x)) fail(where, `a text like ${{pattern}}`);
+}}
+
+function flag(x, where) {{
+  if (typeof x !== "boolean") fail(where, "true or false");
+}}
+
+function word(x, known, where) {{
+  if (!known.has(x)) fail(where, `one of ${{[...known].join(", ")}}`);
+}}
+
+function list(x, least, most, where) {{
+  if (!Array.isArray(x) || x.length < least || x.length > most) fail(where, `an array of ${{least}} to ${{most}}`);
+}}
+
+function map(x, where) {{
+  if (typeof x !== "object" || x === null || Array.isArray(x)) fail(where, "a map");
+}}
+"""
+LEASED = """
+/** Types of messages that bear the epoch of the lease under which they're sent. */
+export const LEASED = new Set({});
+"""
+TAIL = """
+const told = new Set();
+
+/**
+ * Check a message, and fill in what was left out.
+ * @param {{object}} message as it came, parsed; it's changed in place
+ * @param {{(problem: string) => void}} tell is told, once for each, what can't be taken
+ * @returns {{?object}} the message; null for one of a type that isn't known, or that can't be taken
+ */
+export function check(message, tell = console.warn) {{
+  try {{
+    map(message, "a message");
+    const checkIt = CHECKS.get(message.type);
+    if (checkIt === undefined) return null;
+    checkIt(message);
+    return message;
+  }} catch (problem) {{
+    if (!(problem instanceof Misfit)) throw problem;
+    if (!told.has(problem.message)) tell(problem.message);
+    told.add(problem.message);
+    return null;
+  }}
+}}
+
+/** As `check`, of a frame as it came. */
+export function decode(frame, tell = console.warn) {{
+  let message = null;
+  try {{
+    message = JSON.parse(frame);
+  }} catch {{
+    // What is no JSON is no map, either.
+  }}
+  return check(message, tell);
+}}
+"""
+
+
+def script(found: Iterable[MessageDescription]) -> str:
+    """The module that checks what comes into a page."""
+    all_messages = list(found)
+    coming = [m for m in all_messages if m.sender in {Party.SERVER, Party.EITHER}]
+    shown = [m for m in all_messages if m.sender not in {Party.SITE, Party.ROBOT}]
+    pieces = [HEAD.format(command=COMMAND)]
+    pieces += [_typedef(part) for part in _each(shown)]
+    checks = _each(coming)
+    sets = dict.fromkeys(known for part in checks for field in part.fields for known in _choices(field.type))
+    names = {known: f"WORDS_{number}" for number, known in enumerate(sets, 1)}
+    pieces.append("\n".join(f"const {name} = new Set({json.dumps(known)});" for known, name in names.items()))
+    pieces += [_check(part, names) for part in checks]
+    rows = "\n".join(f"  [{json.dumps(message.tag)}, {_function(message)}]," for message in coming)
+    pieces.append(f"const CHECKS = new Map([\n{rows}\n]);")
+    leased = [message.tag for message in shown if message not in coming and "epoch" in _names(message)]
+    pieces.append(LEASED.format(json.dumps(leased)))
+    return "\n".join(pieces) + TAIL.format()
+
+
+def _names(message: MessageDescription) -> set[str]:
+    return {field.name for field in message.fields}
+
+
+def _each(found: Iterable[MessageDescription]) -> list[MessageDescription]:
+    """Messages and their parts, each once, what is needed first."""
+    return list({part.name: part for message in found for part in parts(message)}.values())
+
+
+def _choices(kind: kinds.Type) -> Iterator[tuple[Any, ...]]:
+    for one in alternatives(kind):
+        if isinstance(one, kinds.EnumType | kinds.LiteralType):
+            yield words(one)
+        for name in ("item_type", "item_types", "value_type"):
+            inner = getattr(one, name, ())
+            for part in inner if isinstance(inner, tuple) else (inner,):
+                yield from _choices(part)
+
+
+def _function(message: MessageDescription) -> str:
+    return f"check{message.name}"
+
+
+def _typedef(message: MessageDescription) -> str:
+    about = f"{message.sender}: {_without_sender(message.text)}" if message.sender else message.text
+    if message.is_array:
+        inner = ", ".join(_script_type(field.type, field.nullable) for field in message.fields)
+        return f"/** {about} @typedef {{[{inner}]}} {message.name} */"
+    lines = [f"/**\n * {about}\n * @typedef {{object}} {message.name}"]
+    if message.tag:
+        lines.append(f' * @property {{"{message.tag}"}} {message.tag_field}')
+    for field in message.fields:
+        name = field.name if field.required else f"[{field.name}]"
+        text = f" {field.text}" if field.text else ""
+        lines.append(f" * @property {{{_script_type(field.type, field.nullable)}}} {name} {_what(field)}.{text}")
+    return "\n".join(lines) + "\n */"
+
+
+def _without_sender(text: str) -> str:
+    return re.sub(r"^(Client|Server|Servlet|Holder|Admin|Robot|Either side): ", "", text)
+
+
+def _script_type(kind: kinds.Type, nullable: bool) -> str:
+    found = dict.fromkeys(_one_script_type(one) for one in alternatives(kind))
+    return "|".join([*found, *(["null"] if nullable else [])])
+
+
+def _one_script_type(kind: kinds.Type) -> str:
+    match kind:
+        case kinds.IntType() | kinds.FloatType():
+            return "number"
+        case kinds.StrType():
+            return "string"
+        case kinds.BoolType():
+            return "boolean"
+        case kinds.EnumType() | kinds.LiteralType():
+            return "|".join(json.dumps(one) for one in words(kind))
+        case kinds.ListType(item) | kinds.VarTupleType(item):
+            return f"Array<{_script_type(item, is_nullable(item))}>"
+        case kinds.TupleType(items):
+            return f"[{', '.join(_script_type(item, is_nullable(item)) for item in items)}]"
+        case kinds.DictType(_, item):
+            return f"Object<string, {_script_type(item, is_nullable(item))}>"
+        case _:
+            return described(kind).name
+
+
+def _check(message: MessageDescription, names: dict[tuple[Any, ...], str]) -> str:
+    label = message.tag or message.name
+    lines = [f"function {_function(message)}(m) {{"]
+    if message.is_array:
+        least = sum(field.required for field in message.fields)
+        most = "Infinity" if message.is_open else len(message.fields)
+        lines.append(f'  list(m, {least}, {most}, "{label}");')
+    else:
+        lines.append(f'  map(m, "{label}");')
+    if message.tag:
+        at, tag = f"m.{message.tag_field}", json.dumps(message.tag)
+        lines.append(f'  if ({at} !== undefined && {at} !== {tag}) fail("{label}", {tag});')
+    for number, field in enumerate(message.fields):
+        at = f"m[{number}]" if message.is_array else f"m.{field.name}"
+        lines += [f"  {line}" for line in _field_check(field, at, f"{label}.{field.name}", names)]
+    return "\n".join([*lines, "}"])
+
+
+def _field_check(field: FieldDescription, at: str, where: str, names: dict[tuple[Any, ...], str]) -> list[str]:
+    check = list(_place_check(field.type, at, where, names, 0))
+    if field.required:
+        return _guarded(f"if ({at} !== null)", check) if field.nullable else check
+    missing = f"{at} === undefined" + f" || {at} === null" * field.null_is_absence
+    default = re.sub(r"[A-Za-z_]\w*", r"m.\g<0>", field.computed) or json.dumps(field.default)
+    if isinstance(field.default, dict):
+        return [f"if ({missing}) {at} = {default};", *check]
+    if field.nullable and not field.null_is_absence:
+        return [f"if ({missing}) {at} = {default};", *_guarded(f"else if ({at} !== null)", check)]
+    if "[" in at:
+        # An array that ends before stays as it is.
+        return _guarded(f"if ({at} !== undefined && {at} !== null)", check)
+    return [f"if ({missing}) {at} = {default};", *_guarded("else", check)]
+
+
+def _guarded(head: str, check: list[str]) -> list[str]:
+    """Lines that are run where their head says."""
+    return [f"{head} {check[0]}"] if len(check) == 1 else [f"{head} {{", *(f"  {line}" for line in check), "}"]
+
+
+def _place_check(
+    kind: kinds.Type, at: str, where: str, names: dict[tuple[Any, ...], str], depth: int
+) -> Iterator[str]:
+    found = alternatives(kind)
+    if len(found) == 1:
+        yield from _one_check(found[0], at, where, names, depth)
+        return
+    for number, one in enumerate(found):
+        head = f"{'else if' if number else 'if'} ({_looks_like(one, at)})"
+        yield from [f"{head} {{", *(f"  {line}" for line in _one_check(one, at, where, names, depth)), "}"]
+    yield f'else fail({json.dumps(where)}, "of a kind that is known");'
+
+
+def _looks_like(kind: kinds.Type, at: str) -> str:
+    """Whether what stands there can only be this one of several."""
+    match kind:
+        case kinds.BoolType():
+            return f'typeof {at} === "boolean"'
+        case kinds.IntType():
+            return f"Number.isInteger({at})"
+        case kinds.FloatType():
+            return f'typeof {at} === "number"'
+        case kinds.StrType() | kinds.EnumType() | kinds.LiteralType():
+            return f'typeof {at} === "string"'
+        case kinds.ListType() | kinds.VarTupleType() | kinds.TupleType():
+            return f"Array.isArray({at})"
+    tag, tag_field = getattr(kind, "tag", None), getattr(kind, "tag_field", None)
+    alike = f'typeof {at} === "object" && {at} !== null'
+    return alike if tag is None else f"{alike} && {at}.{tag_field} === {json.dumps(tag)}"
+
+
+def _one_check(
+    kind: kinds.Type, at: str, where: str, names: dict[tuple[Any, ...], str], depth: int
+) -> Iterator[str]:
+    place = json.dumps(where)
+    match kind:
+        case kinds.IntType():
+            yield f"whole({at}, {_ends(kind)}, {place});"
+        case kinds.FloatType():
+            yield f"real({at}, {_ends(kind)}, {place});"
+        case kinds.StrType(pattern=str(pattern)):
+            yield f"like({at}, /{pattern.replace(chr(92) + 'A', '^').replace(chr(92) + 'Z', '$')}/, {place});"
+        case kinds.StrType():
+            yield f"text({at}, {_sizes(kind)}, {place});"
+        case kinds.BoolType():
+            yield f"flag({at}, {place});"
+        case kinds.EnumType() | kinds.LiteralType():
+            yield f"word({at}, {names[words(kind)]}, {place});"
+        case kinds.ListType(item) | kinds.VarTupleType(item):
+            yield f"list({at}, {_sizes(kind)}, {place});"
+            yield from _each_check(item, f"of {at}", where, names, depth)
+        case kinds.TupleType(items):
+            yield f"list({at}, {len(items)}, {len(items)}, {place});"
+            for number, item in enumerate(items):
+                check = list(_place_check(item, f"{at}[{number}]", where, names, depth))
+                yield from _guarded(f"if ({at}[{number}] !== null)", check) if is_nullable(item) else check
+        case kinds.DictType(_, item):
+            yield f"map({at}, {place});"
+            yield from _each_check(item, f"of Object.values({at})", where, names, depth)
+        case _:
+            yield f"{_function(described(kind))}({at});"
+
+
+def _each_check(
+    item: kinds.Type, of: str, where: str, names: dict[tuple[Any, ...], str], depth: int
+) -> Iterator[str]:
+    inner = "xyzuvw"[depth]
+    check = list(_place_check(item, inner, where, names, depth + 1))
+    if is_nullable(item):
+        check = _guarded(f"if ({inner} !== null)", check)
+    yield from _guarded(f"for (const {inner} {of})", check)
+
+
+def _ends(kind: kinds.IntType | kinds.FloatType) -> str:
+    low, high = bounds(kind)
+    largest = sys.float_info.max
+    return ", ".join(map(_literal, (-largest if low is None else low, largest if high is None else high)))
+
+
+def _literal(number: float) -> str:
+    """A number, as scripts write it."""
+    if abs(number) >= 2**62:
+        return "-" * (number < 0) + ("WHOLE" if isinstance(number, int) else "REAL")
+    return re.sub(r"0{6,}$", lambda zeros: f"e{len(zeros[0])}", repr(number).removesuffix(".0"))
+
+
+def _sizes(kind: Any) -> str:
+    least, most = kind.min_length or 0, "Infinity" if kind.max_length is None else kind.max_length
+    return f"{least}, {most}"
+
+
+# The documents' tables.
+
+MARKED = re.compile(r"<!-- (fields|messages|roles|words)(?:: ([\w -]+))? -->\n.*?<!-- end -->", re.S)
+
+
+def document(text: str, found: Iterable[MessageDescription]) -> str:
+    """A document with its tables as the definitions have them.
+
+    Raises:
+        KeyError: If it asks for a table of something that isn't there.
+    """
+    known = list(found)
+    tables = {name: part for part in _each(known) for name in (part.name, part.tag) if name}
+    tags = {part.name: part.tag for part in _each(known) if part.tag}
+    choices = {one.cls.__name__: one.cls for part in _each(known) for field in part.fields
+               for one in alternatives(field.type) if isinstance(one, kinds.EnumType)}  # fmt: skip
+
+    def table(match: re.Match[str]) -> str:
+        what, name = match[1], match[2]
+        if what == "roles":
+            rows = _roles_table(known)
+        elif what == "words":
+            rows = _words_table(choices[name])
+        elif what == "fields":
+            rows = _fields_table(name, tables[name], tags)
+        else:
+            rows = _messages_table([tables[one] for one in name.split()], tags)
+        head = f"<!-- {what}{f': {name}' if name else ''} -->"
+        # A table is one to Markdown between blank lines.
+        return "\n".join([head, "", *rows, "", "<!-- end -->"])
+
+    return MARKED.sub(table, text)
+
+
+def _fields_table(name: str, message: MessageDescription, tags: dict[str, str]) -> list[str]:
+    rows = [f"| `{name}` | | |", "|---|---|---|"]
+    rows += [_row(f"`{field.name}`", _what(field), _told(field.text, tags)) for field in message.fields]
+    return rows
+
+
+def _messages_table(found: list[MessageDescription], tags: dict[str, str]) -> list[str]:
+    rows = ["| message | fields | |", "|---|---|---|"]
+    for message in found:
+        fields = "; ".join(f"`{field.name}` {_what(field)}" for field in message.fields)
+        rows.append(_row(f"`{message.tag}`", fields, _told(message.text, tags)))
+    return rows
+
+
+def _row(*cells: str) -> str:
+    return "|" + "".join(f" {cell} |" if cell else " |" for cell in cells)
+
+
+def _told(text: str, tags: dict[str, str]) -> str:
+    """A docstring as the protocol's document has it: messages have other names there."""
+    return re.sub(r"`(\w+)`", lambda match: f"`{tags.get(match[1], match[1])}`", text).removesuffix(".")
+
+
+def _words_table(kind: type[enum.Enum]) -> list[str]:
+    texts = field_texts(kind)
+    return [
+        "| word | |",
+        "|---|---|",
+        *(_row(f"`{one.value}`", _told(texts.get(one.name, ""), {})) for one in kind),
+    ]
+
+
+def _roles_table(known: list[MessageDescription]) -> list[str]:
+    rows, before = ["| role | may send |", "|---|---|"], set[str]()
+    for role in (Role.VIEWER, Role.OPERATOR, Role.ADMIN):
+        may = [m.tag for m in known if m.tag != "hello" and may_send(role, Party(m.sender))]
+        new = ", ".join(f"`{tag}`" for tag in may if tag not in before)
+        rows.append(f"| `{role}` | {'the same, and ' if before else ''}{new} |")
+        before |= set(may)
+    return rows
+
+
+def _what(field: FieldDescription) -> str:
+    """A field's type, its range and its default, for people."""
+    what = " or ".join(dict.fromkeys(_one_what(one) for one in alternatives(field.type)))
+    if field.required:
+        return what + " or null" * field.nullable
+    return f"{what} ({_default(field)})"
+
+
+def _default(field: FieldDescription) -> str:
+    """What stands for a field that is left out, for people."""
+    if field.computed:
+        return re.sub(r"[A-Za-z_]\w*", r"`\g<0>`", field.computed).replace("-", "−")
+    match field.default:
+        case None:
+            return "absent"
+        case "":
+            return "empty"
+        case [] | {}:
+            return "none"
+        case float(number):
+            return _figure(number)
+        case default if any(isinstance(one, kinds.EnumType) for one in alternatives(field.type)):
+            return f"`{default}`"
+        case default:
+            return json.dumps(default, ensure_ascii=False).replace(".0", "")
+
+
+TERMS = {(1, 2**63 - 1): "number", (0, 2**63 - 1): "count", (-(2**63), 2**63 - 1): "integer"}
+"""Ranges of integers that have a name."""
+
+
+def _one_what(kind: kinds.Type) -> str:
+    match kind:
+        case kinds.IntType():
+            low, high = bounds(kind)
+            return TERMS.get((low, high)) or f"integer from {low} to {high}"
+        case kinds.FloatType():
+            return _real(kind)
+        case kinds.StrType(pattern=str()):
+            return "epoch"
+        case kinds.StrType(least, most):
+            return "text" if (least, most) == (None, 2000) else f"text of {least or 'up'} to {most} characters"
+        case kinds.BoolType():
+            return "boolean"
+        case kinds.EnumType() | kinds.LiteralType():
+            return ", ".join(f"`{one}`" for one in words(kind))
+        case kinds.ListType(item, least, most) | kinds.VarTupleType(item, least, most):
+            if isinstance(item, kinds.FloatType) and (least, most) == (1, 64):
+                return "joints"
+            size = "" if least == most else f"{least} to " if least else "up to "
+            return f"{size}{most or 'any number'} × {_several(item)}"
+        case kinds.TupleType(items):
+            return f"[{', '.join(_several(item) for item in items)}]"
+        case kinds.NamedTupleType(_, fields):
+            return f"[{', '.join(f'`{field.encode_name}`' for field in fields)}]"
+        case kinds.DictType(_, item):
+            return f"map of {_several(item)}"
+    inner = described(kind)
+    if inner.is_array:
+        return f"[{', '.join(f'`{field.name}`' for field in inner.fields)}]"
+    if inner.tag:
+        return f"`{inner.tag}`"
+    names = (f"`{field.name}`" + ("" if field.required else f" ({_default(field)})") for field in inner.fields)
+    return "map of " + ", ".join(names)
+
+
+def _several(kind: kinds.Type) -> str:
+    found = list(dict.fromkeys(_one_what(one) for one in alternatives(kind)))
+    return " or ".join([*found, *(["null"] if is_nullable(kind) else [])])
+
+
+def _real(kind: kinds.FloatType) -> str:
+    low, high = bounds(kind)
+    if kind.gt is not None:
+        return f"real > {_figure(kind.gt)}" + ("" if high in {None, 1e9} else f" up to {_figure(high)}")
+    if (low, high) in {(None, None), (-1e9, 1e9)}:
+        return "real"
+    if high in {None, 1e9}:
+        return f"real ≥ {_figure(low)}"
+    return f"real from {_figure(low)} to {_figure(high)}"
+
+
+def _figure(number: Any) -> str:
+    size = abs(number)
+    if size >= 1e4 and 10 ** (len(str(int(size))) - 1) == size:
+        raised = str(len(str(int(size))) - 1).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return ("−" if number < 0 else "") + f"10{raised}"
+    return f"{number:g}".replace("-", "−")
+
+
+# What is written, and what is stale.
+
+
+def derived() -> dict[Path, str]:
+    """Every file that has something derived, as it's to be."""
+    found, stored = messages(), recorded()
+    protocol, recording = DOCUMENTS
+    return {
+        SCRIPT: script(found),
+        protocol: document(protocol.read_text(encoding="utf-8"), found),
+        recording: document(recording.read_text(encoding="utf-8"), stored),
+    }
+
+
+def stale() -> list[Path]:
+    """The files that aren't what the definitions say."""
+    return [path for path, text in derived().items() if text != (path.read_text("utf-8") if path.exists() else "")]
+
+
+def main(asked: list[str]) -> int:
+    """Write what is stale, or with `--check` only name it."""
+    for path in (found := stale()):
+        if "--check" in asked:
+            print(f"{path.relative_to(HOME)} isn't what the definitions of messages say: run `{COMMAND}`")
+        else:
+            path.write_text(derived()[path], encoding="utf-8")
+            print(f"wrote {path.relative_to(HOME)}")
+    return int(bool(found) and "--check" in asked)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
