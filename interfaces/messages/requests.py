@@ -8,14 +8,19 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import Annotated, ClassVar, Final, TypeAlias
 
-from interfaces.messages.fields import Count, Message, Number, Rate, Time, Word
+from msgspec import Meta
+
+from interfaces.messages.fields import CommandId, Count, Message, Number, Rate, Time, Word
 from vrs.commands import Command, finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array
 from vrs.segment import PolynomialSegment
+
+LONGEST_DELAY: Final = 0.1
+"""Compact frames wait no longer for others that go in the same message [s]."""
 
 
 class FrameStatus(enum.StrEnum):
@@ -36,6 +41,8 @@ class ViewForm(enum.StrEnum):
     """The timeline, and each edit of it: the viewer evaluates it itself."""
     FRAMES = "frames"
     """Positions, at a broadcaster's rate and as it asks for them."""
+    COMPACT = "compact"
+    """The same frames, quantised and predicted: a tenth of the bytes; see `interfaces.messages.compact`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,11 +114,15 @@ class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
     form: ViewForm
     rate: Rate | None = None
     """Wished rate of frames [1/s]; the broadcaster with the nearest one is taken."""
+    delay: Annotated[float, Meta(ge=0, le=LONGEST_DELAY)] = 0.0
+    """How long a compact frame may wait for others that go in the same message [s]."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
         if self.rate is not None:
             finite("rate", self.rate, "None or frames a second")
+        if not 0 <= finite("delay", self.delay, "0 to 0.1 s") <= LONGEST_DELAY:
+            raise InvalidValueError("delay", self.delay, "0 to 0.1 s")
 
 
 class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
@@ -173,6 +184,21 @@ class Broadcast:
     version: ClassVar[int] = 1
     frame: Frame
     verdicts: Verdicts
+
+
+Range: TypeAlias = tuple[Count, Count, CommandId | None]
+"""First and last number of frames that were falsified, and the command."""
+
+
+class Compact(Message, frozen=True, omit_defaults=True, gc=False, tag="compact"):
+    """Servlet: the newest frames of a broadcaster in compact form, and what became of earlier ones."""
+
+    q: Annotated[bytes, Meta(min_length=2, max_length=32768)]
+    """1 to 16 frames; see `interfaces.messages.compact`. In JSON base64."""
+    since: Count | None = None
+    """Of older frames than this nothing is known; absent: as before, of a key frame 1."""
+    falsified: Annotated[tuple[Range, ...], Meta(max_length=256)] = ()
+    """Frames that were falsified since the message before; with a key frame, all that are known."""
 
 
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
@@ -255,5 +281,5 @@ def _check_number(number: object) -> None:
 
 Request: TypeAlias = Order | Ask | Follow | Want
 """What a client sends."""
-Reply: TypeAlias = Outcome | Answer | Broadcast | Scene | History | Change | Pulse
+Reply: TypeAlias = Outcome | Answer | Broadcast | Compact | Scene | History | Change | Pulse
 """What a servlet sends."""

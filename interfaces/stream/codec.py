@@ -55,6 +55,7 @@ WIRES: dict[type, type[Wire]] = {
     messages.Outcome: message_wires.OutcomeWire,
     messages.Answer: message_wires.AnswerWire,
     messages.Broadcast: message_wires.BroadcastWire,
+    messages.Compact: messages.Compact,
     messages.Scene: messages.Scene,
     messages.History: message_wires.HistoryWire,
     messages.Change: message_wires.ChangeWire,
@@ -197,7 +198,15 @@ def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Wire]:
     return reader
 
 
-FOR_ONE = (messages.Outcome, messages.Answer, messages.Scene, messages.Pulse, Pong, control.Problem)
+FOR_ONE = (
+    messages.Outcome,
+    messages.Answer,
+    messages.Compact,
+    messages.Scene,
+    messages.Pulse,
+    Pong,
+    control.Problem,
+)
 """What one client alone gets: remembering it would push out what others are still to get."""
 
 

@@ -36,6 +36,7 @@ from interfaces.messages.fields import (
     numbers,
     text,
 )
+from interfaces.messages.requests import Range
 from interfaces.messages.segments import C, Dof, Segments, rows, segments_of
 
 
@@ -100,9 +101,6 @@ class AnswerWire(Message, frozen=True, omit_defaults=True, gc=False, tag="answer
         """The answer."""
         q = array(self.q)
         return Answer(Frame(self.number, self.t, self.made_at, q, self.status, self.falsified_by), self.now)
-
-
-Range = tuple[Count, Count, CommandId | None]
 
 
 class BroadcastWire(Message, frozen=True, omit_defaults=True, gc=False, tag="broadcast"):
