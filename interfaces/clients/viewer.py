@@ -54,8 +54,8 @@ class Viewer:
     """An observer that asks periodically, with play-back: play, pause, step, rewind, seek, rate, loop, go live.
 
     It begins live. In the form of segments it holds the whole timeline and evaluates it itself; in the form of
-    frames, plain or compact, it shows a broadcaster's while live, and asks for others. Nothing but its own user moves it away from
-    where it is.
+    frames, plain or compact, it shows a broadcaster's while live, and asks for others. Nothing but its own user
+    moves it away from where it is.
     """
 
     def __init__(

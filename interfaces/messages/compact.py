@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from operator import add, sub
 from typing import Final
 
@@ -236,14 +237,21 @@ def _signed(value: int) -> int:
     return value >> 1 if value % 2 == 0 else ~(value >> 1)
 
 
+def _several(integers: Iterator[int], count: int) -> tuple[int, ...]:
+    found = tuple(map(_signed, islice(integers, count)))
+    if len(found) < count:
+        raise StopIteration
+    return found
+
+
 def _key(integers: Iterator[int]) -> tuple[_Times, _State]:
     dof, ticks, period, ahead = next(integers), _signed(next(integers)), next(integers), _signed(next(integers))
     if not 1 <= dof <= MOST_JOINTS:
         raise InvalidValueError("joints", dof, f"1 to {MOST_JOINTS}")
     if not 1 <= period <= _LONGEST_PERIOD:
         raise InvalidValueError("period", period, f"1 to {_LONGEST_PERIOD} ticks")
-    x, v, a = (tuple(_signed(next(integers)) for _ in range(dof)) for _ in range(3))
-    return _checked((ticks, period, ahead), (x, v, a))
+    state = _several(integers, dof), _several(integers, dof), _several(integers, dof)
+    return _checked((ticks, period, ahead), state)
 
 
 def _following(integers: Iterator[int], flags: int, times: _Times, state: _State) -> tuple[_Times, _State]:
@@ -251,7 +259,7 @@ def _following(integers: Iterator[int], flags: int, times: _Times, state: _State
     ticks += period + (_signed(next(integers)) if flags & TIMED else 0)
     x, v, a = state
     if not flags & STILL:
-        a = tuple(value + _signed(next(integers)) for value in a)
+        a = tuple(map(add, a, _several(integers, len(a))))
     v = tuple(map(add, v, a))
     return _checked((ticks, period, ahead), (tuple(map(add, x, v)), v, a))
 

@@ -131,7 +131,8 @@ receipts = st.builds(
 rates = st.sampled_from([None, 60.0])
 statuses = st.sampled_from(m.FrameStatus)
 frames = st.builds(m.Frame, counts, times, times, arrays, statuses, ids)
-verdicts = st.builds(m.Verdicts, counts, counts, st.lists(st.tuples(counts, counts, ids), max_size=4).map(tuple))
+falsified = st.lists(st.tuples(counts, counts, ids), max_size=4).map(tuple)
+verdicts = st.builds(m.Verdicts, counts, counts, falsified)
 leases = st.builds(
     c.Lease, st.sampled_from(LeaseState), st.none() | epochs, st.none() | names, st.booleans(), st.none() | one,
     st.none() | st.sampled_from(LeaseEnd), st.booleans(),
@@ -227,11 +228,14 @@ task_reports = st.builds(
 messages = {
     m.Order: st.builds(m.Order, numbers, st.none() | commands, st.integers(0, 2**64 - 1)),
     m.Ask: st.builds(m.Ask, numbers, stamps),
-    m.Follow: st.builds(m.Follow, numbers, st.sampled_from(m.ViewForm), st.none() | floats(0.1, 1e3)),
+    m.Follow: st.builds(
+        m.Follow, numbers, st.sampled_from(m.ViewForm), st.none() | floats(0.1, 1e3), floats(0.0, 0.1)
+    ),
     m.Want: st.builds(m.Want, counts, st.none() | counts),
     m.Outcome: st.builds(m.Outcome, numbers, st.none() | receipts, words, counts, times),
     m.Answer: st.builds(m.Answer, frames, times),
     m.Broadcast: st.builds(m.Broadcast, frames, verdicts),
+    m.Compact: st.builds(m.Compact, st.binary(min_size=2), st.none() | counts, falsified),
     m.Scene: st.builds(m.Scene, numbers, words, arrays, times, times, counts, counts, times, rates),
     m.History: st.builds(m.History, counts, counts, runs()),
     m.Change: st.builds(m.Change, counts, numbers, ids, counts, runs(), st.none() | counts, times, times),
