@@ -31,6 +31,7 @@ from interfaces.messages import (
     Pulse,
     Reply,
     Scene,
+    Verdicts,
     ViewForm,
     Want,
 )
@@ -386,8 +387,10 @@ class FrameSource:
         frame = message.frame
         if self._newest is None or frame.number > self._newest.number:
             self._newest = frame
-            self._recent.append(frame)
             self._judge(message)
+            self._recent.append(frame)
+            if self._waited:
+                self._recent = deque((_judged(one, message.verdicts) for one in self._recent), MOST_FRAMES)
 
     def _unpack(self, message: Compact, now: float) -> None:
         """Read compact frames; those that wait for others in a message are shown as much later."""
@@ -489,6 +492,14 @@ class FrameSource:
     def close(self) -> None:
         """Ask no more."""
         self._observer.close()
+
+
+def _judged(frame: Frame, verdicts: Verdicts) -> Frame:
+    """A frame with what became of it."""
+    verdict = status_of(frame.number, verdicts) if frame.status is FrameStatus.PREDICTED else None
+    if verdict is None:
+        return frame
+    return replace(frame, status=verdict.status, falsified_by=verdict.falsified_by)
 
 
 _Value = TypeVar("_Value")

@@ -38,7 +38,7 @@ _LATEST: Final = int(LARGEST) * TICKS
 _LONGEST_PERIOD: Final = 10**10
 _LONGEST: Final = 18
 _LAST, _MORE = "01234567", "89abcdef"
-_INTEGER: Final = re.compile("[89a-f]*[0-7]")
+_INTEGER: Final = re.compile(f"[89a-f]{{0,{_LONGEST - 1}}}[0-7]")
 _Times = tuple[int, int, int]
 """When it shows, the period, how far that's ahead of when it was made [ticks]."""
 _State = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
@@ -220,16 +220,16 @@ def _integers(data: bytes) -> list[int]:
     digits = data.hex()
     texts = _INTEGER.findall(digits)
     if sum(map(len, texts)) != len(digits):
-        raise InvalidValueError("compact frames", f"{len(data)} bytes", "a last integer that ends")
+        raise InvalidValueError("compact frames", f"{len(data)} bytes", f"integers of at most {_LONGEST} digits")
     return [_SHORT[text] if text in _SHORT else _integer(text) for text in texts]
 
 
 def _integer(text: str) -> int:
     value = 0
-    for digit in reversed(text[: _LONGEST + 1]):
+    for digit in reversed(text):
         value = value << 3 | int(digit, 16) & 7
-    if len(text) > _LONGEST or value > LARGEST_INTEGER:
-        raise InvalidValueError("integer", f"{len(text)} digits", f"at most {_LONGEST}, and below 2**53")
+    if value > LARGEST_INTEGER:
+        raise InvalidValueError("integer", value, "below 2**53")
     return value
 
 

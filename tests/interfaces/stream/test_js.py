@@ -180,9 +180,9 @@ def test_compact_bytes_that_are_wrong_are_refused_as_in_python(page: Any) -> Non
     given = []
     for _ in range(3000):
         data = bytearray(whole[rng.integers(len(whole))])
-        for _ in range(rng.integers(1, 4)):
+        for _ in range(rng.integers(0, 3)):
             data[rng.integers(len(data))] = rng.integers(256)
-        given.append(bytes(data[: rng.integers(2, len(data) + 1)]))
+        given.append(bytes(data[: rng.integers(2, len(data) + 1)] if rng.random() < 0.2 else data))
     found = page.evaluate(
         """(rows) => { let reader = new vrs.CompactReader(); return rows.map((q, k) => {
         if (k % 5 === 0) reader = new vrs.CompactReader();
