@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import time
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -35,6 +37,7 @@ from vrs.model import frozen_array
 
 RUNS = int(os.environ.get("VRS_FUZZ_RUNS", "20000"))
 """Mutated messages."""
+DOCUMENT = Path(__file__).parents[3] / "docs" / "protocol.md"
 NEAR = 0.5 / STEPS
 """How far a joint may be off [rad]: below the 1e-5 that the document states."""
 VECTORS: list[dict[str, Any]] = json.loads(PATH.read_text(encoding="utf-8"))["compact"]
@@ -359,6 +362,18 @@ class FromTheDocument:
         assert digits in ([], [0])
         self.number = first + form // 2
         return shown
+
+
+def test_the_example_of_the_document_is_the_first_vector() -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    _, _, section = text.partition("### Compact frames\n")
+    section, _, _ = section.partition("\n### ")
+    assert json.loads(VECTORS[0]["json"])["q"] in section
+    message = decode(VECTORS[0]["json"].encode(), Encoding.JSON, allowed=Compact)
+    assert encode(message, Encoding.MSGPACK).hex() in re.sub(r"\s", "", section)
+    table = section.partition("| digits | integers | |\n|---|---|---|\n")[2].partition("\n\n")[0]
+    digits = ("".join(re.findall("`([0-9a-f]+)`", row.split("|")[1])) for row in table.splitlines())
+    assert "".join(digits) == VECTORS[0]["hex"]
 
 
 def test_a_reader_from_the_document_reads_the_vectors() -> None:
