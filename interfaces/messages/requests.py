@@ -42,7 +42,7 @@ class ViewForm(enum.StrEnum):
     FRAMES = "frames"
     """Positions, at a broadcaster's rate and as it asks for them."""
     COMPACT = "compact"
-    """The same frames, quantised and predicted, in a fifth to a sixteenth of the bytes; see `interfaces.messages.compact`."""
+    """The same frames, quantised and predicted, in 1/5 to 1/16 of the bytes; see `interfaces.messages.compact`."""
 
 
 @dataclass(frozen=True, slots=True)
