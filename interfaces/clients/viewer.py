@@ -89,9 +89,9 @@ class Viewer:
         if not 0.1 <= self.rate <= 1000:
             raise InvalidValueError("rate", rate, "0.1 to 1000 frames a second")
         lead = finite("lead", lead, "−60 to 60 s")
-        if abs(lead) > 60 or (lead and form is not ViewForm.SEGMENTS):
+        if abs(lead) > 60 or (lead and form != ViewForm.SEGMENTS):
             raise InvalidValueError("lead", lead, "−60 to 60 s for segments, 0 for frames")
-        if delay and form is not ViewForm.COMPACT:
+        if delay and form != ViewForm.COMPACT:
             raise InvalidValueError("delay", delay, "0 to 0.1 s for compact frames, else 0")
         port, self._own = port_to(engine)
         self.form = ViewForm(form)
