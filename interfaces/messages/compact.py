@@ -28,8 +28,8 @@ TICKS: Final = 1_000_000
 """Ticks a second, of times."""
 MOST_FRAMES: Final = 16
 """Frames in a message, at most."""
-LARGEST_INTEGER: Final = 2**53 - 1
-"""Integers that cross are no larger: JavaScript's numbers hold them."""
+LAST_NUMBER: Final = 2**53 - 1
+"""Frames are numbered up to this: JavaScript's numbers hold it, as they hold all that counts here."""
 TIMED, STILL, PREDICTED = 1, 2, 4
 """What the bits of a frame's first integer say."""
 
@@ -187,7 +187,7 @@ class CompactDecoder:
         first, form, behind = next(integers), next(integers), next(integers)
         count, key = form // 2 + 1, form % 2 == 1
         last = first + count - 1
-        if count > MOST_FRAMES or first < 1 or last > LARGEST_INTEGER or behind > last:
+        if count > MOST_FRAMES or first < 1 or last > LAST_NUMBER or behind > last:
             raise InvalidValueError("frames", (first, count, behind), f"1 to {MOST_FRAMES}, numbered from 1")
         if last <= self.number:
             return ()
@@ -228,8 +228,6 @@ def _integer(text: str) -> int:
     value = 0
     for digit in reversed(text):
         value = value << 3 | int(digit, 16) & 7
-    if value > LARGEST_INTEGER:
-        raise InvalidValueError("integer", value, "below 2**53")
     return value
 
 

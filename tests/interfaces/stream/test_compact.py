@@ -20,7 +20,7 @@ from interfaces import Viewer
 from interfaces.engine_server.broadcast import KEY_PERIOD, Broadcaster
 from interfaces.messages import Broadcast, Compact, Follow, Frame, FrameStatus, Scene, ViewForm
 from interfaces.messages.compact import (
-    LARGEST_INTEGER,
+    LAST_NUMBER,
     STEPS,
     TICKS,
     CompactDecoder,
@@ -265,11 +265,13 @@ class TestTheServersSide:
             for first, last, by in verdicts.falsified:
                 told |= dict.fromkeys(range(first, last + 1), by)
             assert verdicts.through == newest.verdicts.through
+            assert verdicts.since == newest.verdicts.since
             for first, last, by in newest.verdicts.falsified:
                 for number in range(max(first, verdicts.since), last + 1):
                     assert told[number] == by
             told = {number: by for number, by in told.items() if number >= newest.verdicts.since}
         assert lost > 5
+        assert newest.verdicts.since > 1
         assert len(told) > 100
 
 
@@ -443,7 +445,7 @@ def test_no_bytes_bring_anything_but_frames_or_an_error_that_says_why() -> None:
         assert len(found) <= 16
         for one in found:
             got = one.frame
-            assert 1 <= got.number <= LARGEST_INTEGER
+            assert 1 <= got.number <= LAST_NUMBER
             assert 1 <= len(got.q) <= 64
             assert np.abs(got.q).max() <= 1e9
             assert max(abs(got.t), abs(got.made_at)) <= 1e9
@@ -451,6 +453,19 @@ def test_no_bytes_bring_anything_but_frames_or_an_error_that_says_why() -> None:
     assert read > RUNS / 50
     assert len(refused) > RUNS / 20
     assert all(" must be " in text and len(text) < 2000 for text in refused)
+
+
+def test_an_integer_has_eighteen_digits_at_most() -> None:
+    # A number of 18 digits, a key frame of one joint: the digits that are 0 cost, and mean nothing.
+    for digits, fits in ((17, True), (18, False), (30, False)):
+        text = "9" + "8" * (digits - 1) + "0" + "10" + "01040" + "000"
+        message = Compact(bytes.fromhex(text + "0" * (len(text) % 2)))
+        if fits:
+            (found,) = CompactDecoder().receive(message)
+            assert (found.frame.number, found.frame.q.tolist()) == (1, [0.0])
+        else:
+            with pytest.raises(InvalidValueError, match="integers of at most 18 digits"):
+                CompactDecoder().receive(message)
 
 
 def test_the_longest_message_takes_no_time() -> None:

@@ -177,7 +177,8 @@ def test_compact_frames_are_read_to_the_bit(page: Any) -> None:
 def test_compact_bytes_that_are_wrong_are_refused_as_in_python(page: Any) -> None:
     rng = np.random.default_rng(6)
     whole = [bytes.fromhex(vector["hex"]) for vector in VECTORS["compact"]]
-    given = []
+    long = ("9" + "8" * (digits - 1) + "0" + "10" + "01040" + "000" for digits in (17, 18, 30))
+    given = [bytes.fromhex(text + "0" * (len(text) % 2)) for text in long]
     for _ in range(3000):
         data = bytearray(whole[rng.integers(len(whole))])
         for _ in range(rng.integers(0, 3)):
