@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from statistics import median
 from typing import Any
 
@@ -16,7 +16,10 @@ from benchmarks.results import Bar, Cost, Part, Result
 from interfaces import messages as m
 from interfaces.clients.ports import RemotePort
 from interfaces.clients.viewer_sources import Mirror
+from interfaces.engine_server.broadcast import CompactSlot
 from interfaces.engine_server.site import Site
+from interfaces.messages.compact import CompactDecoder, CompactEncoder
+from interfaces.messages.requests import LONGEST_DELAY
 from interfaces.stream import Encoding, decode, encode
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, PolynomialSegment
 from vrs.model import Array
@@ -45,8 +48,8 @@ def part() -> Part:
         "Wire",
         f"A follower of segments for {SECONDS} s: a parabolic move a second, `change` and `pulse` in msgpack, and "
         f"{RATE} frames a second: meshcat's `set_transform` of seven links by its own packer, our frames, and maps "
-        "of nothing but time and joints. The copy is compared with the engine at every frame. Then the time to "
-        "write and read a message, without a socket.",
+        "of nothing but time and joints. The copy is compared with the engine at every frame. The same "
+        "frames compact: quantised and predicted. Then the time to write and read a message, without a socket.",
         (
             *(
                 Result(
@@ -62,6 +65,7 @@ def part() -> Part:
                 for name, (theirs, share) in peers.items()
             ),
             Result("segments in JSON", Cost(streams[Encoding.JSON][0]), unit="B/s"),
+            *_compact(frames),
             *_costs(frames[-1]),
         ),
     )
@@ -113,6 +117,33 @@ def _set(link: int, X: Array) -> dict[str, Any]:
 
 def _rate(frames: Any) -> float:
     return sum(map(len, frames)) / SECONDS
+
+
+def _compact(frames: list[m.Frame]) -> list[Result]:
+    """The frames in compact form: bytes a second, and what one costs in a message of its own."""
+    results = []
+    for delay in (0.0, LONGEST_DELAY):
+        sent = list(_written(frames, delay))
+        size = sum(map(len, sent)) / SECONDS
+        results.append(Result(f"compact frames that wait {1e3 * delay:g} ms at most", Cost(size), unit="B/s"))
+    writer, sent, reader = _written(frames, 0.0), iter(list(_written(frames, 0.0))), CompactDecoder()
+
+    def read() -> None:
+        reader.receive(decode(next(sent), Encoding.MSGPACK, allowed=m.Compact))
+
+    results.append(Result("write a compact frame, msgpack", _time(lambda: next(writer))))
+    results.append(Result("read a compact frame, msgpack", _time(read)))
+    return results
+
+
+def _written(frames: list[m.Frame], delay: float) -> Iterator[bytes]:
+    """The messages that a viewer of compact frames gets."""
+    slot = CompactSlot(CompactEncoder(RATE), RATE, delay)
+    for frame in frames:
+        slot.put(m.Broadcast.showing(frame, m.Verdicts(1, frame.number)))
+        message = slot.take()
+        if message is not None:
+            yield encode(message, Encoding.MSGPACK)
 
 
 def _costs(frame: m.Frame) -> list[Result]:

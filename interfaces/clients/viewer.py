@@ -54,8 +54,8 @@ class Viewer:
     """An observer that asks periodically, with play-back: play, pause, step, rewind, seek, rate, loop, go live.
 
     It begins live. In the form of segments it holds the whole timeline and evaluates it itself; in the form of
-    frames it shows a broadcaster's while live, and asks for others. Nothing but its own user moves it away from
-    where it is.
+    frames, plain or compact, it shows a broadcaster's while live, and asks for others. Nothing but its own user
+    moves it away from where it is.
     """
 
     def __init__(
@@ -66,6 +66,7 @@ class Viewer:
         form: ViewForm = ViewForm.SEGMENTS,
         lead: float = 0.0,
         resend: float = 0.3,
+        delay: float = 0.0,
     ) -> None:
         """Reach an engine; it's asked for the scene at the first `advance`.
 
@@ -77,20 +78,27 @@ class Viewer:
                 D_f + D_b frames are of age 0 by the user's clock where D = −D_f. For segments: broadcasters have
                 their own.
             resend: After how long without an answer something is asked for again [s].
+            delay: How long a compact frame may wait for others that go in the same message [s], 0 to 0.1: it's
+                shown as much later, and costs a third.
 
         Raises:
-            InvalidValueError: If something is out of range, or a lead is given for frames.
+            InvalidValueError: If something is out of range, a lead is given for frames, or a delay for anything but
+                compact frames.
         """
         self.rate = finite("rate", rate, "0.1 to 1000 frames a second")
         if not 0.1 <= self.rate <= 1000:
             raise InvalidValueError("rate", rate, "0.1 to 1000 frames a second")
         lead = finite("lead", lead, "−60 to 60 s")
-        if abs(lead) > 60 or (lead and form is ViewForm.FRAMES):
+        if abs(lead) > 60 or (lead and form != ViewForm.SEGMENTS):
             raise InvalidValueError("lead", lead, "−60 to 60 s for segments, 0 for frames")
+        if delay and form != ViewForm.COMPACT:
+            raise InvalidValueError("delay", delay, "0 to 0.1 s for compact frames, else 0")
         port, self._own = port_to(engine)
         self.form = ViewForm(form)
         self.segments = SegmentSource(port, lead=lead, resend=resend) if self.form is ViewForm.SEGMENTS else None
-        self._source = self.segments or FrameSource(port, rate=self.rate, resend=resend)
+        self._source = self.segments or FrameSource(
+            port, rate=self.rate, resend=resend, form=self.form, delay=delay
+        )
         port.join(self)
         self.port = port
         self.head = PlayHead(self._source.live.at, lambda: self._source.span)
@@ -112,7 +120,7 @@ class Viewer:
 
     @property
     def timeline(self) -> Timeline | None:
-        """The timeline as far as it has come; None before that, and in the form of frames."""
+        """The timeline as far as it has come; None before that, and in the forms of frames."""
         return None if self.segments is None else self.segments.mirror.timeline
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import takewhile
@@ -22,6 +22,7 @@ from interfaces.link.delivery import interval_of
 from interfaces.messages import (
     Broadcast,
     Change,
+    Compact,
     Follow,
     Frame,
     FrameStatus,
@@ -30,9 +31,11 @@ from interfaces.messages import (
     Pulse,
     Reply,
     Scene,
+    Verdicts,
     ViewForm,
     Want,
 )
+from interfaces.messages.compact import MOST_FRAMES, CompactDecoder
 from vrs.errors import InvalidValueError
 from vrs.model import frozen_array
 from vrs.segment import PolynomialSegment
@@ -324,9 +327,19 @@ class SegmentSource(ViewerSource):
 class FrameSource:
     """Shows a broadcaster's frames while live, and asks for others, early enough that they come in time."""
 
-    def __init__(self, port: EnginePort, *, rate: float, resend: float) -> None:
+    def __init__(
+        self,
+        port: EnginePort,
+        *,
+        rate: float,
+        resend: float,
+        form: ViewForm = ViewForm.FRAMES,
+        delay: float = 0.0,
+    ) -> None:
         self._port, self._resend, self._period = port, resend, 1.0 / rate
-        self._follow = Follow(port.number(), ViewForm.FRAMES, rate)
+        self._follow = Follow(port.number(), form, rate, delay)
+        self._decoder = CompactDecoder()
+        self._recent: deque[Frame] = deque(maxlen=MOST_FRAMES)
         self._observer = Observer(port, resend=resend)
         self._due = -math.inf
         self._asked: OrderedDict[int, float] = OrderedDict()
@@ -362,12 +375,46 @@ class FrameSource:
             self._scene = message
             if message.rate is None:
                 self.live.heard(message.now, now=now)
+            else:
+                self._due = now + max(self._resend, 2.0 / message.rate)
         elif isinstance(message, Broadcast):
-            frame = message.frame
-            self.live.heard(frame.t, now=now)
-            if self._newest is None or frame.number > self._newest.number:
-                self._newest = frame
-                self._judge(message)
+            self.live.heard(message.frame.t, now=now)
+            self._take(message)
+        elif isinstance(message, Compact) and self._scene is not None:
+            self._unpack(message, now)
+
+    def _take(self, message: Broadcast) -> None:
+        frame = message.frame
+        if self._newest is None or frame.number > self._newest.number:
+            self._newest = frame
+            self._judge(message)
+            self._recent.append(frame)
+            if self._waited:
+                self._recent = deque((_judged(one, message.verdicts) for one in self._recent), MOST_FRAMES)
+
+    def _unpack(self, message: Compact, now: float) -> None:
+        """Read compact frames; those that wait for others in a message are shown as much later."""
+        try:
+            frames = self._decoder.receive(message)
+        except InvalidValueError:
+            frames = ()
+        for broadcast in frames:
+            self._take(broadcast)
+        if frames:
+            self.live.heard(frames[-1].frame.t - self._waited, now=now)
+
+    @property
+    def _waited(self) -> float:
+        """How long a frame waits for others, at most [s]: whole periods."""
+        rate = None if self._scene is None else self._scene.rate
+        return int(self._follow.delay * rate + 1e-6) / rate if rate else 0.0
+
+    @property
+    def _lacking(self) -> bool:
+        """Whether the scene is to be asked for, and with it a key frame."""
+        if self._scene is None:
+            return True
+        return self._follow.form is ViewForm.COMPACT and self._scene.rate is not None and self._decoder.lacking
 
     def _judge(self, message: Broadcast) -> None:
         """Learn what became of the frames that were shown; the older come first."""
@@ -386,7 +433,7 @@ class FrameSource:
 
     def advance(self, *, now: float) -> None:
         """Follow the broadcaster, and take what was asked for."""
-        if self._scene is None and now >= self._due:
+        if self._lacking and now >= self._due:
             self._port.send(self._follow, now=now)
             self._due = now + self._resend
         for observation in self._observer.advance(now=now):
@@ -405,7 +452,10 @@ class FrameSource:
     def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:
         """The frame nearest to a time, if it's near enough and not the last one; what comes next is asked for."""
         if live and self._newest is not None:
-            return None if self._newest.t < floor else self._show(self._newest, number, self._broadcast)
+            newest = self._newest
+            if self._waited:
+                newest = next((frame for frame in reversed(self._recent) if frame.t <= t + SAME), self._recent[0])
+            return None if newest.t < floor else self._show(newest, number, self._broadcast)
         next_, later = ahead(self._period), ahead(self.delay)
         self._ask(t if later is None else later, now)
         near = SAME + (0.0 if next_ is None else NEAR * abs(next_ - t))
@@ -437,11 +487,19 @@ class FrameSource:
 
     def next_deadline(self) -> float | None:
         """When something is asked for again [s]."""
-        return earliest(self._observer.next_deadline(), self._due if self._scene is None else None)
+        return earliest(self._observer.next_deadline(), self._due if self._lacking else None)
 
     def close(self) -> None:
         """Ask no more."""
         self._observer.close()
+
+
+def _judged(frame: Frame, verdicts: Verdicts) -> Frame:
+    """A frame with what became of it."""
+    verdict = status_of(frame.number, verdicts) if frame.status is FrameStatus.PREDICTED else None
+    if verdict is None:
+        return frame
+    return replace(frame, status=verdict.status, falsified_by=verdict.falsified_by)
 
 
 _Value = TypeVar("_Value")

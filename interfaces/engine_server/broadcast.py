@@ -5,12 +5,14 @@ Source: Doulgeri, Zikos, Delopoulos, sections III and VI-B.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
+from typing import TypeVar
 
 from interfaces.engine_server.forecasts import WINDOW, Forecasts
 from interfaces.engine_server.journal import Journal
-from interfaces.messages import Broadcast, Frame, FrameStatus, FrameVerdict, Verdicts
+from interfaces.messages import Broadcast, Compact, Frame, FrameStatus, FrameVerdict, Verdicts
+from interfaces.messages.compact import MOST_FRAMES, CompactEncoder, CompactFrame, packed
 from vrs.commands import finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError
@@ -21,6 +23,9 @@ MOST_VIEWERS = 1024
 
 RANGES = 64
 """Most ranges of falsified frames in a message."""
+
+KEY_PERIOD = 5.0
+"""A key frame goes to each viewer of compact frames at least once in this time [s]."""
 
 DUE = 2e-9
 """How much too early [s] a deadline counts as reached: engine times are whole nanoseconds."""
@@ -46,6 +51,83 @@ class FrameSlot:
 
     def __bool__(self) -> bool:
         return self._newest is not None
+
+    def begin_again(self) -> None:
+        """Do nothing: each frame stands for itself."""
+
+
+class CompactSlot:
+    """The place of a viewer of compact frames: those of its next message, never more.
+
+    What it would have to build on a frame that it wasn't sent, begins with a key frame, and that doesn't wait.
+    """
+
+    def __init__(self, encoder: CompactEncoder, rate: float, delay: float) -> None:
+        """Wait for frames.
+
+        Args:
+            encoder: The broadcaster's.
+            rate: Frames a second.
+            delay: How long a frame may wait for others that go in the same message [s].
+        """
+        self._encoder = encoder
+        self._size = min(1 + int(delay * rate + 1e-6), MOST_FRAMES)
+        self._key_every = KEY_PERIOD * rate
+        self._key_at = 0.0
+        self._broken = True
+        self._frames: list[CompactFrame] = []
+        self._known: Sequence[tuple[int, int, int | None]] = ()
+        self._since = 1
+        self._verdicts = Verdicts(1, 0)
+        self.missed = 0
+        """Frames that were never taken."""
+
+    def put(self, message: Broadcast) -> None:
+        """Put a frame behind those that wait; where there's no room, in their place."""
+        frame = self._encoder.add(message.frame)
+        self._broken |= frame.delta is None
+        if len(self._frames) >= self._size or frame.delta is None:
+            self._broken |= bool(self._frames)
+            self.missed += len(self._frames)
+            self._frames.clear()
+        self._frames.append(frame)
+        self._verdicts = message.verdicts
+
+    def take(self) -> Compact | None:
+        """Take the next message; None where it isn't complete."""
+        if not self:
+            return None
+        number, verdicts = self._frames[-1].number, self._verdicts
+        key = self._broken or number >= self._key_at
+        data = packed(self._frames, number - verdicts.through, key=key)
+        since = self._newly_since(number, key)
+        known = () if key else set(self._known)
+        falsified = tuple(found for found in verdicts.falsified if found not in known)
+        self._known = verdicts.falsified
+        if key:
+            self._broken, self._key_at = False, number + self._key_every
+        self._frames.clear()
+        return Compact(data, since, falsified)
+
+    def _newly_since(self, number: int, key: bool) -> int | None:
+        """Number of the oldest frame that something is known of, where the viewer can't tell by itself."""
+        since = self._verdicts.since
+        plain = 1 if key else self._since
+        if since <= max(plain, number - WINDOW + 1):
+            self._since = plain
+            return None
+        self._since = since
+        return since
+
+    def __bool__(self) -> bool:
+        return len(self._frames) >= self._size or (self._broken and bool(self._frames))
+
+    def begin_again(self) -> None:
+        """Send a key frame next: the viewer lacks a frame."""
+        self._broken = True
+
+
+Slot = TypeVar("Slot", FrameSlot, CompactSlot)
 
 
 class Broadcaster:
@@ -77,7 +159,8 @@ class Broadcaster:
         """Frames that turned out wrong, the last ones."""
         self._ranges: tuple[tuple[int, int, int | None], ...] = ()
         self._since = 1
-        self._slots: list[FrameSlot] = []
+        self._slots: list[FrameSlot | CompactSlot] = []
+        self._encoder = CompactEncoder(self.rate)
         self._begun: float | None = None
         self._beat = 0
         self.number = 0
@@ -113,13 +196,26 @@ class Broadcaster:
         Raises:
             InvalidValueError: If there are too many.
         """
+        return self._joined(FrameSlot())
+
+    def join_compact(self, delay: float = 0.0) -> CompactSlot:
+        """Give a place to a viewer that wants its frames compact.
+
+        Args:
+            delay: How long a frame may wait for others that go in the same message [s].
+
+        Raises:
+            InvalidValueError: If there are too many.
+        """
+        return self._joined(CompactSlot(self._encoder, self.rate, delay))
+
+    def _joined(self, slot: Slot) -> Slot:
         if len(self._slots) >= MOST_VIEWERS:
             raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_VIEWERS} a broadcaster")
-        slot = FrameSlot()
         self._slots.append(slot)
         return slot
 
-    def leave(self, slot: FrameSlot) -> None:
+    def leave(self, slot: FrameSlot | CompactSlot) -> None:
         """Give a place back; one that was given back already is none."""
         self._slots = [other for other in self._slots if other is not slot]
 

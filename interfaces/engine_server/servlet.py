@@ -10,7 +10,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from interfaces.engine_server.broadcast import DUE, MOST_VIEWERS, Broadcaster, FrameSlot
+from interfaces.engine_server.broadcast import DUE, MOST_VIEWERS, Broadcaster, CompactSlot, FrameSlot
 from interfaces.engine_server.forecasts import Forecasts
 from interfaces.engine_server.journal import MOST_CHANGED, Journal
 from interfaces.link.delivery import REMEMBERED, OrderBook
@@ -82,7 +82,7 @@ class Servlet:
         self._edit = self.journal.look()
         self._follow: Follow | None = None
         self._snapshot: tuple[int, Timeline] = (0, self.journal.engine.timeline)
-        self._slot: FrameSlot | None = None
+        self._slot: FrameSlot | CompactSlot | None = None
         self._source: Broadcaster | None = None
         self._beat: float | None = None
 
@@ -180,7 +180,10 @@ class Servlet:
             elif free := [source for source in self._broadcasters if source.viewers < MOST_VIEWERS]:
                 wished = follow.rate or max(source.rate for source in free)
                 self._source = min(free, key=lambda source: abs(source.rate - wished))
-                self._slot = self._source.join()
+                compact = follow.form is ViewForm.COMPACT
+                self._slot = self._source.join_compact(follow.delay) if compact else self._source.join()
+        elif self._slot is not None:
+            self._slot.begin_again()
         self._show_scene(now)
 
     def _show_scene(self, now: float) -> None:

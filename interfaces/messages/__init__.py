@@ -5,6 +5,7 @@ from interfaces.messages.requests import (
     Ask,
     Broadcast,
     Change,
+    Compact,
     Follow,
     Frame,
     FrameStatus,
@@ -22,6 +23,6 @@ from interfaces.messages.requests import (
 )  # fmt: skip
 
 __all__ = [
-    "Answer", "Ask", "Broadcast", "Change", "Follow", "Frame", "FrameStatus", "FrameVerdict", "History", "Order",
-    "Outcome", "Pulse", "Reply", "Request", "Scene", "Verdicts", "ViewForm", "Want",
+    "Answer", "Ask", "Broadcast", "Change", "Compact", "Follow", "Frame", "FrameStatus", "FrameVerdict", "History",
+    "Order", "Outcome", "Pulse", "Reply", "Request", "Scene", "Verdicts", "ViewForm", "Want",
 ]  # fmt: skip

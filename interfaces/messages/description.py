@@ -21,6 +21,9 @@ from interfaces.messages.fields import CROSSING, plain
 from vrs.errors import InvalidValueError
 
 
+_BASE64 = r"\A(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?\Z"
+
+
 class FieldDescription(NamedTuple):
     """A field of a message, or of a part of one."""
 
@@ -123,15 +126,21 @@ def is_nullable(kind: kinds.Type) -> bool:
 
 
 def alternatives(kind: kinds.Type) -> tuple[kinds.Type, ...]:
-    """What may stand in a place, as it crosses in JSON, null and the bytes of msgpack left out.
+    """What may stand in a place, as it crosses in JSON, without null.
+
+    Bytes cross as base64 there, and where something else may stand, not at all.
 
     Raises:
         InvalidValueError: If nothing says how it crosses.
     """
     if isinstance(kind, kinds.UnionType):
-        return tuple(one for part in kind.types for one in alternatives(part))
-    if isinstance(kind, kinds.NoneType | kinds.BytesType):
+        parts = [part for part in kind.types if not isinstance(part, kinds.BytesType)]
+        return tuple(one for part in parts for one in alternatives(part))
+    if isinstance(kind, kinds.NoneType):
         return ()
+    if isinstance(kind, kinds.BytesType):
+        least, most = (-(-size // 3) * 4 for size in (kind.min_length or 0, kind.max_length or sys.maxsize))
+        return (kinds.StrType(least, most, _BASE64),)
     if isinstance(kind, kinds.Metadata):
         return alternatives(kind.type)
     if isinstance(kind, kinds.CustomType):

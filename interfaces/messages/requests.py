@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -48,6 +48,9 @@ else:
     When = Time | None
     Past = Time | msgspec.UnsetType | None
 
+LONGEST_DELAY: Final = 0.1
+"""Compact frames wait no longer for others that go in the same message [s]."""
+
 
 class FrameStatus(enum.StrEnum):
     """How far a frame can be trusted."""
@@ -67,6 +70,8 @@ class ViewForm(enum.StrEnum):
     """The timeline, and each edit of it: the viewer evaluates it itself."""
     FRAMES = "frames"
     """Positions, at a broadcaster's rate and as it asks for them."""
+    COMPACT = "compact"
+    """The same frames, quantised and predicted, in 1/5 to 1/16 of the bytes; see `interfaces.messages.compact`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,14 +143,18 @@ class Follow(Message, frozen=True, omit_defaults=True, gc=False, tag="follow"):
     sender: ClassVar[Party] = Party.CLIENT
     number: Number
     form: ViewForm
-    """`segments`: the timeline and each edit of it; `frames`: positions."""
+    """`segments`: the timeline and each edit of it; `frames`: positions; `compact`: positions in few bytes."""
     rate: Rate | None = None
     """Of frames [1/s]: the broadcaster with the nearest one is taken."""
+    delay: Annotated[float, Meta(ge=0, le=LONGEST_DELAY)] = 0.0
+    """Of compact frames: how long one may wait for others that go in the same message [s]."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
         if self.rate is not None:
             finite("rate", self.rate, "None or frames a second")
+        if not 0 <= finite("delay", self.delay, "0 to 0.1 s") <= LONGEST_DELAY:
+            raise InvalidValueError("delay", self.delay, "0 to 0.1 s")
 
 
 class Want(Message, frozen=True, omit_defaults=True, gc=False, tag="want"):
@@ -217,6 +226,10 @@ class Verdicts:
     """First and last number, and the command."""
 
 
+Range: TypeAlias = tuple[Count, Count, CommandId | None]
+"""First and last number of frames that were falsified, and the command."""
+
+
 class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="broadcast"):
     """The newest frame of a broadcaster, and what became of earlier ones."""
 
@@ -229,7 +242,7 @@ class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, ta
     through: Count
     status: FrameStatus = FrameStatus.PREDICTED
     falsified_by: CommandId | None = None
-    falsified: Annotated[tuple[tuple[Count, Count, CommandId | None], ...], Meta(max_length=256)] = ()
+    falsified: Annotated[tuple[Range, ...], Meta(max_length=256)] = ()
 
     @classmethod
     def showing(cls, frame: Frame, verdicts: Verdicts) -> Broadcast:
@@ -246,6 +259,18 @@ class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, ta
     def verdicts(self) -> Verdicts:
         """What became of earlier frames."""
         return Verdicts(self.since, self.through, self.falsified)
+
+
+class Compact(Message, frozen=True, omit_defaults=True, gc=False, tag="compact"):
+    """The newest frames of a broadcaster in compact form, and what became of earlier ones."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    q: Annotated[bytes, Meta(min_length=2, max_length=32768)]
+    """1 to 16 frames; see `interfaces.messages.compact`. In JSON base64."""
+    since: Count | None = None
+    """Of older frames than this nothing is known; absent: as before, of a key frame 1."""
+    falsified: Annotated[tuple[Range, ...], Meta(max_length=256)] = ()
+    """Frames that were falsified since the message before; with a key frame, all that are known."""
 
 
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
@@ -362,5 +387,5 @@ def _check_number(number: object) -> None:
 
 Request: TypeAlias = Order | Ask | Follow | Want
 """What a client sends."""
-Reply: TypeAlias = Outcome | Answer | Broadcast | Scene | History | Change | Pulse
+Reply: TypeAlias = Outcome | Answer | Broadcast | Compact | Scene | History | Change | Pulse
 """What a servlet sends."""

@@ -152,7 +152,15 @@ def _reader(encoding: Encoding, allowed: Any) -> Callable[[bytes], Message]:
     return read
 
 
-FOR_ONE = (messages.Outcome, messages.Answer, messages.Scene, messages.Pulse, Pong, control.Problem)
+FOR_ONE = (
+    messages.Outcome,
+    messages.Answer,
+    messages.Compact,
+    messages.Scene,
+    messages.Pulse,
+    Pong,
+    control.Problem,
+)
 """What one client alone gets: remembering it would push out what others are still to get."""
 
 

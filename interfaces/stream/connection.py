@@ -329,6 +329,7 @@ class Connection(RobotConnection[ClientCore]):
         *,
         rate: float = 50.0,
         form: ViewForm = ViewForm.SEGMENTS,
+        delay: float = 0.0,
         show: Callable[[ShownFrame], None] | None = None,
     ) -> RemoteViewer:
         """A viewer, on a connection of its own.
@@ -336,6 +337,7 @@ class Connection(RobotConnection[ClientCore]):
         Args:
             rate: Frames to show a second, 0.1 to 1000.
             form: What crosses.
+            delay: How long compact frames may wait for others that go in the same message [s], 0 to 0.1.
             show: Is called with each frame, in another thread: to be quick.
 
         Raises:
@@ -343,7 +345,8 @@ class Connection(RobotConnection[ClientCore]):
             InvalidValueError: If rate is out of range.
         """
         session = self._open(Role.VIEWER)
-        viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), show=show, end=partial(self._end, session))
+        end = partial(self._end, session)
+        viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), delay=delay, show=show, end=end)
         self._add(session, viewer)
         return viewer
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol, TypeVar
 
 from interfaces.clients.designer import Designer, Issued
@@ -164,6 +165,7 @@ class RemoteViewer:
         *,
         rate: float,
         form: ViewForm,
+        delay: float,
         end: Callable[[], None],
         show: Callable[[ShownFrame], None] | None = None,
     ) -> None:
@@ -173,12 +175,14 @@ class RemoteViewer:
             session: Its connection.
             rate: Frames a second.
             form: What crosses.
+            delay: How long compact frames may wait for others [s].
             end: Closes the connection.
             show: Is called with each frame, in the connection's thread and under its lock: to be quick.
         """
         self._end = end
-        self._session, self._rate, self._form, self._show = session, rate, form, show
-        self._viewer = Viewer(session.port, rate=rate, form=form)
+        self._session, self._show = session, show
+        self._make = partial(Viewer, rate=rate, form=form, delay=delay)
+        self._viewer = self._make(session.port)
 
     @property
     def newest(self) -> ShownFrame | None:
@@ -192,7 +196,7 @@ class RemoteViewer:
 
     @property
     def timeline(self) -> Timeline | None:
-        """The timeline as far as it has come; None before that, and in the form of frames."""
+        """The timeline as far as it has come; None before that, and in the forms of frames."""
         return self._session.do(lambda _: self._viewer.timeline)
 
     @property
@@ -265,4 +269,4 @@ class RemoteViewer:
     def renew(self) -> None:
         """Follow anew, live."""
         self._viewer.close()
-        self._viewer = Viewer(self._session.port, rate=self._rate, form=self._form)
+        self._viewer = self._make(self._session.port)

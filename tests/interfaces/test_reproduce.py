@@ -236,13 +236,14 @@ class TestDoulgeri:
         for kind in encoding.MOTIONS:
             sizes = encoding.measure(kind, 1, 2.0 if kind == "moves" else 0.4)
             assert sizes.rebuilt <= 1e-12
+            assert sizes.compact_error <= 1e-5
             assert sizes.frames_single < sizes.frames
         assert encoding.measure("moves", 1, 6.0).segments < sizes.frames
 
     def test_encoding_concludes(self):
-        sizes = encoding.Sizes(100.0, 60.0, 400.0, 50.0, 1e-3, 0.0)
+        sizes = encoding.Sizes(100.0, 60.0, 400.0, 50.0, 1e-3, 0.0, 400.0, 500.0, 600.0, 1e-6)
         found = encoding.conclude(SMALL, ([sizes] * 2,) * 3)
-        assert [claim.holds for claim in found.claims[:3]] == [False, True, True]
+        assert [claim.holds for claim in found.claims[:5]] == [False, True, True, True, True]
 
     def test_more_hands_than_runs(self):
         assert dragging.work(SMALL, "2") is None

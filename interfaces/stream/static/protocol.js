@@ -175,8 +175,9 @@ function map(x, where) {
  * @typedef {object} Follow
  * @property {"follow"} type
  * @property {number} number number.
- * @property {"segments"|"frames"} form `segments`, `frames`. `segments`: the timeline and each edit of it; `frames`: positions.
+ * @property {"segments"|"frames"|"compact"} form `segments`, `frames`, `compact`. `segments`: the timeline and each edit of it; `frames`: positions; `compact`: positions in few bytes.
  * @property {number|null} [rate] real > 0 up to 10⁴ (absent). Of frames [1/s]: the broadcaster with the nearest one is taken.
+ * @property {number} [delay] real from 0 to 0.1 (0). Of compact frames: how long one may wait for others that go in the same message [s].
  */
 /**
  * Client: Segments of the scene of that edit, from that one on; without `index` all edits after that one.
@@ -239,6 +240,14 @@ function map(x, where) {
  * @property {"predicted"|"confirmed"|"falsified"} [status] `predicted`, `confirmed`, `falsified` (`predicted`).
  * @property {number|null} [falsified_by] integer (absent).
  * @property {Array<[number, number, number|null]>} [falsified] up to 256 × [count, count, integer or null] (none).
+ */
+/**
+ * Server: The newest frames of a broadcaster in compact form, and what became of earlier ones.
+ * @typedef {object} Compact
+ * @property {"compact"} type
+ * @property {string} q epoch. 1 to 16 frames; see `interfaces.messages.compact`. In JSON base64.
+ * @property {number|null} [since] count (absent). Of older frames than this nothing is known; absent: as before, of a key frame 1.
+ * @property {Array<[number, number, number|null]>} [falsified] up to 256 × [count, count, integer or null] (none). Frames that were falsified since the message before; with a key frame, all that are known.
  */
 /**
  * Server: What there is to see, for one who has just come.
@@ -744,6 +753,23 @@ function checkBroadcast(m) {
       whole(x[0], 0, WHOLE, "broadcast.falsified");
       whole(x[1], 0, WHOLE, "broadcast.falsified");
       if (x[2] !== null) whole(x[2], -WHOLE, WHOLE, "broadcast.falsified");
+    }
+  }
+}
+function checkCompact(m) {
+  map(m, "compact");
+  if (m.type !== undefined && m.type !== "compact") fail("compact", "compact");
+  like(m.q, /^(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?$/, "compact.q");
+  if (m.since === undefined || m.since === null) m.since = null;
+  else whole(m.since, 0, WHOLE, "compact.since");
+  if (m.falsified === undefined) m.falsified = [];
+  else {
+    list(m.falsified, 0, 256, "compact.falsified");
+    for (const x of m.falsified) {
+      list(x, 3, 3, "compact.falsified");
+      whole(x[0], 0, WHOLE, "compact.falsified");
+      whole(x[1], 0, WHOLE, "compact.falsified");
+      if (x[2] !== null) whole(x[2], -WHOLE, WHOLE, "compact.falsified");
     }
   }
 }
@@ -1304,6 +1330,7 @@ const CHECKS = new Map([
   ["outcome", checkOutcome],
   ["answer", checkAnswer],
   ["broadcast", checkBroadcast],
+  ["compact", checkCompact],
   ["scene", checkScene],
   ["history", checkHistory],
   ["change", checkChange],

@@ -98,18 +98,38 @@ def test_dragging(changes: dict[str, Any], said: list[str]) -> None:
 
 
 def test_encoding() -> None:
-    good = encoding.Sizes(120.0, 60.0, 100.0, 100.0, 1e-3, 0.0)
+    good = encoding.Sizes(120.0, 60.0, 100.0, 100.0, 1e-3, 0.0, 100.0, 300.0, 200.0, 1e-5)
     only(encoding.conclude(STUDY, ([good] * 2,) * 3).claims)
-    by_hand = encoding.conclude(STUDY, ([good] * 2, [good, good._replace(segments=115.0)], [good] * 2)).claims
-    only(by_hand, "bytes of segments")
+    # One of the two is enough.
+    for other in (good._replace(segments=115.0), good._replace(compact=115.0)):
+        only(encoding.conclude(STUDY, ([good] * 2, [good, other], [good] * 2)).claims)
+    both = good._replace(segments=115.0, compact=115.0)
+    only(encoding.conclude(STUDY, ([good] * 2, [good, both], [good] * 2)).claims, "the better of segments and")
+    dear = good._replace(frames=1000.0, segments=500.0, compact=435.0)
+    only(
+        encoding.conclude(STUDY, ([good] * 2, [good, dear], [good] * 2)).claims,
+        "rates by hand, 50 inputs a second: the",
+    )
     only(
         encoding.conclude(STUDY, ([good, good._replace(rebuilt=1e-11)], [good] * 2, [good] * 2)).claims,
-        "off by at most",
+        "who has the segments",
+    )
+    only(
+        encoding.conclude(STUDY, ([good, good._replace(compact_error=1.1e-5)], [good] * 2, [good] * 2)).claims,
+        "who gets compact frames",
     )
     said = encoding.conclude(
         STUDY, ([good, good._replace(commands=119.0)], [good] * 2, [good._replace(commands=140.0)] * 2)
     )
     only(said.claims, "a move every 2 s: bytes", "twist by hand, 50 inputs a second: bytes")
+
+
+def test_the_readers_of_an_encoding_have_the_motion() -> None:
+    found = encoding.measure("rates", 1, 1.0)
+    assert found.rebuilt <= 1e-12
+    assert 1e-6 < found.compact_error <= 1e-5
+    assert found.compact < 0.5 * found.absolute
+    assert found.compact < found.compact_each < found.frames < found.segments
 
 
 RUN = jitter.JitterResult(0.001, 0.002, 0.004, 1.0, 2.0, 1.0, 0.0, 0, 1.0, 1.05, 0, 10, 0)

@@ -5,6 +5,7 @@ What types can't say stands in `RULES`: which fields must go together.
 
 from __future__ import annotations
 
+import base64
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -211,10 +212,17 @@ def _signs(found: dict[str, Any], random: Random) -> None:
             found[name] = found[other]
 
 
+def _base64(found: dict[str, Any], random: Random) -> None:
+    """Bytes cross as base64."""
+    if isinstance(found["q"], str):
+        found["q"] = base64.b64encode(random.randbytes(random.choice((2, 3, 40, 32768)))).decode()
+
+
 RULES: tuple[tuple[set[str], Rule], ...] = (
     ({"dof", "segments"}, _widths),
     ({"dof", "limits", "poses"}, _one_width),
     ({"v_max", "alpha_max"}, _drives),
+    ({"q", "falsified"}, _base64),
     ({"X"}, _pose),
     ({"tool", "speed"}, _pose),
     ({"rates", "twist"}, _either),

@@ -28,11 +28,16 @@ def test_the_four_interfaces(encoding):
             assert robot.observer.ask(0.0).frame.q.tolist() == HOME.tolist()
             viewer = robot.viewer(rate=50)
             frames = robot.viewer(rate=60, form=ViewForm.FRAMES)
+            compact = robot.viewer(rate=60, form=ViewForm.COMPACT, delay=0.05)
+            assert compact.wait(lambda v: len(v.history) > 20)
             assert viewer.wait(lambda v: len(v.history) > 5)
             assert frames.wait(lambda v: len(v.history) > 5)
             engine = serving.hub.site.engine
             for shown in (*viewer.history, *frames.history):
                 assert np.abs(shown.q - engine.joints(shown.t)).max() < 1e-9
+            for shown in compact.history:
+                # The time is rounded, too: to half a microsecond.
+                assert np.abs(shown.q - engine.joints(shown.t)).max() < 1e-5
             viewer.pause()
             viewer.seek(0.1)
             assert viewer.next().t == 0.1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,11 +12,14 @@ import numpy as np
 import pytest
 
 import interfaces.stream
+from interfaces.messages import Compact
+from interfaces.messages.compact import CompactDecoder
 from tests.interfaces.stream.make_vectors import PATH
+from vrs.errors import InvalidValueError
 
-MODULE = Path(interfaces.stream.__file__).parent / "static" / "vrs.js"
+STATIC = Path(interfaces.stream.__file__).parent / "static"
 VECTORS: dict[str, Any] = json.loads(PATH.read_text(encoding="utf-8"))
-NAMES = "decode, evaluate, segmentsOf, Timeline, Reader, ClockSync"
+NAMES = {"vrs.js": "decode, evaluate, segmentsOf, Timeline, Reader, ClockSync", "compact.js": "CompactReader"}
 PLAY = """({ steps, lost, doubled }) => {
   const asked = [], reader = new vrs.Reader((m) => asked.push(m));
   const give = (text, now) => reader.receive(text, now);
@@ -35,7 +39,7 @@ def served(route: Any) -> None:
     """Answer a page's request for a script that stands beside the reader."""
     name = route.request.url.rpartition("/")[2]
     if name:
-        route.fulfill(content_type="text/javascript", body=(MODULE.parent / name).read_text(encoding="utf-8"))
+        route.fulfill(content_type="text/javascript", body=(STATIC / name).read_text(encoding="utf-8"))
     else:
         route.fulfill(content_type="text/html", body="<!doctype html>")
 
@@ -48,10 +52,12 @@ def page(browser: Any) -> Iterator[Any]:
     opened.on("console", lambda said: seen.append(said.text))
     opened.route("http://vrs.test/**", served)
     opened.goto("http://vrs.test/")
-    opened.add_script_tag(
-        content=f'import {{ {NAMES} }} from "/vrs.js"; window.vrs = {{ {NAMES} }};', type="module"
-    )
-    opened.wait_for_function("window.vrs !== undefined")
+    for file, names in NAMES.items():
+        opened.add_script_tag(
+            content=f'import {{ {names} }} from "/{file}"; window.vrs = {{ ...window.vrs, {names} }};',
+            type="module",
+        )
+    opened.wait_for_function("Boolean(window.vrs?.Reader && vrs.CompactReader)")
     yield opened
     opened.close()
     assert seen == []
@@ -167,3 +173,48 @@ def test_after_a_step_of_the_other_clock_mapped_time_goes_on(page: Any) -> None:
     assert late[4]["offset"] == pytest.approx(49.0, abs=0.006)
     # 20 s after a step of 1 s at 5 %: the map has caught up.
     assert late[3] == pytest.approx(49.0, abs=0.01)
+
+
+READ_COMPACT = """(vectors) => { const reader = new vrs.CompactReader();
+  return vectors.map(({ json }) => [reader.receive(JSON.parse(json)), reader.lacking]); }"""
+
+
+def test_compact_frames_are_read_to_the_bit(page: Any) -> None:
+    found = page.evaluate(READ_COMPACT, VECTORS["compact"])
+    assert [lacking for _, lacking in found] == [vector["lacking"] for vector in VECTORS["compact"]]
+    for (frames, _), vector in zip(found, VECTORS["compact"], strict=True):
+        for frame in frames:
+            frame["made_at"] = frame.pop("madeAt")
+            frame["status"] = "predicted" if frame.pop("predicted") else "confirmed"
+        assert frames == vector["frames"]
+
+
+def test_compact_bytes_that_are_wrong_are_refused_as_in_python(page: Any) -> None:
+    rng = np.random.default_rng(6)
+    whole = [bytes.fromhex(vector["hex"]) for vector in VECTORS["compact"]]
+    long = ("9" + "8" * (digits - 1) + "0" + "10" + "01040" + "000" for digits in (17, 18, 30))
+    given = [bytes.fromhex(text + "0" * (len(text) % 2)) for text in long]
+    for _ in range(3000):
+        data = bytearray(whole[rng.integers(len(whole))])
+        for _ in range(rng.integers(0, 3)):
+            data[rng.integers(len(data))] = rng.integers(256)
+        given.append(bytes(data[: rng.integers(2, len(data) + 1)] if rng.random() < 0.2 else data))
+    found = page.evaluate(
+        """(rows) => { let reader = new vrs.CompactReader(); return rows.map((q, k) => {
+        if (k % 5 === 0) reader = new vrs.CompactReader();
+        try { return reader.receive({ q }).map(({ number, t, q }) => [number, t, q]); }
+        catch (error) { if (error instanceof RangeError) return error.message && "refused"; throw error; } }); }""",
+        [base64.b64encode(data).decode() for data in given],
+    )
+    expected: list[Any] = []
+    reader = CompactDecoder()
+    for k, data in enumerate(given):
+        reader = CompactDecoder() if k % 5 == 0 else reader
+        try:
+            frames = [b.frame for b in reader.receive(Compact(data))]
+            expected.append([[frame.number, frame.t, frame.q.tolist()] for frame in frames])
+        except InvalidValueError:
+            expected.append("refused")
+    assert found == expected
+    assert expected.count("refused") > 300
+    assert sum(bool(frames) and frames != "refused" for frames in expected) > 100

@@ -3,9 +3,11 @@
 import random
 
 import msgspec
+import numpy as np
 import pytest
 
 from interfaces.messages import Ask, Follow, Order, Pulse, Reply, ViewForm, Want, control
+from interfaces.messages.compact import CompactDecoder
 from interfaces.messages.control import Notice, Ping, Pong, ProblemCode, Role
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.limits import ClientLimits
@@ -282,6 +284,39 @@ def test_a_slow_reader_gets_the_newest_frame_and_no_more_waits_than_it_may():
     found = [message for message in peer.got(now=10.0) if message.kind == "broadcast"]
     assert len(found) == 1
     assert found[0].frame.made_at == pytest.approx(10.0, abs=0.02)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1])
+@pytest.mark.parametrize("asks", [False, True])
+def test_a_slow_reader_of_compact_frames_goes_on_from_a_key_frame(delay, asks):
+    hub, reader = make_hub(limits=ClientLimits(waiting=1024)), CompactDecoder()
+    peer = Peer(hub, role=Role.VIEWER)
+
+    def read(now):
+        for message in peer.got(now=now):
+            if message.kind == "compact":
+                for found in reader.receive(message):
+                    assert np.abs(found.frame.q - hub.site.engine.joints(found.frame.t)).max() < 1e-5
+
+    peer.session.receive(encode(Follow(1, ViewForm.COMPACT, 60.0, delay), Encoding.MSGPACK), now=0.0)
+    for k in range(1, 60):
+        hub.advance(now=k / 60)
+        read(k / 60)
+    assert reader.number >= 53
+    hub.site.engine.execute(to(1))
+    for k in range(60, 600):
+        hub.advance(now=k / 60)
+        if asks:
+            # Each message of the client lets the session look for what it has for it.
+            peer.session.receive(encode(Ask(k), Encoding.MSGPACK), now=k / 60)
+        assert peer.session.waiting <= 1024
+    for k in range(600, 640):
+        hub.advance(now=k / 60)
+        read(k / 60)
+        if reader.lacking:
+            peer.session.receive(encode(Follow(1, ViewForm.COMPACT, 60.0, delay), Encoding.MSGPACK), now=k / 60)
+    assert not reader.lacking
+    assert reader.number >= 630
 
 
 def test_one_who_asks_and_never_reads_costs_little():
