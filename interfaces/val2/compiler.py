@@ -10,15 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from interfaces.val2.arithmetic import Slots
 from interfaces.val2.context import SPECIAL, Code, Context, Invoke, Leave, StepFunction, Warned
-from interfaces.val2.dialogue import prompt_step, type_step
 from interfaces.val2.errors import ValError
-from interfaces.val2.expressions import ResultKind
+from interfaces.val2.expressions import Expressions
 from interfaces.val2.forms import UNAVAILABLE
-from interfaces.val2.functions import expressions
-from interfaces.val2.instructions import instruction
-from interfaces.val2.memory import MOST_DIMENSIONS, VariableSlot, index, mismatch, undefined, where
+from interfaces.val2.instructions import instruction, prompt_step, type_step
+from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.signals import reaction_to
 from interfaces.val2.structure import StructureBlock, structure
 from interfaces.val2.syntax import (
@@ -83,7 +80,7 @@ class _Compiler:
                 else:
                     scope[name] = context.memory.own(program.name, name)
         self.names = names
-        self.x = expressions(context, scope)
+        self.x = Expressions(context, scope)
         self.kept: dict[int, int] = {}
 
     def code(self) -> Code:
@@ -146,7 +143,7 @@ class _Compiler:
             case React() as react:
                 return self._react(react, following)
             case Ignored(keyword, _, at) if keyword in UNAVAILABLE:
-                raise ValError("Not available", f"{keyword}: {UNAVAILABLE[keyword]}", place=where(at))
+                raise ValError("Not available", f"{keyword}: {UNAVAILABLE[keyword]}", place=at)
             case Ignored(keyword):
                 text = f"{keyword} has no meaning here: program {self.program.name}, step {i + 1}"
 
@@ -222,7 +219,7 @@ class _Compiler:
 
     def _case(self, i: int, value: Expression) -> StepFunction:
         x, block = self.x, self._block(i)
-        text = x.kind(value) is ResultKind.STRING
+        text = x.kind(value) == "string"
         read: Callable[[Expression], Callable[[Slots], Any]] = x.string if text else x.real
         given, arms, otherwise = read(value), [], block.end + 1
         for arm in block.arms:
@@ -294,7 +291,7 @@ class _Compiler:
         if target.prefix:
             raise mismatch(target)
         if len(target.indices) > MOST_DIMENSIONS:
-            raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=where(target.at))
+            raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=target.at)
         read, place = x.location(e), x.slot(target.name)
         first = [x.real(i) for i in target.indices] or [lambda _: 0.0]
 
@@ -322,7 +319,7 @@ class _Compiler:
             parameters = code.program.parameters
             for prefix, parameter in zip(prefixes, parameters, strict=False):
                 if prefix is not None and prefix != parameter.prefix:
-                    raise ValError("Variable type mismatch", f"argument {parameter.name}", place=where(at))
+                    raise ValError("Variable type mismatch", f"argument {parameter.name}", place=at)
             context.pending = Invoke(code, code.slots([p(s) for p in parts]), following)
             return SPECIAL
 
@@ -351,4 +348,4 @@ class _Compiler:
         return watch
 
 
-_PREFIX: Final = {ResultKind.STRING: "$", ResultKind.POINT: "#"}
+_PREFIX: Final = {"string": "$", "point": "#"}

@@ -15,7 +15,7 @@ from typing import Final
 from interfaces.val2.compiler import compiled
 from interfaces.val2.context import Context, Event, ProgramFailed
 from interfaces.val2.errors import ValError
-from interfaces.val2.functions import expressions
+from interfaces.val2.expressions import Expressions
 from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.ports import ArmPort
@@ -164,7 +164,7 @@ class Controller:
         context = self.context
         context.now = max(now, context.now)
         code = context.code(name)
-        x = expressions(context)
+        x = Expressions(context)
         slots = [x.reference(a)([]) if isinstance(a, Variable) else VariableSlot(x.value(a)([])) for a in arguments]
         task = Task(context, code, slots, cycles=cycles, step=step, single=single)
         values = [self._condition(rule) for rule in self.cell]
@@ -177,7 +177,7 @@ class Controller:
 
     def _condition(self, rule: SignalRule) -> Callable[[], bool]:
         """What a rule follows; false where its expression has no value."""
-        test = expressions(self.context).condition(rule.value)
+        test = Expressions(self.context).condition(rule.value)
 
         def holds() -> bool:
             try:
@@ -311,7 +311,8 @@ class Controller:
             ValError: If it has none.
         """
         self.context.now = max(now, self.context.now)
-        return expressions(self.context).value(expression)([])
+        value: Value = Expressions(self.context).value(expression)([])
+        return value
 
     def forget(self) -> None:
         """ZERO: no program, no variables; outputs off.

@@ -31,6 +31,8 @@ class OperandSlot:
     name: str
     kind: Kind
     required: bool = True
+    default: float | None = None
+    """What stands for one that was left out; None where that's for the instruction or function to say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,6 @@ class InstructionForm:
     """Words behind the operands, in their order, one of each group at most."""
     help: str
     origin: Origin
-    group: str
     repeats: bool = False
     """Whether the last operand may come many times."""
     usage: str = ""
@@ -110,11 +111,13 @@ class Parameter:
 
 
 def slots_of(spelled: str) -> tuple[tuple[OperandSlot, ...], bool]:
-    """Slots such as `target:location, hand:real?`, and whether the last (`*`) repeats."""
+    """Slots such as `target:location, hand:real?=0`, and whether the last (`*`) repeats."""
     slots = []
     for part in filter(None, (p.strip() for p in spelled.split(","))):
-        name, _, kind = part.rstrip("?*").partition(":")
-        slots.append(OperandSlot(name, kind or "real", required="?" not in part))  # type: ignore[arg-type]
+        named, _, default = part.partition("=")
+        name, _, kind = named.rstrip("?*").partition(":")
+        otherwise = float(default) if default else None
+        slots.append(OperandSlot(name, kind or "real", "?" not in part, otherwise))  # type: ignore[arg-type]
     return tuple(slots), "*" in spelled
 
 
@@ -123,7 +126,6 @@ def form(
     spelled: str,
     explanation: str,
     origin: Origin,
-    group: str,
     *,
     words: str = "",
     usage: str = "",
@@ -138,7 +140,6 @@ def form(
         groups,
         explanation,
         origin,
-        group,
         repeats,
         usage or _usage(keyword, slots, groups, repeats),
         own,
@@ -187,135 +188,128 @@ def nearest_word(word: str, words: Iterable[str]) -> str:
 
 
 _MOTION: Final = (
-    form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", "motion"),
-    form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", "motion"),
-    form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL", "motion"),
-    form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL", "motion"),
+    form("MOVE", "location:location", "Move to a location, the joints together.", "VAL"),
+    form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL"),
+    form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL"),
+    form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL"),
     form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
-         "VAL", "motion"),
-    form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL", "motion"),
-    form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.",
-         "VAL", "motion"),
-    form("DEPARTS", "distance", "DEPART on a straight line.", "VAL", "motion"),
-    form("DRIVE", "joint, change, speed", "Turn one joint by a change [deg] at a speed [%].", "VAL", "motion"),
-    form("DRAW", "dx?, dy?, dz?", "Move straight by a way in world axes [mm].", "VAL", "motion"),
-    form("READY", "", "Move to the ready position: the arm straight up.", "VAL", "motion"),
-    form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II", "motion"),
-    form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL", "motion"),
-    form("DELAY", "seconds", "Stand still for a time, as a motion.", "VAL", "motion"),
-    form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", "motion"),
-    form("BRAKE", "", "Stop the present motion at once.", "V+", "motion"),
-    form("AT", "time", "The next motion begins at a time of the session [s].", "ours", "motion",
-         usage="AT time [motion]"),
+         "VAL"),
+    form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL"),
+    form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.", "VAL"),
+    form("DEPARTS", "distance", "DEPART on a straight line.", "VAL"),
+    form("DRIVE", "joint, change, speed", "Turn one joint by a change [deg] at a speed [%].", "VAL"),
+    form("DRAW", "dx?=0, dy?=0, dz?=0", "Move straight by a way in world axes [mm].", "VAL"),
+    form("READY", "", "Move to the ready position: the arm straight up.", "VAL"),
+    form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II"),
+    form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL"),
+    form("DELAY", "seconds", "Stand still for a time, as a motion.", "VAL"),
+    form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II"),
+    form("BRAKE", "", "Stop the present motion at once.", "V+"),
+    form("AT", "time", "The next motion begins at a time of the session [s].", "ours", usage="AT time [motion]"),
 )  # fmt: skip
 
 _SETTINGS: Final = (
     form("SPEED", "speed, turning?", "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.",
-         "VAL", "setting", words="MMPS|IPS|MONITOR ALWAYS"),
-    form("ACCEL", "up, down?", "Accelerations: [%] of the nominal.", "V+", "setting"),
-    form("DURATION", "seconds", "Shortest time of the next motion; ALWAYS: each.", "V+", "setting", words="ALWAYS"),
-    form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", "setting", words="ALWAYS"),
-    form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", "setting", words="ALWAYS"),
-    form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL", "setting",
+         "VAL", words="MMPS|IPS|MONITOR ALWAYS"),
+    form("ACCEL", "up, down?", "Accelerations: [%] of the nominal.", "V+"),
+    form("DURATION", "seconds", "Shortest time of the next motion; ALWAYS: each.", "V+", words="ALWAYS"),
+    form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", words="ALWAYS"),
+    form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", words="ALWAYS"),
+    form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL", words="ALWAYS"),
+    form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL",
          words="ALWAYS"),
-    form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL", "setting",
-         words="ALWAYS"),
-    form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", "setting"),
-    form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", "setting"),
-    form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", "setting"),
-    form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", "setting"),
-    form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", "setting"),
-    form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", "setting"),
-    form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
-         "setting"),
-    form("BASE", "dx?, dy?, dz?, turn?", "Where the robot stands in the world: shifted [mm], turned about z [deg].",
-         "VAL", "setting"),
-    form("ENABLE", "", "Turn switches on.", "VAL", "setting", usage="ENABLE switch, .."),
-    form("DISABLE", "", "Turn switches off.", "VAL", "setting", usage="DISABLE switch, .."),
-    form("PARAMETER", "value", "Set a parameter.", "VAL-II", "setting", usage="PARAMETER name = value"),
-    form("ALTER", "channel?, mode?, dx?, dy?, dz?, rx?, ry?, rz?",
-         "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", "setting",
-         usage="ALTER (channel) mode"),
-    form("ALTOUT", "dx?, dy?, dz?, rx?, ry?, rz?",
-         "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II", "setting"),
-    form("NOALTER", "", "Corrections of the path end.", "VAL-II", "setting"),
-    form("ALTON", "channel?, mode?", "As ALTER.", "V+", "setting", usage="ALTON (channel) mode"),
-    form("ALTOFF", "", "As NOALTER.", "V+", "setting"),
+    form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL"),
+    form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL"),
+    form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL"),
+    form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL"),
+    form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL"),
+    form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL"),
+    form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL"),
+    form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
+         "Where the robot stands in the world: shifted [mm], turned about z [deg].", "VAL"),
+    form("ENABLE", "", "Turn switches on.", "VAL", usage="ENABLE switch, .."),
+    form("DISABLE", "", "Turn switches off.", "VAL", usage="DISABLE switch, .."),
+    form("PARAMETER", "value", "Set a parameter.", "VAL-II", usage="PARAMETER name = value"),
+    form("ALTER", "channel?=0, mode?=0, dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
+         "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", usage="ALTER (channel) mode"),
+    form("ALTOUT", "dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
+         "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II"),
+    form("NOALTER", "", "Corrections of the path end.", "VAL-II"),
+    form("ALTON", "channel?=0, mode?=0", "As ALTER.", "V+", usage="ALTON (channel) mode"),
+    form("ALTOFF", "", "As NOALTER.", "V+"),
 )  # fmt: skip
 
 _HAND: Final = (
-    form("OPEN", "", "Open the hand with the next motion.", "VAL", "hand"),
-    form("CLOSE", "", "Close the hand with the next motion.", "VAL", "hand"),
-    form("RELAX", "", "Let the hand go slack with the next motion.", "VAL", "hand"),
-    form("OPENI", "", "Open the hand now, where the arm stands.", "VAL", "hand"),
-    form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL", "hand"),
-    form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL", "hand"),
-    form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
-         "hand"),
+    form("OPEN", "", "Open the hand with the next motion.", "VAL"),
+    form("CLOSE", "", "Close the hand with the next motion.", "VAL"),
+    form("RELAX", "", "Let the hand go slack with the next motion.", "VAL"),
+    form("OPENI", "", "Open the hand now, where the arm stands.", "VAL"),
+    form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL"),
+    form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL"),
+    form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].",
+         "VAL"),
 )  # fmt: skip
 
 _LOCATIONS: Final = (
-    form("SET", "variable:variable, location:location", "Assign a location.", "VAL", "location",
+    form("SET", "variable:variable, location:location", "Assign a location.", "VAL",
          usage="SET variable = location", own=True),
-    form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", "location"),
+    form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL"),
     form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
-         "V+", "location", usage="DECOMPOSE array[first] = location", own=True),
-    form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", "location",
+         "V+", usage="DECOMPOSE array[first] = location", own=True),
+    form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL",
          usage="SHIFT variable BY dx, dy, dz", own=True),
 )  # fmt: skip
 
 _SIGNALS: Final = (
-    form("SIGNAL", "number*", "Turn outputs on, or off where negative.", "VAL", "signal"),
-    form("RESET", "", "Turn all outputs off.", "V+", "signal"),
-    form("WAIT", "condition?", "Wait until a condition holds.", "VAL", "signal"),
-    form("WAIT.EVENT", "mask?, seconds?", "Wait for a time.", "V+", "signal"),
-    form("TIMER", "number, seconds", "Set a timer.", "VAL-II", "signal", usage="TIMER number = seconds"),
+    form("SIGNAL", "number*", "Turn outputs on, or off where negative.", "VAL"),
+    form("RESET", "", "Turn all outputs off.", "V+"),
+    form("WAIT", "condition?", "Wait until a condition holds.", "VAL"),
+    form("WAIT.EVENT", "mask?, seconds?", "Wait for a time.", "V+"),
+    form("TIMER", "number, seconds", "Set a timer.", "VAL-II", usage="TIMER number = seconds"),
     form("REACT", "signal, program:program?", "Call a program after the present step when a signal turns on.",
-         "VAL", "signal", words="ALWAYS", own=True),
-    form("REACTI", "signal, program:program?", "REACT, stopping the present motion at once.", "VAL", "signal",
+         "VAL", words="ALWAYS", own=True),
+    form("REACTI", "signal, program:program?", "REACT, stopping the present motion at once.", "VAL",
          words="ALWAYS", own=True),
-    form("IGNORE", "signal", "Don't react to a signal any more.", "VAL", "signal"),
+    form("IGNORE", "signal", "Don't react to a signal any more.", "VAL"),
 )  # fmt: skip
 
 _CONTROL: Final = (
-    form("IF", "condition", "Do steps if a condition holds.", "VAL", "control", own=True,
+    form("IF", "condition", "Do steps if a condition holds.", "VAL", own=True,
          usage="IF condition THEN .. ELSE .. END, IF condition GOTO label"),
-    form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", "control", own=True),
-    form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", "control", own=True),
-    form("WHILE", "condition", "Repeat steps as long as a condition holds.", "VAL-II", "control", own=True,
+    form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", own=True),
+    form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", own=True),
+    form("WHILE", "condition", "Repeat steps as long as a condition holds.", "VAL-II", own=True,
          usage="WHILE condition DO .. END"),
-    form("DO", "", "Repeat steps until a condition holds.", "VAL-II", "control", own=True,
-         usage="DO .. UNTIL condition"),
-    form("UNTIL", "condition", "The end of DO.", "VAL-II", "control", own=True),
-    form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", "control", own=True,
+    form("DO", "", "Repeat steps until a condition holds.", "VAL-II", own=True, usage="DO .. UNTIL condition"),
+    form("UNTIL", "condition", "The end of DO.", "VAL-II", own=True),
+    form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", own=True,
          usage="FOR variable = start TO stop [STEP step] .. END"),
-    form("CASE", "value", "Do the steps of one of several values.", "VAL-II", "control", own=True,
+    form("CASE", "value", "Do the steps of one of several values.", "VAL-II", own=True,
          usage="CASE value OF .. END"),
-    form("VALUE", "value*", "What of a CASE is done for these values.", "VAL-II", "control", own=True,
+    form("VALUE", "value*", "What of a CASE is done for these values.", "VAL-II", own=True,
          usage="VALUE value, ..:"),
-    form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", "control", own=True),
-    form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", "control", own=True),
-    form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", "control", own=True),
-    form("GOTO", "label:label", "Go on at a label.", "VAL", "control", own=True),
-    form("CALL", "program:program, argument:any?*", "Call a program; arguments by reference.", "VAL-II", "control",
+    form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", own=True),
+    form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", own=True),
+    form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", own=True),
+    form("GOTO", "label:label", "Go on at a label.", "VAL", own=True),
+    form("CALL", "program:program, argument:any?*", "Call a program; arguments by reference.", "VAL-II",
          own=True, usage="CALL program(argument, ..)"),
-    form("GOSUB", "program:program", "Call a program.", "VAL", "control", own=True),
-    form("RETURN", "", "Go back to the program that called.", "VAL", "control", own=True),
-    form("PAUSE", "", "Pause until PROCEED.", "VAL", "control"),
-    form("STOP", "", "End this cycle of the program.", "VAL", "control"),
-    form("HALT", "", "End the program, whatever cycles are left.", "VAL", "control"),
+    form("GOSUB", "program:program", "Call a program.", "VAL", own=True),
+    form("RETURN", "", "Go back to the program that called.", "VAL", own=True),
+    form("PAUSE", "", "Pause until PROCEED.", "VAL"),
+    form("STOP", "", "End this cycle of the program.", "VAL"),
+    form("HALT", "", "End the program, whatever cycles are left.", "VAL"),
 )  # fmt: skip
 
 _DIALOGUE: Final = (
-    form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", "dialogue", own=True),
-    form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", "dialogue",
-         own=True),
-    form("REMARK", "text:text?", "A comment.", "VAL", "dialogue", own=True, usage="REMARK text"),
-    form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", "names", own=True,
+    form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", own=True),
+    form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", own=True),
+    form("REMARK", "text:text?", "A comment.", "VAL", own=True, usage="REMARK text"),
+    form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", own=True,
          usage="AUTO [REAL|LOC] name, .."),
-    form("LOCAL", "name:variable*", "Names of this program alone.", "V+", "names", own=True,
+    form("LOCAL", "name:variable*", "Names of this program alone.", "V+", own=True,
          usage="LOCAL [REAL|LOC] name, .."),
-    form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+", "names", own=True,
+    form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+", own=True,
          usage="GLOBAL [REAL|LOC] name, .."),
 )  # fmt: skip
 
@@ -349,10 +343,10 @@ UNAVAILABLE: Final = {
 
 _REAL_FUNCTIONS: Final = (
     function("ABS", "x", "real", "Absolute value.", "VAL-II"),
-    function("ASC", "text:string, index?", "real", "Code of a character.", "VAL-II"),
+    function("ASC", "text:string, index?=1", "real", "Code of a character.", "VAL-II"),
     function("ATAN2", "y, x", "real", "Angle of a direction [deg].", "VAL-II"),
-    function("BMASK", "bit*", "real", "A number with these bits set, from 1.", "V+"),
-    function("BITS", "first, count?", "real", "Signals from a first one on, as a number.", "V+"),
+    function("BMASK", "bit*=0", "real", "A number with these bits set, from 1.", "V+"),
+    function("BITS", "first, count?=1", "real", "Signals from a first one on, as a number.", "V+"),
     function("COS", "angle", "real", "Cosine of an angle [deg].", "VAL-II"),
     function("DEFINED", "variable:any", "real", "Whether a variable has a value.", "V+"),
     function("DISTANCE", "a:frame, b:frame", "real", "Distance of two locations [mm].", "VAL-II"),
@@ -369,7 +363,8 @@ _REAL_FUNCTIONS: Final = (
     function("OUTSIDE", "low, x, high", "real", "Whether a value is outside a range.", "V+"),
     function("PARAMETER", "name:any", "real", "Value of a parameter.", "V+"),
     function("PI", "", "real", "3.14159..", "VAL-II", constant=True),
-    function("POS", "text:string, part:string, from?", "real", "Where a string has another; 0 for nowhere.", "V+"),
+    function("POS", "text:string, part:string, from?=1", "real",
+             "Where a string has another; 0 for nowhere.", "V+"),
     function("RANDOM", "", "real", "A random number from 0 to 1.", "V+", constant=True),
     function("SIG", "number*", "real", "Whether all these signals are on, or off where negative.", "VAL-II"),
     function("SIGN", "x", "real", "-1 or 1.", "VAL-II"),
@@ -389,7 +384,7 @@ _REAL_FUNCTIONS: Final = (
 
 _STRING_FUNCTIONS: Final = (
     function("$CHR", "code", "string", "The character of a code.", "VAL-II"),
-    function("$DECODE", "$variable:variable, separators:string, mode?", "string",
+    function("$DECODE", "$variable:variable, separators:string, mode?=0", "string",
              "What stands before, or with mode 1 the run of, separators; it's taken out of the variable.", "V+"),
     function("$ENCODE", "item:any?*", "string", "What TYPE would print.", "VAL-II"),
     function("$MID", "text:string, from, length", "string", "Part of a string.", "VAL-II"),
@@ -397,9 +392,9 @@ _STRING_FUNCTIONS: Final = (
 )  # fmt: skip
 
 _LOCATION_FUNCTIONS: Final = (
-    function("TRANS", "x?, y?, z?, o?, a?, t?", "frame", "A transformation [mm, deg]; without angles, no turn.",
-             "VAL-II"),
-    function("SHIFT", "a:frame, dx?, dy?, dz?", "frame", "A location shifted in world axes [mm].", "VAL-II",
+    function("TRANS", "x?=0, y?=0, z?=0, o?=90, a?=-90, t?=0", "frame",
+             "A transformation [mm, deg]; without angles, no turn.", "VAL-II"),
+    function("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0", "frame", "A location shifted in world axes [mm].", "VAL-II",
              usage="SHIFT(a BY dx, dy, dz)"),
     function("INVERSE", "a:frame", "frame", "The transformation back.", "VAL"),
     function("FRAME", "a:frame, b:frame, c:frame, d:frame", "frame",
@@ -410,7 +405,8 @@ _LOCATION_FUNCTIONS: Final = (
     function("NULL", "", "frame", "No way and no turn.", "VAL", constant=True),
     function("HERE", "", "frame", "Where the tool is.", "VAL", constant=True),
     function("DEST", "", "frame", "Where the tool goes.", "VAL-II", constant=True),
-    function("#PPOINT", "j1?, j2?, j3?, j4?, j5?, j6?", "location", "A precision point [deg].", "VAL-II"),
+    function("#PPOINT", "j1?=0, j2?=0, j3?=0, j4?=0, j5?=0, j6?=0", "location",
+             "A precision point [deg].", "VAL-II"),
     function("#HERE", "", "location", "Where the arm is, as a precision point.", "ours", constant=True),
     function("#DEST", "", "location", "Where the arm goes, as a precision point.", "V+", constant=True),
 )  # fmt: skip

@@ -130,25 +130,25 @@ def _decoded(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
             yield from ((item, "any") for item in items if not isinstance(item, Format))
 
 
-POINT: Final = "precision point"
+POINT: Final = "point"
 _RELATIONS: Final = ("==", "<>", "<", "<=", ">", ">=")
 _SHOWN: Final[Mapping[str, str]] = {
     "real": "a number", "string": "a string", "frame": "a transformation", "location": "a location",
-    POINT: "a precision point", "point": "a precision point",
+    "point": "a precision point",
 }  # fmt: skip
 _FITS: Final[Mapping[str, tuple[str, ...]]] = {
     "real": ("real",),
     "string": ("string",),
     "frame": ("frame",),
-    "point": (POINT,),
-    "location": ("frame", POINT, "location"),
+    "point": ("point",),
+    "location": ("frame", "point", "location"),
 }
 _STANDING: Final = ("HERE", "DEST")
 """Functions that give joints where a precision point is wanted."""
 
 
 def kind_of(expression: Expression, known: Mapping[str, str]) -> str:
-    """`real`, `string`, `frame`, `precision point`, or nothing if it can't be told.
+    """`real`, `string`, `frame`, `point`, or nothing if it can't be told.
 
     Args:
         expression: The expression.

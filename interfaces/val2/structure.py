@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.memory import where
 from interfaces.val2.syntax import (
     Assign,
     Case,
@@ -255,7 +254,7 @@ def standalone_error(step: Step, at: TextPosition) -> ValError | None:
         case PlainStatement.BLANK:
             return None
         case PlainStatement() | Conditional() | For() | Case() | Value() | LoopJump() | Goto() | Local():
-            return ValError("Control structure error", "it's for programs", place=where(at))
+            return ValError("Control structure error", "it's for programs", place=at)
         case _:
             return None
 

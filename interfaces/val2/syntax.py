@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
-from interfaces.val2.errors import TextPosition
-
-NOWHERE = TextPosition(0, 0)
-"""Of what was made, not read."""
+from interfaces.val2.errors import NOWHERE, TextPosition
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +120,8 @@ class Instruction:
 
     keyword: str
     """Upper case."""
-    operands: tuple[Expression | None, ...] = ()
-    """None for one that was left out."""
+    operands: tuple[Any, ...] = ()
+    """Expressions; None for one that was left out."""
     words: tuple[str, ...] = ()
     """Words after them, upper case, in the order of `forms.py`: `MMPS`, `ALWAYS`; a switch's name for `ENABLE`."""
     at: TextPosition = field(default=NOWHERE, compare=False)
