@@ -21,22 +21,15 @@ from interfaces.val2.source import SourceFile, read_all, words_of
 from interfaces.val2.structure import standalone_error, survey
 from interfaces.val2.syntax import (
     Apply,
-    Assign,
-    Call,
-    Case,
     Expression,
-    For,
     Format,
     Ignored,
     Instruction,
-    Local,
     Number,
     Program,
-    React,
     Statement,
     Step,
     Unary,
-    Value,
     Variable,
 )
 from robots import puma560
@@ -125,7 +118,7 @@ class _Checker:
         names = {parameter.name for parameter in program.parameters}
         for step in program.steps:
             match step.statement:
-                case Local(keyword, variables) if keyword != "GLOBAL":
+                case Instruction("AUTO" | "LOCAL", variables):
                     names |= {variable.name for variable in variables}
         return frozenset(names)
 
@@ -165,9 +158,10 @@ class _Checker:
         errors = [*self._calls(statement), *_numbers(statement), *_signals(statement)]
         for expression, wanted in kinds.reads(statement):
             errors += kinds.mistakes(expression, wanted, known)
-        if isinstance(statement, For) and statement.variable.prefix:
-            errors.append(mismatch(statement.variable))
-        if not errors and standalone_error(step, step.at) is None:
+        match statement:
+            case Instruction("FOR", (variable, *_)) if variable.prefix:
+                errors.append(mismatch(variable))
+        if not errors and standalone_error(step) is None:
             # What is no mistake here and can't be compiled would stop the program when it comes there.
             uncompilable = refusal(step, self._context)
             errors += [] if uncompilable is None else [uncompilable]
@@ -196,7 +190,7 @@ class _Checker:
 
     def _calls(self, statement: Statement) -> Iterator[ValError]:
         match statement:
-            case Call(name, arguments, _, at):
+            case Instruction("CALL" | "GOSUB", arguments, at=at, program=name):
                 called = self._programs.get(name)
                 if called is None:
                     yield self._undefined(name, at)
@@ -210,7 +204,7 @@ class _Checker:
                 for argument, parameter in zip(arguments, parameters, strict=False):
                     if argument is not None:
                         yield from _passed(argument, parameter)
-            case React(program=name, at=at) if name and name not in self._programs:
+            case Instruction("REACT" | "REACTI", at=at, program=name) if name and name not in self._programs:
                 yield self._undefined(name, at)
 
     def _undefined(self, name: str, at: TextPosition) -> ValError:
@@ -220,10 +214,11 @@ class _Checker:
 
 def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
     """CASE of what is neither a number nor a string, and VALUE of what can't be the same."""
-    if not isinstance(head.statement, Case):
+    i = step.statement
+    if not isinstance(head.statement, Instruction) or head.statement.keyword != "CASE":
         return
-    given = head.statement.value
-    values = step.statement.values if isinstance(step.statement, Value) else (given,) if step is head else ()
+    (given,) = head.statement.operands
+    values = i.operands if isinstance(i, Instruction) and i.keyword in ("VALUE", "CASE") else ()
     wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
     for value in values:
         yield from kinds.mistakes(value, wanted, known)
@@ -246,9 +241,9 @@ def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
 def _given(statement: Statement) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
-        case Assign(keyword="" | "DECOMPOSE") | For():
+        case Instruction("=" | "DECOMPOSE" | "FOR"):
             return "real"
-        case Assign() | Instruction("HERE"):
+        case Instruction("SET" | "HERE"):
             return "frame"
     return ""
 
@@ -307,10 +302,8 @@ def _signals(statement: Statement) -> Iterator[ValError]:
     match statement:
         case Instruction("SIGNAL", operands):
             named += [(operand, settable) for operand in operands]
-        case Instruction("IGNORE", operands):
+        case Instruction("IGNORE" | "REACT" | "REACTI", operands):
             named += [(operand, legal) for operand in operands]
-        case React(signal):
-            named.append((signal, legal))
     for expression, _ in kinds.reads(statement):
         for part in kinds.parts(expression):
             if isinstance(part, Apply) and part.function == "SIG":

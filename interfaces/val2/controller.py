@@ -194,7 +194,7 @@ class Controller:
         Raises:
             ValError: If it can't stand alone, or must not now; what goes wrong while it's done is an event.
         """
-        if (misplaced := standalone_error(step, step.at)) is not None:
+        if (misplaced := standalone_error(step)) is not None:
             raise misplaced
         if self._do is not None or (self.running and not runs_beside_program(step)):
             raise ValError("Program already running")

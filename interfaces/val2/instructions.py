@@ -41,7 +41,6 @@ from interfaces.val2.syntax import (
     Format,
     Instruction,
     Number,
-    Prompt,
     Unary,
     Variable,
 )
@@ -428,6 +427,10 @@ def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) ->
                 return _special(c, Waiting(_standing(c, None, following)))
 
             return stop
+        case "TYPE":
+            return _type(x, i, following)
+        case "PROMPT":
+            return _prompt(x, i, following)
         case "WAIT":
             return _wait(x, i, following)
         case "WAIT.EVENT":
@@ -445,10 +448,9 @@ def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) ->
 # Dialogue.
 
 
-def type_step(x: Expressions, items: tuple[Expression | Format, ...], following: int) -> StepFunction:
-    """TYPE."""
+def _type(x: Expressions, i: Instruction, following: int) -> StepFunction:
     context = x.context
-    parts = [i if isinstance(i, Format) else x.value(i) for i in items]
+    parts = [o if isinstance(o, Format) else x.value(o) for o in i.operands]
 
     def type_(s: Slots) -> int:
         text, ends = formats.spelled([p if isinstance(p, Format) else p(s) for p in parts])
@@ -459,9 +461,9 @@ def type_step(x: Expressions, items: tuple[Expression | Format, ...], following:
     return type_
 
 
-def prompt_step(x: Expressions, prompt: Prompt, following: int) -> StepFunction:
-    """PROMPT: ask, and ask again until the answer is what is wanted."""
-    context, text, names = x.context, x.string(prompt.text), prompt.targets
+def _prompt(x: Expressions, i: Instruction, following: int) -> StepFunction:
+    """Ask, and ask again until the answer is what is wanted."""
+    context, text, names = x.context, x.string(i.operands[0]), i.operands[1:]
     slots = [x.reference(v) for v in names]
     if any(v.prefix == "#" for v in names):
         raise mismatch(next(v for v in names if v.prefix == "#"))

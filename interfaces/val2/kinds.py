@@ -10,25 +10,15 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.forms import Kind
 from interfaces.val2.syntax import (
     Apply,
-    Assign,
     Binary,
-    Call,
-    Case,
     Compound,
-    Conditional,
     Expression,
-    For,
     Format,
-    Goto,
     Instruction,
     Number,
-    Prompt,
-    React,
     Statement,
     Text,
-    Type,
     Unary,
-    Value,
     Variable,
 )
 
@@ -56,43 +46,34 @@ def parts(expression: Expression) -> Iterator[Expression]:
         yield from parts(child)
 
 
-def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
-    """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
-    match statement:
-        case Assign(target, value, "SET"):
-            yield value, "point" if target.prefix == "#" else "frame"
-        case Assign(_, value, "DECOMPOSE"):
-            yield value, "location"
-        case Assign(target, value):
-            yield value, "string" if target.prefix == "$" else "real"
-        case Instruction("HERE", (Compound(parts=(*others, _)),)):
+def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
+    """The operands of an instruction, and what kind each has to be of: `variable` for what it may set."""
+    match i:
+        case Instruction("=" | "SET", (target, value)):
+            yield target, "variable"
+            if i.keyword == "=":
+                yield value, "string" if target.prefix == "$" else "real"
+            else:
+                yield value, "point" if target.prefix == "#" else "frame"
+        case Instruction("HERE", (target,)):
+            *others, last = target.parts if isinstance(target, Compound) else (target,)
             yield from ((other, "frame") for other in others)
-        case Instruction("HERE"):
-            pass
+            if isinstance(last, Variable):
+                yield last, "variable"
         case Instruction("BASE", (Variable() | Apply() | Compound() as only,)):
             yield only, "any"
-        case Instruction(keyword, operands):
-            row = forms.INSTRUCTIONS[keyword]
-            slots = row.slots
-            for i, operand in enumerate(operands):
-                if operand is not None and slots:
-                    yield operand, slots[min(i, len(slots) - 1)].kind
-        case Conditional(_, condition) | Goto(_, condition) if condition is not None:
-            yield condition, "real"
-        case For(_, start, stop, step):
-            yield from ((part, "real") for part in (start, stop, step) if part is not None)
-        case Case(value):
-            yield value, "any"
-        case Value(values):
-            yield from ((value, "any") for value in values)
-        case Call(arguments=arguments):
-            yield from ((a, "any") for a in arguments if a is not None and not isinstance(a, Variable))
-        case React(signal):
-            yield signal, "real"
-        case Type(items):
-            yield from ((item, "any") for item in items if not isinstance(item, Format))
-        case Prompt(text):
-            yield text, "string"
+        case Instruction("CALL" | "GOSUB", given):
+            yield from ((a, "variable" if isinstance(a, Variable) else "any") for a in given if a is not None)
+        case Instruction(keyword, operands) if keyword not in ("", "AUTO", "LOCAL", "GLOBAL"):
+            slots = forms.INSTRUCTIONS[keyword].slots
+            for n, operand in enumerate(operands if slots else ()):
+                if operand is not None and not isinstance(operand, Format):
+                    yield operand, slots[min(n, len(slots) - 1)].kind
+
+
+def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
+    """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
+    yield from ((operand, kind) for operand, kind in _operands(statement) if kind != "variable")
     if isinstance(statement, Instruction) and statement.begins is not None:
         yield statement.begins, "real"
     for target in writes(statement):
@@ -100,34 +81,16 @@ def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
 
 
 def writes(statement: Statement) -> Iterator[Variable]:
-    """The variables that a statement may set."""
-    match statement:
-        case Assign(target):
-            yield target
-        case Instruction("HERE", (Variable() as target,)):
-            yield target
-        case Instruction("HERE", (Compound(parts=(*_, Variable() as target)),)):
-            yield target
-        case For(variable):
-            yield variable
-        case Prompt(_, targets):
-            yield from targets
-        case Call(arguments=arguments):
-            yield from (a for a in arguments if isinstance(a, Variable))
-    for expression, _ in _decoded(statement):
-        for part in parts(expression):
-            match part:
-                case Apply("$DECODE", (Variable() as target, *_)):
-                    yield target
-
-
-def _decoded(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
-    """Where `$DECODE` may stand, which shortens its first argument."""
-    match statement:
-        case Assign(_, value, ""):
-            yield value, "any"
-        case Type(items):
-            yield from ((item, "any") for item in items if not isinstance(item, Format))
+    """The variables that a statement may set; `$DECODE` shortens its first argument."""
+    for operand, kind in _operands(statement):
+        if kind == "variable" and isinstance(operand, Variable):
+            yield operand
+    if isinstance(statement, Instruction) and statement.keyword in ("=", "TYPE"):
+        for operand, _ in _operands(statement):
+            for part in parts(operand):
+                match part:
+                    case Apply("$DECODE", (Variable() as target, *_)):
+                        yield target
 
 
 POINT: Final = "point"

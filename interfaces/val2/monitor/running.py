@@ -11,11 +11,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Style, TerminalState, integer, named, nothing, pieces
 from interfaces.val2.statements import timed
-from interfaces.val2.syntax import (
-    Call,
-    Expression,
-    PlainStatement,
-)
+from interfaces.val2.syntax import BLANK, Expression, Instruction
 
 FOREVER: Final = -1
 """Cycles that never end."""
@@ -27,7 +23,7 @@ _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 def do(state: TerminalState, rest: str) -> None:
     """DO instruction; DO alone does the last again."""
     step = state.step(rest) if rest else state.last_do
-    if step is None or step.statement is PlainStatement.BLANK:
+    if step is None or step.statement == BLANK:
         raise ValError("Missing argument", "DO what? An instruction follows, such as DO READY")
     state.last_do = step
     state.controller.do(step, now=state.now)
@@ -85,10 +81,10 @@ def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ..
     arguments: tuple[Expression, ...] = ()
     if "(" in called:
         statement = state.instruction("CALL", called).statement
-        assert isinstance(statement, Call)
+        assert isinstance(statement, Instruction)
         called = statement.program
-        arguments = tuple(argument for argument in statement.arguments if argument is not None)
-        if len(arguments) < len(statement.arguments):
+        arguments = tuple(argument for argument in statement.operands if argument is not None)
+        if len(arguments) < len(statement.operands):
             raise ValError("Missing argument", f"{text}: none may be left out")
     name = named(called, "program")
     cycles, step = integer("".join(numbers[:1]), 1, "cycles"), integer("".join(numbers[1:]), 1, "step")

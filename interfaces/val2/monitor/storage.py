@@ -26,7 +26,7 @@ from interfaces.val2.monitor.state import (
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
 from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file
-from interfaces.val2.syntax import Call, Program, React, Variable
+from interfaces.val2.syntax import Instruction, Program, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
 
 T = TypeVar("T")
@@ -287,8 +287,8 @@ def _called(programs: dict[str, Program], some: dict[str, Program]) -> dict[str,
     """Programs with all that they call."""
     found, waiting = dict(some), list(some.values())
     while waiting:
-        for node in _walk(waiting.pop()):
-            name = node.program if isinstance(node, Call | React) else ""
+        for step in waiting.pop().steps:
+            name = step.statement.program if isinstance(step.statement, Instruction) else ""
             if name in programs and name not in found:
                 found[name] = programs[name]
                 waiting.append(programs[name])
