@@ -150,13 +150,13 @@ class _Checker:
     def _step(
         self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
-        statement = step.statement
+        statement, reads = step.statement, kinds.reads(step.statement)
         if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
-        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement)]
-        for expression, wanted in kinds.reads(statement):
+        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement, reads)]
+        for expression, wanted in reads:
             errors += kinds.mistakes(expression, wanted, known)
         match statement:
             case Instruction("FOR", (variable, *_)) if variable.prefix:
@@ -166,7 +166,7 @@ class _Checker:
             uncompilable = refusal(step, self._context)
             errors += [] if uncompilable is None else [uncompilable]
         yield from (_error(error) for error in errors)
-        for expression, wanted in kinds.reads(statement):
+        for expression, wanted in reads:
             yield from self._unset(expression, wanted, usable, reported)
 
     def _unset(
@@ -185,7 +185,7 @@ class _Checker:
                 gives = '""' if forms.FUNCTIONS[name].gives == "string" else "0"
                 yield _warning(ValError("No meaning here", f"{name} is {gives}", place=at))
                 return
-        for child, kind in _wanted(expression):
+        for child, kind in kinds.wanted(expression):
             yield from self._unset(child, kind, usable, reported)
 
     def _calls(self, statement: Statement) -> Iterator[ValError]:
@@ -222,20 +222,6 @@ def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
     wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
     for value in values:
         yield from kinds.mistakes(value, wanted, known)
-
-
-def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
-    """The parts of an expression, and whether each has to be a location."""
-    if isinstance(expression, Apply):
-        slots = forms.FUNCTIONS[expression.function].slots
-        return [
-            (argument, slots[min(i, len(slots) - 1)].kind)
-            for i, argument in enumerate(expression.arguments)
-            if argument is not None and argument in kinds.children(expression)
-        ]
-    kind: Kind = "real" if isinstance(expression, Variable) else "frame"
-    located = kinds.kind_of(expression, {}) == "frame"
-    return [(child, kind if located else "real") for child in kinds.children(expression)]
 
 
 def _given(statement: Statement) -> str:
@@ -296,7 +282,7 @@ def _numbers(statement: Statement) -> Iterator[ValError]:
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
-def _signals(statement: Statement) -> Iterator[ValError]:
+def _signals(statement: Statement, reads: list[tuple[Expression, Kind]]) -> Iterator[ValError]:
     """Signals that are written down and that there aren't."""
     named: list[tuple[Expression | Format | None, Callable[[float], int]]] = []
     match statement:
@@ -304,7 +290,7 @@ def _signals(statement: Statement) -> Iterator[ValError]:
             named += [(operand, settable) for operand in operands]
         case Instruction("IGNORE" | "REACT" | "REACTI", operands):
             named += [(operand, legal) for operand in operands]
-    for expression, _ in kinds.reads(statement):
+    for expression, _ in reads:
         for part in kinds.parts(expression):
             if isinstance(part, Apply) and part.function == "SIG":
                 named += [(argument, legal) for argument in part.arguments]

@@ -11,7 +11,7 @@ from typing import Any, Final, TypeAlias
 from interfaces.val2.errors import NOWHERE, TextPosition, ValError
 from interfaces.val2.forms import PARAMETERS, SWITCHES
 from interfaces.val2.memory import Memory, Slots, VariableSlot
-from interfaces.val2.ports import ArmPort
+from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import Reactions, Signals
 from interfaces.val2.syntax import Program
 
@@ -165,7 +165,7 @@ Action: TypeAlias = "Invoke | Leave | Finished | Suspend | Waiting | int"
 class Context:
     """What the closures of compiled programs reach out to."""
 
-    arm: ArmPort
+    arm: Arm
     compile: Callable[[Program, Context], Code]
     """Makes closures of a program; see `interfaces.val2.compiler.compiled`."""
     memory: Memory = field(default_factory=Memory)

@@ -18,7 +18,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
 from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
-from interfaces.val2.ports import ArmPort
+from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import SignalRule, Signals
 from interfaces.val2.structure import runs_beside_program, standalone_error
 from interfaces.val2.syntax import (
@@ -59,7 +59,7 @@ class Controller:
 
     def __init__(
         self,
-        arm: ArmPort,
+        arm: Arm,
         *,
         memory: Memory | None = None,
         parameters: MutableMapping[str, float] | None = None,
@@ -91,7 +91,7 @@ class Controller:
         self._due = False
 
     @property
-    def arm(self) -> ArmPort:
+    def arm(self) -> Arm:
         """What moves."""
         return self.context.arm
 

@@ -32,7 +32,7 @@ from interfaces.val2.expressions import Expressions
 from interfaces.val2.forms import OperandSlot
 from interfaces.val2.functions import whole
 from interfaces.val2.memory import Slots, VariableSlot, mismatch
-from interfaces.val2.ports import ALTER_PERIOD
+from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.syntax import (
     Apply,
     Binary,

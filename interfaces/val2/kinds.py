@@ -71,13 +71,12 @@ def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
                     yield operand, slots[min(n, len(slots) - 1)].kind
 
 
-def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
+def reads(statement: Statement) -> list[tuple[Expression, Kind]]:
     """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
-    yield from ((operand, kind) for operand, kind in _operands(statement) if kind != "variable")
+    found = [one for one in _operands(statement) if one[1] != "variable"]
     if isinstance(statement, Instruction) and statement.begins is not None:
-        yield statement.begins, "real"
-    for target in writes(statement):
-        yield from ((index, "real") for index in target.indices)
+        found.append((statement.begins, "real"))
+    return found + [(index, "real") for target in writes(statement) for index in target.indices]
 
 
 def writes(statement: Statement) -> Iterator[Variable]:
@@ -85,12 +84,23 @@ def writes(statement: Statement) -> Iterator[Variable]:
     for operand, kind in _operands(statement):
         if kind == "variable" and isinstance(operand, Variable):
             yield operand
-    if isinstance(statement, Instruction) and statement.keyword in ("=", "TYPE"):
-        for operand, _ in _operands(statement):
+        elif statement.keyword in ("=", "TYPE"):
             for part in parts(operand):
                 match part:
                     case Apply("$DECODE", (Variable() as target, *_)):
                         yield target
+
+
+def wanted(expression: Expression) -> Iterator[tuple[Expression, Kind]]:
+    """The parts of an expression, and what kind each has to be of; those of `+` and relations have to be alike."""
+    if isinstance(expression, Apply):
+        slots = forms.FUNCTIONS[expression.function].slots
+        for i, argument in enumerate(expression.arguments):
+            if argument is not None and not isinstance(argument, Format):
+                yield argument, slots[i].kind if i < len(slots) else slots[-1].kind
+    else:
+        kind: Kind = "frame" if isinstance(expression, Compound) else "real"
+        yield from ((child, kind) for child in children(expression))
 
 
 POINT: Final = "point"
@@ -135,34 +145,25 @@ def kind_of(expression: Expression, known: Mapping[str, str]) -> str:
             return "real"
 
 
-def mistakes(expression: Expression, wanted: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
+def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
     """What in an expression can't be of the kind that it has to be of.
 
     Args:
         expression: The expression.
-        wanted: What it has to be.
+        asked: What it has to be.
         known: What is known of names without a prefix.
     """
     kind = kind_of(expression, known)
-    if wanted == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
+    if asked == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
         kind = POINT
-    if kind and wanted in _FITS and kind not in _FITS[wanted]:
-        yield ValError("Mixed types", f"{_SHOWN[kind]} where {_SHOWN[wanted]} is wanted", place=expression.at)
+    if kind and asked in _FITS and kind not in _FITS[asked]:
+        yield ValError("Mixed types", f"{_SHOWN[kind]} where {_SHOWN[asked]} is wanted", place=expression.at)
         return
-    match expression:
-        case Apply(name, arguments):
-            slots = forms.FUNCTIONS[name].slots
-            for i, argument in enumerate(arguments):
-                if argument is not None and not isinstance(argument, Format):
-                    yield from mistakes(argument, slots[min(i, len(slots) - 1)].kind, known)
-        case Compound(parts):
-            for part in parts:
-                yield from mistakes(part, "frame", known)
-        case Binary(operator, left, right) if operator == "+" or operator in _RELATIONS:
-            yield from _alike(expression, left, right, known)
-        case _:
-            for child in children(expression):
-                yield from mistakes(child, "real", known)
+    if isinstance(expression, Binary) and (expression.operator == "+" or expression.operator in _RELATIONS):
+        yield from _alike(expression, expression.left, expression.right, known)
+    else:
+        for part, kind_of_part in wanted(expression):
+            yield from mistakes(part, kind_of_part, known)
 
 
 def _alike(whole: Binary, left: Expression, right: Expression, known: Mapping[str, str]) -> Iterable[ValError]:
@@ -171,7 +172,6 @@ def _alike(whole: Binary, left: Expression, right: Expression, known: Mapping[st
     if kinds == {"real", "string"}:
         yield ValError("Mixed types", f"a number and a string with {whole.operator} between them", place=whole.at)
         return
-    wanted: Kind = "string" if kinds == {"string"} else "real"
     if kinds:
-        yield from mistakes(left, wanted, known)
-        yield from mistakes(right, wanted, known)
+        for part in (left, right):
+            yield from mistakes(part, "string" if kinds == {"string"} else "real", known)

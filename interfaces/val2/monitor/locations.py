@@ -12,7 +12,7 @@ from typing_extensions import override
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, TerminalState, as_location, halves, nothing, pieces
-from interfaces.val2.ports import Where
+from interfaces.val2.motion.places import Where
 from interfaces.val2.syntax import Compound, Number, Variable
 from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation, from_oat
 
