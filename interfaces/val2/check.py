@@ -92,7 +92,7 @@ class _Checker:
         """Programs by which names are set; the empty name stands for all."""
         self._known: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         """Kinds of what names were set to, by their scopes; the empty name stands for all."""
-        for entry in (*source.locations, *source.reals, *source.strings):
+        for entry in source.values:
             self._set[""].add(entry.variable.name)
         for entry in source.locations:
             self._known[""][entry.variable.name].add("frame")

@@ -9,7 +9,7 @@ from typing import Final
 from interfaces.val2.controller import ControllerStatus
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.state import Style, TerminalState, integer, named, nothing, pieces
+from interfaces.val2.monitor.state import Style, TerminalState, integer, named, pieces
 from interfaces.val2.statements import timed
 from interfaces.val2.syntax import BLANK, Expression, Instruction
 
@@ -96,9 +96,8 @@ def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ..
     return name, arguments, cycles, step
 
 
-def abort(state: TerminalState, rest: str) -> None:
+def abort(state: TerminalState, _rest: str) -> None:
     """ABORT."""
-    nothing(rest, "ABORT")
     controller = state.controller
     if not (controller.running or controller.doing) and _stands(state):
         raise ValError("No program running")
@@ -122,27 +121,8 @@ def panic(state: TerminalState, _rest: str) -> None:
     state.say("*Arm power off* ENABLE POWER turns it on again", style=Style.ERROR)
 
 
-def proceed(state: TerminalState, rest: str) -> None:
-    """PROCEED."""
-    nothing(rest, "PROCEED")
-    state.controller.proceed(now=state.now)
-
-
-def retry(state: TerminalState, rest: str) -> None:
-    """RETRY."""
-    nothing(rest, "RETRY")
-    state.controller.retry(now=state.now)
-
-
-def undo(state: TerminalState, rest: str) -> None:
-    """UNDO."""
-    nothing(rest, "UNDO")
-    state.say(state.controller.arm.undo(now=state.now))
-
-
-def timeline(state: TerminalState, rest: str) -> None:
+def timeline(state: TerminalState, _rest: str) -> None:
     """TIMELINE."""
-    nothing(rest, "TIMELINE")
     state.say(f"Now {layout.fixed(state.now, 3)} s")
     scheduled = state.controller.arm.timeline(now=state.now)
     if scheduled:
@@ -151,9 +131,8 @@ def timeline(state: TerminalState, rest: str) -> None:
     state.say_all(scheduled, "Nothing is scheduled")
 
 
-def status(state: TerminalState, rest: str) -> None:
+def status(state: TerminalState, _rest: str) -> None:
     """STATUS."""
-    nothing(rest, "STATUS")
     controller = state.controller
     current = controller.status()
     here, there = controller.arm.here(now=state.now), controller.arm.destination(now=state.now)
