@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import MISSING, TOO_MANY, InstructionForm, nearest
+from interfaces.val2.forms import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.grammar import Node, Worded
 from interfaces.val2.syntax import (
     Apply,
@@ -96,7 +96,7 @@ class OperandText:
             return None
         return Apply(name, tuple(arguments), TextPosition(self.line, plain.start(1) + 1))
 
-    def by_rule(self, row: InstructionForm, start: str) -> list[Any]:
+    def by_rule(self, row: Form, start: str) -> list[Any]:
         """The operands that a rule of the grammar finds, by an instruction's slots; words between them left out.
 
         Raises:
@@ -118,7 +118,7 @@ class OperandText:
             return label_of(self.expression(node), self)
         return grammar.form_of(node, self.line) if getattr(node, "type", "") == "FORMAT" else self.expression(node)
 
-    def require(self, form: InstructionForm) -> None:
+    def require(self, form: Form) -> None:
         """See that there's something.
 
         Raises:
@@ -128,9 +128,7 @@ class OperandText:
             raise ValError(MISSING, form.usage, place=self.end)
 
 
-def operands_and_words(
-    row: InstructionForm, given: list[Worded]
-) -> tuple[list[Expression | None], tuple[str, ...]]:
+def operands_and_words(row: Form, given: list[Worded]) -> tuple[list[Expression | None], tuple[str, ...]]:
     """Tell operands from words, which look like variables where no operand stands before them.
 
     Raises:
@@ -151,7 +149,7 @@ def operands_and_words(
     return operands, _ordered(row, found)
 
 
-def _ordered(row: InstructionForm, found: list[tuple[str, TextPosition]]) -> tuple[str, ...]:
+def _ordered(row: Form, found: list[tuple[str, TextPosition]]) -> tuple[str, ...]:
     words = []
     for group in row.words:
         here = [(word, at) for word, at in found if word in group]
@@ -172,7 +170,7 @@ def as_word(operand: Expression | None) -> str:
     return operand.value.upper() if isinstance(operand, Text) else ""
 
 
-def count(row: InstructionForm, operands: list[Expression | None], rest: OperandText) -> None:
+def count(row: Form, operands: list[Expression | None], rest: OperandText) -> None:
     """Count the operands.
 
     Raises:
@@ -268,24 +266,24 @@ def _is_location(value: Expression) -> bool:
     return isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
 
 
-def _instruction(row: InstructionForm, rest: OperandText) -> Instruction:
-    if row.keyword in ("ACCEL", "ALTER", "ALTON"):
+def _instruction(row: Form, rest: OperandText) -> Instruction:
+    if row.name in ("ACCEL", "ALTER", "ALTON"):
         _open_channel(row, rest)
     operands, words = operands_and_words(row, rest.operands())
-    if row.keyword == "ACCEL" and len(operands) == 3:
+    if row.name == "ACCEL" and len(operands) == 3:
         operands = operands[1:]
     count(row, operands, rest)
-    if row.keyword == "GRASP" and len(operands) == 2:
+    if row.name == "GRASP" and len(operands) == 2:
         operands[1] = label_of(operands[1], rest)
-    if row.keyword == "WAIT" and operands:
+    if row.name == "WAIT" and operands:
         operands[0] = _channel_wait(operands[0])
-    return Instruction(row.keyword, tuple(operands), words, rest.at)
+    return Instruction(row.name, tuple(operands), words, rest.at)
 
 
-def _open_channel(row: InstructionForm, rest: OperandText) -> None:
+def _open_channel(row: Form, rest: OperandText) -> None:
     """`ALTER (1) 3` reads like `ALTER 1, 3`."""
     if found := _CHANNEL.match(rest.text):
-        inner = found[2] if found[2].strip() or row.keyword != "ACCEL" else "1"
+        inner = found[2] if found[2].strip() or row.name != "ACCEL" else "1"
         rest.text = f"{found[1]} {inner},{found[3]}{rest.text[found.end() :]}"
 
 
@@ -305,7 +303,7 @@ def timed(text: str) -> tuple[int, int, int] | None:
     return None if found is None else (found.end(1), found.start(2), found.end(2))
 
 
-def _at(row: InstructionForm, rest: OperandText) -> Statement:
+def _at(row: Form, rest: OperandText) -> Statement:
     """`AT time`, or with a motion behind it."""
     places = timed(rest.text)
     if places is None:
@@ -317,21 +315,21 @@ def _at(row: InstructionForm, rest: OperandText) -> Statement:
     return replace(made, begins=rest.expression(time))
 
 
-def _plain(row: InstructionForm, rest: OperandText) -> Statement:
+def _plain(row: Form, rest: OperandText) -> Statement:
     if not rest.empty:
-        detail = f"unexpected '{rest.text.strip()}' behind {row.keyword}; allowed: the end of the line"
+        detail = f"unexpected '{rest.text.strip()}' behind {row.name}; allowed: the end of the line"
         raise ValError("Syntax error", detail, place=rest.start)
-    return Instruction(row.keyword, (), (), rest.at)
+    return Instruction(row.name, (), (), rest.at)
 
 
-def _shift(row: InstructionForm, rest: OperandText) -> Statement:
+def _shift(row: Form, rest: OperandText) -> Statement:
     target, *values = rest.by_rule(row, "shift")
     if len(values) > 3:
         raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
     return Instruction("SET", (target, Apply("SHIFT", (target, *values), rest.at)), (), rest.at)
 
 
-def _parameter(row: InstructionForm, rest: OperandText) -> Statement:
+def _parameter(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     found = _SETTING.match(rest.text)
     if found is None:
@@ -339,14 +337,14 @@ def _parameter(row: InstructionForm, rest: OperandText) -> Statement:
     name = found[1].upper()
     if name not in forms.PARAMETERS:
         reject_misspelling("parameter", [name], forms.PARAMETERS, TextPosition(rest.line, found.start(1) + 1))
-        return Ignored(row.keyword, rest.text.strip(), rest.at)
+        return Ignored(row.name, rest.text.strip(), rest.at)
     if found[2] is None:
         raise ValError(MISSING, f"allowed: {row.usage}", place=TextPosition(rest.line, found.end() + 1))
     value = grammar.read(" " * found.end() + rest.text[found.end() :], "expression", rest.line)
-    return Instruction(row.keyword, (rest.expression(value),), (name,), rest.at)
+    return Instruction(row.name, (rest.expression(value),), (name,), rest.at)
 
 
-def _switches(row: InstructionForm, rest: OperandText) -> Statement:
+def _switches(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     names = []
     for operand, words in rest.operands():
@@ -357,18 +355,18 @@ def _switches(row: InstructionForm, rest: OperandText) -> Statement:
         names.append(name)
     if any(name not in forms.SWITCHES for name in names):
         reject_misspelling("switch", names, forms.SWITCHES, rest.start)
-        return Ignored(row.keyword, rest.text.strip(), rest.at)
-    return Instruction(row.keyword, (), tuple(names), rest.at)
+        return Ignored(row.name, rest.text.strip(), rest.at)
+    return Instruction(row.name, (), tuple(names), rest.at)
 
 
-def _react(row: InstructionForm, rest: OperandText) -> Statement:
+def _react(row: Form, rest: OperandText) -> Statement:
     operands, words = operands_and_words(row, rest.operands())
     count(row, operands[:2], rest)
     if len(operands) > 3:
         raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
     signal, *others = operands
     program = _program_of(others[0]) if others and others[0] is not None else ""
-    return Instruction(row.keyword, (signal,), words, rest.at, program=program)
+    return Instruction(row.name, (signal,), words, rest.at, program=program)
 
 
 def _program_of(operand: Expression) -> str:
@@ -379,37 +377,37 @@ def _program_of(operand: Expression) -> str:
     raise ValError("Syntax error", "allowed: the name of a program", place=operand.at)
 
 
-def _goto(row: InstructionForm, rest: OperandText) -> Statement:
+def _goto(row: Form, rest: OperandText) -> Statement:
     operands = rest.operands()
     if len(operands) != 1 or operands[0][1]:
         raise ValError(MISSING if rest.empty else "Syntax error", f"allowed: {row.usage}", place=rest.end)
-    return Instruction(row.keyword, (label_of(operands[0][0], rest),), (), rest.at)
+    return Instruction(row.name, (label_of(operands[0][0], rest),), (), rest.at)
 
 
-def _value(row: InstructionForm, rest: OperandText) -> Statement:
+def _value(row: Form, rest: OperandText) -> Statement:
     rest.text = rest.text.rstrip().removesuffix(":")
     rest.require(row)
     operands = rest.operands()
     for operand, words in operands:
         if operand is None or words:
             raise ValError("Syntax error", f"allowed: {row.usage}", place=words[0][1] if words else rest.start)
-    return Instruction(row.keyword, tuple(operand for operand, _ in operands), (), rest.at)
+    return Instruction(row.name, tuple(operand for operand, _ in operands), (), rest.at)
 
 
-def _any(row: InstructionForm, rest: OperandText) -> Statement:
+def _any(row: Form, rest: OperandText) -> Statement:
     rest.text = rest.text.rstrip().removesuffix(":")
     return _plain(row, rest)
 
 
-def _loops(row: InstructionForm, rest: OperandText) -> Statement:
+def _loops(row: Form, rest: OperandText) -> Statement:
     text, count = rest.text.strip(), 1
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
     if text and not (plain and 1 <= (count := int(text)) <= MOST_LOOPS):
         raise ValError("Syntax error", f"allowed: a number of loops, 1 to {MOST_LOOPS}", place=rest.start)
-    return Instruction(row.keyword, (Number(float(count)),) if count > 1 else (), (), rest.at)
+    return Instruction(row.name, (Number(float(count)),) if count > 1 else (), (), rest.at)
 
 
-def _call(row: InstructionForm, rest: OperandText) -> Statement:
+def _call(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     name, arguments = rest.tree("call")
     if not _NAME.fullmatch(name):
@@ -421,10 +419,10 @@ def _call(row: InstructionForm, rest: OperandText) -> Statement:
         given.append(None if node is None else rest.expression(node))
     if given == [None]:
         given = []
-    return Instruction(row.keyword, tuple(given), (), rest.at, program=grammar.name_of(name))
+    return Instruction(row.name, tuple(given), (), rest.at, program=grammar.name_of(name))
 
 
-def _prompt(row: InstructionForm, rest: OperandText) -> Statement:
+def _prompt(row: Form, rest: OperandText) -> Statement:
     operands, targets = rest.operands(), []
     first = operands[0][0] if operands else None
     for operand, words in operands:
@@ -436,18 +434,18 @@ def _prompt(row: InstructionForm, rest: OperandText) -> Statement:
                 raise ValError("Syntax error", "allowed: variables behind the text", place=at)
             targets.append(operand)
     text = Text("", rest.at) if first is None else first
-    return Instruction(row.keyword, (text, *targets), (), rest.at)
+    return Instruction(row.name, (text, *targets), (), rest.at)
 
 
-def _local(row: InstructionForm, rest: OperandText) -> Statement:
+def _local(row: Form, rest: OperandText) -> Statement:
     words: tuple[str, ...] = ()
     if found := _KIND.match(rest.text):
         words = ("LOC" if found[1].upper() == "LOC" else "REAL",)
         rest.text = " " * found.end() + rest.text[found.end() :]
-    return Instruction(row.keyword, tuple(rest.by_rule(row, "names")), words, rest.at)
+    return Instruction(row.name, tuple(rest.by_rule(row, "names")), words, rest.at)
 
 
-_OWN: Final[dict[str, Callable[[InstructionForm, OperandText], Statement]]] = {
+_OWN: Final[dict[str, Callable[[Form, OperandText], Statement]]] = {
     **dict.fromkeys(("ELSE", "END", "DO", "RETURN"), _plain),
     **dict.fromkeys(("ENABLE", "DISABLE"), _switches),
     **dict.fromkeys(("REACT", "REACTI"), _react),

@@ -47,11 +47,11 @@ def test_functions_that_are_listed_are_those_that_are_made():
     assert made == forms.FUNCTIONS.keys()
 
 
-@pytest.mark.parametrize("row", forms.INSTRUCTIONS.values(), ids=lambda row: row.keyword)
+@pytest.mark.parametrize("row", forms.INSTRUCTIONS.values(), ids=lambda row: row.name)
 def test_every_instruction_is_known_to_the_parser(row):
     known = True
     try:
-        known = not isinstance(parse_line(row.keyword).statement, Ignored)
+        known = not isinstance(parse_line(row.name).statement, Ignored)
     except ValError as error:
         known = error.what != "Undefined instruction"
     assert known

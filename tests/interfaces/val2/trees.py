@@ -107,11 +107,19 @@ TIMED = (
 """What AT may stand before."""
 
 
+OTHERS = (
+    "SET", "DECOMPOSE", "SHIFT", "REACT", "REACTI", "IF", "ELSE", "END", "WHILE", "DO", "UNTIL", "FOR", "CASE",
+    "VALUE", "ANY", "EXIT", "NEXT", "GOTO", "CALL", "GOSUB", "RETURN", "TYPE", "PROMPT", "REMARK", "AUTO", "LOCAL",
+    "GLOBAL",
+)  # fmt: skip
+"""What is made by `statements` below."""
+
+
 @st.composite
 def instructions(draw):
-    """An instruction that has no node of its own."""
-    row = draw(st.sampled_from([row for row in forms.INSTRUCTIONS.values() if not row.own]))
-    match row.keyword:
+    """An instruction whose operands stand between commas, and some others."""
+    row = draw(st.sampled_from([row for row in forms.INSTRUCTIONS.values() if row.name not in OTHERS]))
+    match row.name:
         case "TIMER":
             return Instruction("TIMER", (draw(numbers | st.builds(Variable, plain)), draw(expressions)))
         case "PARAMETER":
@@ -120,7 +128,7 @@ def instructions(draw):
             )
         case "ENABLE" | "DISABLE":
             switches = st.lists(st.sampled_from(sorted(forms.SWITCHES)), min_size=1, max_size=3)
-            return Instruction(row.keyword, (), tuple(draw(switches)))
+            return Instruction(row.name, (), tuple(draw(switches)))
         case "GRASP":
             label = draw(labels.map(lambda n: (Number(float(n)),)) | st.just(()))
             return Instruction("GRASP", (draw(expressions), *label))
@@ -137,8 +145,8 @@ def instructions(draw):
         operands.pop()
     chosen = [draw(st.sampled_from(["", *group])) for group in row.words]
     times = numbers | st.builds(Variable, plain)
-    begins = draw(st.none() | times) if row.keyword in TIMED else None
-    return Instruction(row.keyword, tuple(operands), tuple(filter(None, chosen)), begins=begins)
+    begins = draw(st.none() | times) if row.name in TIMED else None
+    return Instruction(row.name, tuple(operands), tuple(filter(None, chosen)), begins=begins)
 
 
 programs_called = plain
