@@ -21,22 +21,15 @@ from interfaces.val2.source import SourceFile, read_all, words_of
 from interfaces.val2.structure import standalone_error, survey
 from interfaces.val2.syntax import (
     Apply,
-    Assign,
-    Call,
-    Case,
     Expression,
-    For,
     Format,
     Ignored,
     Instruction,
-    Local,
     Number,
     Program,
-    React,
     Statement,
     Step,
     Unary,
-    Value,
     Variable,
 )
 from robots import puma560
@@ -99,7 +92,7 @@ class _Checker:
         """Programs by which names are set; the empty name stands for all."""
         self._known: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         """Kinds of what names were set to, by their scopes; the empty name stands for all."""
-        for entry in (*source.locations, *source.reals, *source.strings):
+        for entry in source.values:
             self._set[""].add(entry.variable.name)
         for entry in source.locations:
             self._known[""][entry.variable.name].add("frame")
@@ -125,7 +118,7 @@ class _Checker:
         names = {parameter.name for parameter in program.parameters}
         for step in program.steps:
             match step.statement:
-                case Local(keyword, variables) if keyword != "GLOBAL":
+                case Instruction("AUTO" | "LOCAL", variables):
                     names |= {variable.name for variable in variables}
         return frozenset(names)
 
@@ -157,22 +150,23 @@ class _Checker:
     def _step(
         self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
-        statement = step.statement
+        statement, reads = step.statement, kinds.reads(step.statement)
         if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
-        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement)]
-        for expression, wanted in kinds.reads(statement):
+        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement, reads)]
+        for expression, wanted in reads:
             errors += kinds.mistakes(expression, wanted, known)
-        if isinstance(statement, For) and statement.variable.prefix:
-            errors.append(mismatch(statement.variable))
-        if not errors and standalone_error(step, step.at) is None:
+        match statement:
+            case Instruction("FOR", (variable, *_)) if variable.prefix:
+                errors.append(mismatch(variable))
+        if not errors and standalone_error(step) is None:
             # What is no mistake here and can't be compiled would stop the program when it comes there.
             uncompilable = refusal(step, self._context)
             errors += [] if uncompilable is None else [uncompilable]
         yield from (_error(error) for error in errors)
-        for expression, wanted in kinds.reads(statement):
+        for expression, wanted in reads:
             yield from self._unset(expression, wanted, usable, reported)
 
     def _unset(
@@ -191,12 +185,12 @@ class _Checker:
                 gives = '""' if forms.FUNCTIONS[name].gives == "string" else "0"
                 yield _warning(ValError("No meaning here", f"{name} is {gives}", place=at))
                 return
-        for child, kind in _wanted(expression):
+        for child, kind in kinds.wanted(expression):
             yield from self._unset(child, kind, usable, reported)
 
     def _calls(self, statement: Statement) -> Iterator[ValError]:
         match statement:
-            case Call(name, arguments, _, at):
+            case Instruction("CALL" | "GOSUB", arguments, at=at, program=name):
                 called = self._programs.get(name)
                 if called is None:
                     yield self._undefined(name, at)
@@ -210,7 +204,7 @@ class _Checker:
                 for argument, parameter in zip(arguments, parameters, strict=False):
                     if argument is not None:
                         yield from _passed(argument, parameter)
-            case React(program=name, at=at) if name and name not in self._programs:
+            case Instruction("REACT" | "REACTI", at=at, program=name) if name and name not in self._programs:
                 yield self._undefined(name, at)
 
     def _undefined(self, name: str, at: TextPosition) -> ValError:
@@ -220,35 +214,22 @@ class _Checker:
 
 def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
     """CASE of what is neither a number nor a string, and VALUE of what can't be the same."""
-    if not isinstance(head.statement, Case):
+    i = step.statement
+    if not isinstance(head.statement, Instruction) or head.statement.keyword != "CASE":
         return
-    given = head.statement.value
-    values = step.statement.values if isinstance(step.statement, Value) else (given,) if step is head else ()
+    (given,) = head.statement.operands
+    values = i.operands if isinstance(i, Instruction) and i.keyword in ("VALUE", "CASE") else ()
     wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
     for value in values:
         yield from kinds.mistakes(value, wanted, known)
 
 
-def _wanted(expression: Expression) -> list[tuple[Expression, Kind]]:
-    """The parts of an expression, and whether each has to be a location."""
-    if isinstance(expression, Apply):
-        slots = forms.FUNCTIONS[expression.function].slots
-        return [
-            (argument, slots[min(i, len(slots) - 1)].kind)
-            for i, argument in enumerate(expression.arguments)
-            if argument is not None and argument in kinds.children(expression)
-        ]
-    kind: Kind = "real" if isinstance(expression, Variable) else "frame"
-    located = kinds.kind_of(expression, {}) == "frame"
-    return [(child, kind if located else "real") for child in kinds.children(expression)]
-
-
 def _given(statement: Statement) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
-        case Assign(keyword="" | "DECOMPOSE") | For():
+        case Instruction("=" | "DECOMPOSE" | "FOR"):
             return "real"
-        case Assign() | Instruction("HERE"):
+        case Instruction("SET" | "HERE"):
             return "frame"
     return ""
 
@@ -301,17 +282,15 @@ def _numbers(statement: Statement) -> Iterator[ValError]:
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
-def _signals(statement: Statement) -> Iterator[ValError]:
+def _signals(statement: Statement, reads: list[tuple[Expression, Kind]]) -> Iterator[ValError]:
     """Signals that are written down and that there aren't."""
     named: list[tuple[Expression | Format | None, Callable[[float], int]]] = []
     match statement:
         case Instruction("SIGNAL", operands):
             named += [(operand, settable) for operand in operands]
-        case Instruction("IGNORE", operands):
+        case Instruction("IGNORE" | "REACT" | "REACTI", operands):
             named += [(operand, legal) for operand in operands]
-        case React(signal):
-            named.append((signal, legal))
-    for expression, _ in kinds.reads(statement):
+    for expression, _ in reads:
         for part in kinds.parts(expression):
             if isinstance(part, Apply) and part.function == "SIG":
                 named += [(argument, legal) for argument in part.arguments]

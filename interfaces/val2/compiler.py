@@ -10,38 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from interfaces.val2.arithmetic import Slots
 from interfaces.val2.context import SPECIAL, Code, Context, Invoke, Leave, StepFunction, Warned
-from interfaces.val2.dialogue import prompt_step, type_step
 from interfaces.val2.errors import ValError
-from interfaces.val2.expressions import ResultKind
+from interfaces.val2.expressions import Expressions
 from interfaces.val2.forms import UNAVAILABLE
-from interfaces.val2.functions import expressions
 from interfaces.val2.instructions import instruction
-from interfaces.val2.memory import MOST_DIMENSIONS, VariableSlot, index, mismatch, undefined, where
+from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.signals import reaction_to
-from interfaces.val2.structure import StructureBlock, structure
-from interfaces.val2.syntax import (
-    Assign,
-    Call,
-    Case,
-    Conditional,
-    Expression,
-    For,
-    Goto,
-    Ignored,
-    Instruction,
-    Local,
-    LoopJump,
-    PlainStatement,
-    Program,
-    Prompt,
-    React,
-    Step,
-    Type,
-    Value,
-    Variable,
-)  # fmt: skip
+from interfaces.val2.structure import structure
+from interfaces.val2.syntax import Expression, Ignored, Instruction, Number, Program, Step, Variable
 from interfaces.val2.values import Location, Transformation, to_oat
 
 
@@ -73,17 +50,17 @@ class _Compiler:
         self.structure = structure(program)
         scope: dict[str, int | VariableSlot] = {p.name: i for i, p in enumerate(program.parameters)}
         names = len(program.parameters)
-        for step in program.steps:
-            if not isinstance(step.statement, Local) or step.statement.keyword == "GLOBAL":
+        for i in (step.statement for step in program.steps):
+            if not isinstance(i, Instruction) or i.keyword not in ("AUTO", "LOCAL"):
                 continue
-            for name in (v.name for v in step.statement.names if v.name not in scope):
-                if step.statement.keyword == "AUTO":
+            for name in (v.name for v in i.operands if v.name not in scope):
+                if i.keyword == "AUTO":
                     scope[name] = names
                     names += 1
                 else:
                     scope[name] = context.memory.own(program.name, name)
         self.names = names
-        self.x = expressions(context, scope)
+        self.x = Expressions(context, scope)
         self.kept: dict[int, int] = {}
 
     def code(self) -> Code:
@@ -107,56 +84,54 @@ class _Compiler:
         return self.kept.setdefault(i, self.names + len(self.kept))
 
     def statement(self, i: int, step: Step) -> StepFunction:
-        context, x, following, jumps = self.context, self.x, i + 1, self.structure.jumps
+        x, following, jumps = self.x, i + 1, self.structure.jumps
         match step.statement:
-            case PlainStatement.BLANK | PlainStatement.DO | Local():
+            case Ignored(keyword, _, at) if keyword in UNAVAILABLE:
+                raise ValError("Not available", f"{keyword}: {UNAVAILABLE[keyword]}", place=at)
+            case Ignored(keyword):
+                return self._ignored(
+                    f"{keyword} has no meaning here: program {self.program.name}, step {i + 1}", following
+                )
+            case Instruction("" | "DO" | "AUTO" | "LOCAL" | "GLOBAL"):
                 return lambda _: following
-            case Value() | PlainStatement.ELSE | PlainStatement.ANY:
-                target = self._past(i)
+            case Instruction("VALUE" | "ELSE" | "ANY"):
+                target = self.structure.blocks[i].end + 1
                 return lambda _: target
-            case PlainStatement.END:
+            case Instruction("END"):
                 return self._end(i)
-            case PlainStatement.RETURN:
+            case Instruction("RETURN"):
                 return self._leave()
-            case Assign(name, value, "SET"):
-                return self._set(name, value, following)
-            case Assign(name, value, "DECOMPOSE"):
-                return self._decompose(name, value, following)
-            case Assign(name, value):
-                return self._assign(name, value, following)
-            case Conditional(_, condition):
-                test, otherwise = x.condition(condition), jumps[i]
-                return lambda s: following if test(s) else otherwise
-            case Goto(_, condition) if condition is not None:
+            case Instruction("=" | "SET" | "DECOMPOSE" as keyword, (name, value)):
+                make = {"=": self._assign, "SET": self._set, "DECOMPOSE": self._decompose}[keyword]
+                return make(name, value, following)
+            case Instruction("IF", (condition, _)):
                 test, target = x.condition(condition), jumps[i]
                 return lambda s: target if test(s) else following
-            case Goto() | LoopJump():
+            case Instruction("IF" | "WHILE" | "UNTIL", (condition,)):
+                test, otherwise = x.condition(condition), jumps[i]
+                return lambda s: following if test(s) else otherwise
+            case Instruction("GOTO" | "EXIT" | "NEXT"):
                 target = jumps[i]
                 return lambda _: target
-            case For() as loop:
-                return self._for(i, loop)
-            case Case(value):
+            case Instruction("FOR", (variable, *limits)):
+                return self._for(i, variable, limits)
+            case Instruction("CASE", (value,)):
                 return self._case(i, value)
-            case Call() as call:
+            case Instruction("CALL" | "GOSUB") as call:
                 return self._call(call, following)
-            case Type(items):
-                return type_step(x, items, following)
-            case Prompt() as prompt:
-                return prompt_step(x, prompt, following)
-            case React() as react:
+            case Instruction("REACT" | "REACTI") as react:
                 return self._react(react, following)
-            case Ignored(keyword, _, at) if keyword in UNAVAILABLE:
-                raise ValError("Not available", f"{keyword}: {UNAVAILABLE[keyword]}", place=where(at))
-            case Ignored(keyword):
-                text = f"{keyword} has no meaning here: program {self.program.name}, step {i + 1}"
+            case plain:
+                return instruction(x, plain, i, jumps.get(i))
 
-                def ignored(_: Slots) -> int:
-                    context.warn(Warned(text))
-                    return following
+    def _ignored(self, text: str, following: int) -> StepFunction:
+        context, warning = self.context, Warned(text)
 
-                return ignored
-            case Instruction() as plain_instruction:
-                return instruction(x, plain_instruction, i, jumps.get(i))
+        def ignored(_: Slots) -> int:
+            context.warn(warning)
+            return following
+
+        return ignored
 
     def _leave(self) -> StepFunction:
         context, action = self.context, Leave()
@@ -169,24 +144,13 @@ class _Compiler:
 
     # Structures.
 
-    def _block(self, i: int) -> StructureBlock:
-        """The innermost block that a step belongs to as its head, its end, or an arm."""
-        return self.structure.blocks[i]
-
-    def _past(self, i: int) -> int:
-        """Behind the END of the block whose arm is at a step."""
-        return self._block(i).end + 1
-
     def _end(self, i: int) -> StepFunction:
-        block = self._block(i)
-        head = self.program.steps[block.start].statement
-        if isinstance(head, Conditional) and head.keyword == "WHILE":
-            start = block.start
-            return lambda _: start
-        following = i + 1
-        if not isinstance(head, For):
-            return lambda _: following
-        k, body, variable = self._keep(block.start), block.start + 1, head.variable
+        block = self.structure.blocks[i]
+        head, target = self.program.steps[block.start].statement, block.start if block.kind == "WHILE" else i + 1
+        if block.kind != "FOR":
+            return lambda _: target
+        k, body, following = self._keep(block.start), block.start + 1, i + 1
+        variable: Variable = head.operands[0]  # type: ignore[union-attr]
 
         def again(s: Slots) -> int:
             kept = s[k]
@@ -201,13 +165,12 @@ class _Compiler:
 
         return again
 
-    def _for(self, i: int, loop: For) -> StepFunction:
-        if loop.variable.prefix:
-            raise mismatch(loop.variable)
-        x, memory, variable = self.x, self.context.memory, loop.variable
-        start, stop = x.real(loop.start), x.real(loop.stop)
-        step = x.real(loop.step) if loop.step is not None else (lambda _: 1.0)
-        slot, k, body, past = x.reference(variable), self._keep(i), i + 1, self._block(i).end + 1
+    def _for(self, i: int, variable: Variable, limits: list[Expression]) -> StepFunction:
+        if variable.prefix:
+            raise mismatch(variable)
+        x, memory = self.x, self.context.memory
+        start, stop, step = (x.real(e) for e in (*limits, Number(1.0))[:3])
+        slot, k, body, past = x.reference(variable), self._keep(i), i + 1, self.structure.blocks[i].end + 1
 
         def begin(s: Slots) -> int:
             value, limit, by = start(s), stop(s), step(s)
@@ -221,14 +184,14 @@ class _Compiler:
         return begin
 
     def _case(self, i: int, value: Expression) -> StepFunction:
-        x, block = self.x, self._block(i)
-        text = x.kind(value) is ResultKind.STRING
+        x, block = self.x, self.structure.blocks[i]
+        text = x.kind(value) == "string"
         read: Callable[[Expression], Callable[[Slots], Any]] = x.string if text else x.real
         given, arms, otherwise = read(value), [], block.end + 1
         for arm in block.arms:
             statement = self.program.steps[arm].statement
-            if isinstance(statement, Value):
-                arms.append(([read(v) for v in statement.values], arm + 1))
+            if statement.keyword == "VALUE":
+                arms.append(([read(v) for v in statement.operands], arm + 1))  # type: ignore[union-attr]
             else:
                 otherwise = arm + 1
 
@@ -294,7 +257,7 @@ class _Compiler:
         if target.prefix:
             raise mismatch(target)
         if len(target.indices) > MOST_DIMENSIONS:
-            raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=where(target.at))
+            raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=target.at)
         read, place = x.location(e), x.slot(target.name)
         first = [x.real(i) for i in target.indices] or [lambda _: 0.0]
 
@@ -312,17 +275,17 @@ class _Compiler:
 
     # Calls.
 
-    def _call(self, call: Call, following: int) -> StepFunction:
+    def _call(self, call: Instruction, following: int) -> StepFunction:
         context, x, at = self.context, self.x, call.at
-        parts = [self._argument(a) for a in call.arguments]
-        prefixes = [None if a is None else _PREFIX.get(x.kind(a), "") for a in call.arguments]
+        parts = [self._argument(a) for a in call.operands]
+        prefixes = [None if a is None else _PREFIX.get(x.kind(a), "") for a in call.operands]
 
         def invoke(s: Slots) -> int:
             code = context.code(call.program, at)
             parameters = code.program.parameters
             for prefix, parameter in zip(prefixes, parameters, strict=False):
                 if prefix is not None and prefix != parameter.prefix:
-                    raise ValError("Variable type mismatch", f"argument {parameter.name}", place=where(at))
+                    raise ValError("Variable type mismatch", f"argument {parameter.name}", place=at)
             context.pending = Invoke(code, code.slots([p(s) for p in parts]), following)
             return SPECIAL
 
@@ -337,18 +300,17 @@ class _Compiler:
         value = self.x.value(e)
         return lambda s: VariableSlot(value(s))
 
-    def _react(self, react: React, following: int) -> StepFunction:
-        context, signal, at = self.context, self.x.real(react.signal), react.at
+    def _react(self, react: Instruction, following: int) -> StepFunction:
+        context, signal, at = self.context, self.x.real(react.operands[0]), react.at
 
         def watch(s: Slots) -> int:
             if react.program:
                 context.code(react.program, at)
-            context.reactions.add(
-                reaction_to(signal(s), react.program, immediate=react.immediate, always=react.always)
-            )
+            immediate, always = react.keyword == "REACTI", "ALWAYS" in react.words
+            context.reactions.add(reaction_to(signal(s), react.program, immediate=immediate, always=always))
             return following
 
         return watch
 
 
-_PREFIX: Final = {ResultKind.STRING: "$", ResultKind.POINT: "#"}
+_PREFIX: Final = {"string": "$", "point": "#"}

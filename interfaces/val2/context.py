@@ -8,13 +8,12 @@ from collections.abc import Callable, Generator, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
-from interfaces.val2.arithmetic import Slots
-from interfaces.val2.errors import TextPosition, ValError
+from interfaces.val2.errors import NOWHERE, TextPosition, ValError
 from interfaces.val2.forms import PARAMETERS, SWITCHES
-from interfaces.val2.memory import Memory, VariableSlot, where
-from interfaces.val2.ports import ArmPort
+from interfaces.val2.memory import Memory, Slots, VariableSlot
+from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import Reactions, Signals
-from interfaces.val2.syntax import NOWHERE, Program
+from interfaces.val2.syntax import Program
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +165,7 @@ Action: TypeAlias = "Invoke | Leave | Finished | Suspend | Waiting | int"
 class Context:
     """What the closures of compiled programs reach out to."""
 
-    arm: ArmPort
+    arm: Arm
     compile: Callable[[Program, Context], Code]
     """Makes closures of a program; see `interfaces.val2.compiler.compiled`."""
     memory: Memory = field(default_factory=Memory)
@@ -205,7 +204,7 @@ class Context:
         """
         program = self.memory.programs.get(name)
         if program is None:
-            raise ValError("Undefined program name", name, place=where(at))
+            raise ValError("Undefined program name", name, place=at)
         code = self.compiled.get(name)
         if code is None or code.program is not program:
             code = self.compiled[name] = self.compile(program, self)

@@ -15,11 +15,11 @@ from typing import Final
 from interfaces.val2.compiler import compiled
 from interfaces.val2.context import Context, Event, ProgramFailed
 from interfaces.val2.errors import ValError
-from interfaces.val2.functions import expressions
+from interfaces.val2.expressions import Expressions
 from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
-from interfaces.val2.ports import ArmPort
-from interfaces.val2.signals import SignalRule, Signals
+from interfaces.val2.motion.arm import Arm
+from interfaces.val2.signals import SignalRule
 from interfaces.val2.structure import runs_beside_program, standalone_error
 from interfaces.val2.syntax import (
     Expression,
@@ -54,12 +54,12 @@ class ControllerStatus:
     """Why it stands: PAUSE, ABORT, XSTEP or ERROR; or how it ended."""
 
 
-class Controller:
+class Controller(Context):
     """One controller."""
 
     def __init__(
         self,
-        arm: ArmPort,
+        arm: Arm,
         *,
         memory: Memory | None = None,
         parameters: MutableMapping[str, float] | None = None,
@@ -75,45 +75,20 @@ class Controller:
             rng: Of RANDOM.
             now: Session time [s]; timers begin here.
         """
-        self.context = Context(arm, compiled, memory or Memory(), now=now)
+        super().__init__(arm, compiled, memory or Memory(), now=now)
         if rng is not None:
-            self.context.rng = rng
+            self.rng = rng
         if parameters is not None:
-            for name, value in self.context.parameters.items():
+            for name, value in self.parameters.items():
                 parameters.setdefault(name, value)
-            self.context.parameters = parameters
-        self.context.timers = [now] * len(self.context.timers)
+            self.parameters = parameters
+        self.timers = [now] * len(self.timers)
         self.cell: tuple[SignalRule, ...] = ()
         """What sets the inputs; begins anew at every EXECUTE."""
         self._program: Task | None = None
         self._do: Task | None = None
         self._busy = now
         self._due = False
-
-    @property
-    def arm(self) -> ArmPort:
-        """What moves."""
-        return self.context.arm
-
-    @property
-    def memory(self) -> Memory:
-        """Programs and variables."""
-        return self.context.memory
-
-    @property
-    def signals(self) -> Signals:
-        """Digital signals."""
-        return self.context.signals
-
-    @property
-    def switches(self) -> dict[str, bool]:
-        """Switches by name; `switch` turns them."""
-        return self.context.switches
-
-    @property
-    def parameters(self) -> MutableMapping[str, float]:
-        """Parameters by name."""
-        return self.context.parameters
 
     @property
     def running(self) -> bool:
@@ -124,11 +99,6 @@ class Controller:
     def doing(self) -> bool:
         """Whether a DO is under way."""
         return self._do is not None
-
-    @property
-    def asking(self) -> bool:
-        """Whether a PROMPT waits for a line."""
-        return self.context.asking
 
     def status(self) -> ControllerStatus:
         """What the program does."""
@@ -161,23 +131,22 @@ class Controller:
         self, name: str, arguments: Sequence[Expression], *, cycles: int, step: int, single: bool, now: float
     ) -> None:
         self._free()
-        context = self.context
-        context.now = max(now, context.now)
-        code = context.code(name)
-        x = expressions(context)
+        self.now = max(now, self.now)
+        code = self.code(name)
+        x = Expressions(self)
         slots = [x.reference(a)([]) if isinstance(a, Variable) else VariableSlot(x.value(a)([])) for a in arguments]
-        task = Task(context, code, slots, cycles=cycles, step=step, single=single)
+        task = Task(self, code, slots, cycles=cycles, step=step, single=single)
         values = [self._condition(rule) for rule in self.cell]
         self.arm.begin_program()
-        context.reactions.clear()
-        context.warned.clear()
-        context.stop_first = False
+        self.reactions.clear()
+        self.warned.clear()
+        self.stop_first = False
         self._program, self._due = task, True
-        self.signals.begin(self.cell, values, now=context.now)
+        self.signals.begin(self.cell, values, now=self.now)
 
     def _condition(self, rule: SignalRule) -> Callable[[], bool]:
         """What a rule follows; false where its expression has no value."""
-        test = expressions(self.context).condition(rule.value)
+        test = Expressions(self).condition(rule.value)
 
         def holds() -> bool:
             try:
@@ -194,33 +163,32 @@ class Controller:
         Raises:
             ValError: If it can't stand alone, or must not now; what goes wrong while it's done is an event.
         """
-        if (misplaced := standalone_error(step, step.at)) is not None:
+        if (misplaced := standalone_error(step)) is not None:
             raise misplaced
         if self._do is not None or (self.running and not runs_beside_program(step)):
             raise ValError("Program already running")
-        self.context.now = max(now, self.context.now)
-        code = compiled(Program("", (), (step,)), self.context)
+        self.now = max(now, self.now)
+        code = compiled(Program("", (), (step,)), self)
         if not self.running:
-            self.context.warned.clear()
-            self._do, self._due = Task(self.context, code, [], cycles=1), True
+            self.warned.clear()
+            self._do, self._due = Task(self, code, [], cycles=1), True
             return
         try:
             code.steps[0](code.slots([]))
         except ValError as error:
-            self.context.events.append(ProgramFailed(error))
+            self.events.append(ProgramFailed(error))
         self._due = True
 
     def release_scheduled(self, *, now: float) -> None:
         """End a DO whose motion is accepted but begins later, without waiting for it; else nothing."""
-        context = self.context
-        context.now = max(now, context.now)
-        if self._do is None or context.asking:
+        self.now = max(now, self.now)
+        if self._do is None or self.asking:
             return
         try:
-            scheduled = self.arm.answered(now=context.now) and not self.arm.ready(now=context.now)
+            scheduled = self.arm.answered(now=self.now) and not self.arm.ready(now=self.now)
             word = "DO"
         except ValError as error:
-            context.events.append(ProgramFailed(error))
+            self.events.append(ProgramFailed(error))
             scheduled, word = True, "ERROR"
         if scheduled:
             self._do.end(word)
@@ -229,30 +197,28 @@ class Controller:
 
     def abort(self, *, now: float) -> None:
         """ABORT: the arm brakes within its limits; a program stands, and can go on; a DO is over."""
-        context = self.context
-        context.now = max(now, context.now)
+        self.now = max(now, self.now)
         if self._do is not None:
             self._do.end("ABORT")
             self._do = None
         elif self._program is not None and self.running:
             self._program.pause("ABORT")
         self._due = True
-        self.arm.brake(now=context.now)
+        self.arm.brake(now=self.now)
 
     def interrupt(self, error: ValError, *, now: float) -> None:
         """Give up what runs, for a reason that isn't its own: a program stands, and RETRY may go on; a DO is over.
 
         The arm isn't told to stop: somebody else does that, or has other plans.
         """
-        context = self.context
-        context.now = max(now, context.now)
+        self.now = max(now, self.now)
         task = self._active()
         if task is None:
             return
         task.fail(error)
         self._do = None
         self._due = True
-        self.arm.give_up(now=context.now)
+        self.arm.give_up(now=self.now)
 
     def proceed(self, *, now: float) -> None:
         """PROCEED: go on, with the next step where one was given up.
@@ -270,7 +236,7 @@ class Controller:
             ValError: If there's nothing to go on with.
         """
         task = self._paused(now)
-        self.arm.retry(now=self.context.now)
+        self.arm.retry(now=self.now)
         task.go_on(again=True)
 
     def xstep(self, name: str | None = None, *, cycles: int = 1, step: int = 1, now: float) -> None:
@@ -292,17 +258,9 @@ class Controller:
         """
         if not self.asking:
             raise ValError("No program asks")
-        self.context.now = max(now, self.context.now)
-        self.context.answers.append(text[:LONGEST_STRING])
+        self.now = max(now, self.now)
+        self.answers.append(text[:LONGEST_STRING])
         self._due = True
-
-    def switch(self, name: str, on: bool) -> None:
-        """ENABLE or DISABLE.
-
-        Raises:
-            ValError: If there's no such switch.
-        """
-        self.context.switch(name, on)
 
     def evaluate(self, expression: Expression, *, now: float) -> Value:
         """The value of an expression.
@@ -310,8 +268,9 @@ class Controller:
         Raises:
             ValError: If it has none.
         """
-        self.context.now = max(now, self.context.now)
-        return expressions(self.context).value(expression)([])
+        self.now = max(now, self.now)
+        value: Value = Expressions(self).value(expression)([])
+        return value
 
     def forget(self) -> None:
         """ZERO: no program, no variables; outputs off.
@@ -322,7 +281,7 @@ class Controller:
         self._free()
         self._program = None
         self.memory.clear()
-        self.context.compiled.clear()
+        self.compiled.clear()
         self.signals.reset()
         self._due = True
 
@@ -334,7 +293,7 @@ class Controller:
         self._free()
         if self._program is None or self._program.state is not ProgramState.PAUSED:
             raise ValError("No program to proceed")
-        self.context.now = max(now, self.context.now)
+        self.now = max(now, self.now)
         self._due = True
         return self._program
 
@@ -352,10 +311,9 @@ class Controller:
         Returns:
             What has happened, oldest first.
         """
-        context = self.context
-        context.now = now = max(now, context.now)
-        context.signals.advance(now=now)
-        self._due |= context.notice()
+        self.now = now = max(now, self.now)
+        self.signals.advance(now=now)
+        self._due |= self.notice()
         task = self._active()
         if task is None:
             self._due = False
@@ -364,21 +322,21 @@ class Controller:
             start = now if task.waiting else max(self._busy, now - (MOST_AT_ONCE - TURN) * STATEMENT)
             done = task.run(TURN + round((now - start) / STATEMENT))
             self._busy = start + done * STATEMENT
-            context.signals.advance(now=now)
-            self._due |= context.notice()
+            self.signals.advance(now=now)
+            self._due |= self.notice()
             if task is self._do and task.state is not ProgramState.RUNNING:
                 self._do = None
-        events = tuple(context.events)
-        context.events.clear()
+        events = tuple(self.events)
+        self.events.clear()
         return events
 
     def next_deadline(self) -> float:
         """When `advance` has something to do [s]: a time that is over for at once, infinity for never."""
-        if self.context.events or self.signals.changed:
-            return self.context.now
+        if self.events or self.signals.changed:
+            return self.now
         task = self._active()
         if task is None:
-            wanted = self.context.now if self._due else math.inf
+            wanted = self.now if self._due else math.inf
         else:
             wanted = max(self._busy, task.next_deadline() if task.waiting and not self._due else self._busy)
         return min(wanted, self.signals.next_deadline())

@@ -21,6 +21,10 @@ class TextPosition:
     """Column, from 1."""
 
 
+NOWHERE: Final = TextPosition(0, 0)
+"""Of what was made, not read."""
+
+
 class ValError(VrsError):
     """An error in VAL's dress: `*Undefined location* P3, step 12`."""
 
@@ -40,10 +44,12 @@ class ValError(VrsError):
             detail: Which one, or what is allowed.
             program: Name of the program.
             step: Step of the program, from 1.
-            place: Where it stands: within the line of the step for a program, in the file for a file.
+            place: Where it stands: within the line of the step for a program, in the file for a file; `NOWHERE`
+                is none.
         """
         self.what, self.detail = what, detail
-        self.program, self.step, self.place = program, step, place
+        self.program, self.step = program, step
+        self.place = place if place is not None and place.line else None
         super().__init__(self._spelled())
 
     def _spelled(self) -> str:

@@ -31,50 +31,70 @@ class OperandSlot:
     name: str
     kind: Kind
     required: bool = True
+    default: float | None = None
+    """What stands for one that was left out; None where that's for the instruction or function to say."""
+
+    @classmethod
+    def read(cls, spelled: str) -> OperandSlot:
+        """A slot as `Form` has it."""
+        named, _, default = spelled.partition("=")
+        name, _, kind = named.rstrip("?*").partition(":")
+        return cls(name, kind or "real", "?" not in spelled, float(default) if default else None)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, slots=True)
-class InstructionForm:
-    """How an instruction is written."""
+class Form:
+    """A row of the table: how an instruction or a function is written, and what it does."""
 
-    keyword: str
-    slots: tuple[OperandSlot, ...]
-    words: tuple[tuple[str, ...], ...]
-    """Words behind the operands, in their order, one of each group at most."""
-    help: str
-    origin: Origin
-    group: str
-    repeats: bool = False
-    """Whether the last operand may come many times."""
-    usage: str = ""
-    """How it's written."""
-    own: bool = False
-    """Whether it has a node of its own in the tree, and isn't an `Instruction`."""
+    def __init__(
+        self,
+        name: str,
+        spelled: str,
+        explanation: str,
+        origin: Origin,
+        *,
+        words: str = "",
+        usage: str = "",
+        constant: bool = False,
+        idle: bool = False,
+    ) -> None:
+        """Read a row.
 
-    @property
-    def allowed_words(self) -> tuple[str, ...]:
-        """All the words that may stand behind the operands."""
-        return tuple(word for group in self.words for word in group)
+        Args:
+            name: Upper case; of a function with its prefix.
+            spelled: Slots such as `target:location, hand:real?=0`, and what a function gives: `angle -> real`. Of
+                a slot that ends in `?` the operand may be left out; the number behind `=` stands for it then. One
+                that ends in `*` may come many times.
+            explanation: What it does, a line.
+            origin: Where it's known from.
+            words: What may stand behind the operands, in their order, one of each group at most: `MMPS|IPS ALWAYS`.
+            usage: How it's written, where that isn't told by the slots.
+            constant: A function that may be written without parentheses; its name can't be a variable's.
+            idle: A function that is recognised, but has no meaning here: 0, or an empty string.
+        """
+        operands, _, gives = spelled.partition("-> ")
+        self.name, self.help, self.origin = name, explanation, origin
+        self.constant, self.idle = constant, idle
+        self.gives: Kind | str = gives
+        """Of a function."""
+        self.repeats = "*" in operands
+        """Whether the last operand may come many times."""
+        self.slots = tuple(OperandSlot.read(part) for part in operands.strip().split(", ") if part)
+        self.words = tuple(tuple(group.split("|")) for group in words.split())
+        self.allowed_words = tuple(word for group in self.words for word in group)
+        self.usage = usage or self._usage()
 
-
-@dataclass(frozen=True, slots=True)
-class Function:
-    """How a function is written."""
-
-    name: str
-    slots: tuple[OperandSlot, ...]
-    gives: Kind
-    help: str
-    origin: Origin
-    repeats: bool = False
-    constant: bool = False
-    """It may be written without parentheses, and its name can't be a variable's."""
-    usage: str = ""
-    idle: bool = False
-    """It's recognised, but has no meaning here: 0, or an empty string."""
+    def _usage(self) -> str:
+        shown = ""
+        for i, slot in enumerate(self.slots):
+            piece = f"{', ' if i else ''}{slot.name}"
+            shown += piece if slot.required else f"[{piece}]"
+        shown += ", .." if self.repeats else ""
+        if self.gives:
+            return self.name if self.constant else f"{self.name}({shown})"
+        return f"{self.name} {shown}".rstrip() + "".join(f" [{'|'.join(group)}]" for group in self.words)
 
     def expect(self, arguments: Sequence[object | None], at: TextPosition) -> None:
-        """Count the arguments.
+        """Count a function's arguments.
 
         Raises:
             ValError: If there are too few or too many of them.
@@ -109,72 +129,6 @@ class Parameter:
     origin: Origin
 
 
-def slots_of(spelled: str) -> tuple[tuple[OperandSlot, ...], bool]:
-    """Slots such as `target:location, hand:real?`, and whether the last (`*`) repeats."""
-    slots = []
-    for part in filter(None, (p.strip() for p in spelled.split(","))):
-        name, _, kind = part.rstrip("?*").partition(":")
-        slots.append(OperandSlot(name, kind or "real", required="?" not in part))  # type: ignore[arg-type]
-    return tuple(slots), "*" in spelled
-
-
-def form(
-    keyword: str,
-    spelled: str,
-    explanation: str,
-    origin: Origin,
-    group: str,
-    *,
-    words: str = "",
-    usage: str = "",
-    own: bool = False,
-) -> InstructionForm:
-    """A row of the table: slots as `slots_of` reads them, words as `MMPS|IPS ALWAYS`."""
-    slots, repeats = slots_of(spelled)
-    groups = tuple(tuple(group.split("|")) for group in words.split())
-    return InstructionForm(
-        keyword,
-        slots,
-        groups,
-        explanation,
-        origin,
-        group,
-        repeats,
-        usage or _usage(keyword, slots, groups, repeats),
-        own,
-    )
-
-
-def function(
-    name: str,
-    spelled: str,
-    gives: Kind,
-    explanation: str,
-    origin: Origin,
-    *,
-    constant: bool = False,
-    usage: str = "",
-    idle: bool = False,
-) -> Function:
-    """A row of the table of functions."""
-    slots, repeats = slots_of(spelled)
-    shown = usage or (name if constant and not slots else f"{name}({_listed(slots, repeats)})")
-    return Function(name, slots, gives, explanation, origin, repeats, constant, shown, idle)
-
-
-def _usage(keyword: str, slots: tuple[OperandSlot, ...], groups: tuple[tuple[str, ...], ...], repeats: bool) -> str:
-    words = "".join(f" [{'|'.join(group)}]" for group in groups)
-    return f"{keyword} {_listed(slots, repeats)}".rstrip() + words
-
-
-def _listed(slots: tuple[OperandSlot, ...], repeats: bool) -> str:
-    shown = ""
-    for i, slot in enumerate(slots):
-        piece = f"{', ' if i else ''}{slot.name}"
-        shown += piece if slot.required else f"[{piece}]"
-    return shown + (", .." if repeats else "")
-
-
 def nearest(word: str, words: Iterable[str]) -> str:
     """`; did you mean MOVES?`, or nothing."""
     close = nearest_word(word, words)
@@ -187,140 +141,130 @@ def nearest_word(word: str, words: Iterable[str]) -> str:
 
 
 _MOTION: Final = (
-    form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", "motion"),
-    form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", "motion"),
-    form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL", "motion"),
-    form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL", "motion"),
-    form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
-         "VAL", "motion"),
-    form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL", "motion"),
-    form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.",
-         "VAL", "motion"),
-    form("DEPARTS", "distance", "DEPART on a straight line.", "VAL", "motion"),
-    form("DRIVE", "joint, change, speed", "Turn one joint by a change [deg] at a speed [%].", "VAL", "motion"),
-    form("DRAW", "dx?, dy?, dz?", "Move straight by a way in world axes [mm].", "VAL", "motion"),
-    form("READY", "", "Move to the ready position: the arm straight up.", "VAL", "motion"),
-    form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II", "motion"),
-    form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL", "motion"),
-    form("DELAY", "seconds", "Stand still for a time, as a motion.", "VAL", "motion"),
-    form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", "motion"),
-    form("BRAKE", "", "Stop the present motion at once.", "V+", "motion"),
-    form("AT", "time", "The next motion begins at a time of the session [s].", "ours", "motion",
-         usage="AT time [motion]"),
+    Form("MOVE", "location:location", "Move to a location, the joints together.", "VAL"),
+    Form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL"),
+    Form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL"),
+    Form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL"),
+    Form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
+         "VAL"),
+    Form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL"),
+    Form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.", "VAL"),
+    Form("DEPARTS", "distance", "DEPART on a straight line.", "VAL"),
+    Form("DRIVE", "joint, change, speed", "Turn one joint by a change [deg] at a speed [%].", "VAL"),
+    Form("DRAW", "dx?=0, dy?=0, dz?=0", "Move straight by a way in world axes [mm].", "VAL"),
+    Form("READY", "", "Move to the ready position: the arm straight up.", "VAL"),
+    Form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II"),
+    Form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL"),
+    Form("DELAY", "seconds", "Stand still for a time, as a motion.", "VAL"),
+    Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II"),
+    Form("BRAKE", "", "Stop the present motion at once.", "V+"),
+    Form("AT", "time", "The next motion begins at a time of the session [s].", "ours", usage="AT time [motion]"),
 )  # fmt: skip
 
 _SETTINGS: Final = (
-    form("SPEED", "speed, turning?", "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.",
-         "VAL", "setting", words="MMPS|IPS|MONITOR ALWAYS"),
-    form("ACCEL", "up, down?", "Accelerations: [%] of the nominal.", "V+", "setting"),
-    form("DURATION", "seconds", "Shortest time of the next motion; ALWAYS: each.", "V+", "setting", words="ALWAYS"),
-    form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", "setting", words="ALWAYS"),
-    form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", "setting", words="ALWAYS"),
-    form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL", "setting",
+    Form("SPEED", "speed, turning?", "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.",
+         "VAL", words="MMPS|IPS|MONITOR ALWAYS"),
+    Form("ACCEL", "up, down?", "Accelerations: [%] of the nominal.", "V+"),
+    Form("DURATION", "seconds", "Shortest time of the next motion; ALWAYS: each.", "V+", words="ALWAYS"),
+    Form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", words="ALWAYS"),
+    Form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", words="ALWAYS"),
+    Form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL", words="ALWAYS"),
+    Form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL",
          words="ALWAYS"),
-    form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL", "setting",
-         words="ALWAYS"),
-    form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", "setting"),
-    form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", "setting"),
-    form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", "setting"),
-    form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", "setting"),
-    form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", "setting"),
-    form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", "setting"),
-    form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
-         "setting"),
-    form("BASE", "dx?, dy?, dz?, turn?", "Where the robot stands in the world: shifted [mm], turned about z [deg].",
-         "VAL", "setting"),
-    form("ENABLE", "", "Turn switches on.", "VAL", "setting", usage="ENABLE switch, .."),
-    form("DISABLE", "", "Turn switches off.", "VAL", "setting", usage="DISABLE switch, .."),
-    form("PARAMETER", "value", "Set a parameter.", "VAL-II", "setting", usage="PARAMETER name = value"),
-    form("ALTER", "channel?, mode?, dx?, dy?, dz?, rx?, ry?, rz?",
-         "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", "setting",
-         usage="ALTER (channel) mode"),
-    form("ALTOUT", "dx?, dy?, dz?, rx?, ry?, rz?",
-         "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II", "setting"),
-    form("NOALTER", "", "Corrections of the path end.", "VAL-II", "setting"),
-    form("ALTON", "channel?, mode?", "As ALTER.", "V+", "setting", usage="ALTON (channel) mode"),
-    form("ALTOFF", "", "As NOALTER.", "V+", "setting"),
+    Form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL"),
+    Form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL"),
+    Form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL"),
+    Form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL"),
+    Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL"),
+    Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL"),
+    Form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL"),
+    Form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
+         "Where the robot stands in the world: shifted [mm], turned about z [deg].", "VAL"),
+    Form("ENABLE", "", "Turn switches on.", "VAL", usage="ENABLE switch, .."),
+    Form("DISABLE", "", "Turn switches off.", "VAL", usage="DISABLE switch, .."),
+    Form("PARAMETER", "value", "Set a parameter.", "VAL-II", usage="PARAMETER name = value"),
+    Form("ALTER", "channel?=0, mode?=0, dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
+         "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", usage="ALTER (channel) mode"),
+    Form("ALTOUT", "dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
+         "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II"),
+    Form("NOALTER", "", "Corrections of the path end.", "VAL-II"),
+    Form("ALTON", "channel?=0, mode?=0", "As ALTER.", "V+", usage="ALTON (channel) mode"),
+    Form("ALTOFF", "", "As NOALTER.", "V+"),
 )  # fmt: skip
 
 _HAND: Final = (
-    form("OPEN", "", "Open the hand with the next motion.", "VAL", "hand"),
-    form("CLOSE", "", "Close the hand with the next motion.", "VAL", "hand"),
-    form("RELAX", "", "Let the hand go slack with the next motion.", "VAL", "hand"),
-    form("OPENI", "", "Open the hand now, where the arm stands.", "VAL", "hand"),
-    form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL", "hand"),
-    form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL", "hand"),
-    form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
-         "hand"),
+    Form("OPEN", "", "Open the hand with the next motion.", "VAL"),
+    Form("CLOSE", "", "Close the hand with the next motion.", "VAL"),
+    Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL"),
+    Form("OPENI", "", "Open the hand now, where the arm stands.", "VAL"),
+    Form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL"),
+    Form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL"),
+    Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].",
+         "VAL"),
 )  # fmt: skip
 
 _LOCATIONS: Final = (
-    form("SET", "variable:variable, location:location", "Assign a location.", "VAL", "location",
-         usage="SET variable = location", own=True),
-    form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", "location"),
-    form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
-         "V+", "location", usage="DECOMPOSE array[first] = location", own=True),
-    form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", "location",
-         usage="SHIFT variable BY dx, dy, dz", own=True),
+    Form("SET", "variable:variable, location:location", "Assign a location.", "VAL",
+         usage="SET variable = location"),
+    Form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL"),
+    Form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
+         "V+", usage="DECOMPOSE array[first] = location"),
+    Form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL",
+         usage="SHIFT variable BY dx, dy, dz"),
 )  # fmt: skip
 
 _SIGNALS: Final = (
-    form("SIGNAL", "number*", "Turn outputs on, or off where negative.", "VAL", "signal"),
-    form("RESET", "", "Turn all outputs off.", "V+", "signal"),
-    form("WAIT", "condition?", "Wait until a condition holds.", "VAL", "signal"),
-    form("WAIT.EVENT", "mask?, seconds?", "Wait for a time.", "V+", "signal"),
-    form("TIMER", "number, seconds", "Set a timer.", "VAL-II", "signal", usage="TIMER number = seconds"),
-    form("REACT", "signal, program:program?", "Call a program after the present step when a signal turns on.",
-         "VAL", "signal", words="ALWAYS", own=True),
-    form("REACTI", "signal, program:program?", "REACT, stopping the present motion at once.", "VAL", "signal",
-         words="ALWAYS", own=True),
-    form("IGNORE", "signal", "Don't react to a signal any more.", "VAL", "signal"),
+    Form("SIGNAL", "number*", "Turn outputs on, or off where negative.", "VAL"),
+    Form("RESET", "", "Turn all outputs off.", "V+"),
+    Form("WAIT", "condition?", "Wait until a condition holds.", "VAL"),
+    Form("WAIT.EVENT", "mask?, seconds?", "Wait for a time.", "V+"),
+    Form("TIMER", "number, seconds", "Set a timer.", "VAL-II", usage="TIMER number = seconds"),
+    Form("REACT", "signal, program:program?", "Call a program after the present step when a signal turns on.",
+         "VAL", words="ALWAYS"),
+    Form("REACTI", "signal, program:program?", "REACT, stopping the present motion at once.", "VAL",
+         words="ALWAYS"),
+    Form("IGNORE", "signal", "Don't react to a signal any more.", "VAL"),
 )  # fmt: skip
 
 _CONTROL: Final = (
-    form("IF", "condition", "Do steps if a condition holds.", "VAL", "control", own=True,
+    Form("IF", "condition, label:label?", "Do steps if a condition holds.", "VAL",
          usage="IF condition THEN .. ELSE .. END, IF condition GOTO label"),
-    form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", "control", own=True),
-    form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", "control", own=True),
-    form("WHILE", "condition", "Repeat steps as long as a condition holds.", "VAL-II", "control", own=True,
+    Form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II"),
+    Form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II"),
+    Form("WHILE", "condition", "Repeat steps as long as a condition holds.", "VAL-II",
          usage="WHILE condition DO .. END"),
-    form("DO", "", "Repeat steps until a condition holds.", "VAL-II", "control", own=True,
-         usage="DO .. UNTIL condition"),
-    form("UNTIL", "condition", "The end of DO.", "VAL-II", "control", own=True),
-    form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", "control", own=True,
+    Form("DO", "", "Repeat steps until a condition holds.", "VAL-II", usage="DO .. UNTIL condition"),
+    Form("UNTIL", "condition", "The end of DO.", "VAL-II"),
+    Form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II",
          usage="FOR variable = start TO stop [STEP step] .. END"),
-    form("CASE", "value", "Do the steps of one of several values.", "VAL-II", "control", own=True,
-         usage="CASE value OF .. END"),
-    form("VALUE", "value*", "What of a CASE is done for these values.", "VAL-II", "control", own=True,
-         usage="VALUE value, ..:"),
-    form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", "control", own=True),
-    form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", "control", own=True),
-    form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", "control", own=True),
-    form("GOTO", "label:label", "Go on at a label.", "VAL", "control", own=True),
-    form("CALL", "program:program, argument:any?*", "Call a program; arguments by reference.", "VAL-II", "control",
-         own=True, usage="CALL program(argument, ..)"),
-    form("GOSUB", "program:program", "Call a program.", "VAL", "control", own=True),
-    form("RETURN", "", "Go back to the program that called.", "VAL", "control", own=True),
-    form("PAUSE", "", "Pause until PROCEED.", "VAL", "control"),
-    form("STOP", "", "End this cycle of the program.", "VAL", "control"),
-    form("HALT", "", "End the program, whatever cycles are left.", "VAL", "control"),
+    Form("CASE", "value:any", "Do the steps of one of several values.", "VAL-II", usage="CASE value OF .. END"),
+    Form("VALUE", "value:any*", "What of a CASE is done for these values.", "VAL-II", usage="VALUE value, ..:"),
+    Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II"),
+    Form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II"),
+    Form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II"),
+    Form("GOTO", "label:label", "Go on at a label.", "VAL"),
+    Form("CALL", "argument:any?*", "Call a program; arguments by reference.", "VAL-II",
+         usage="CALL program(argument, ..)"),
+    Form("GOSUB", "argument:any?*", "Call a program.", "VAL", usage="GOSUB program"),
+    Form("RETURN", "", "Go back to the program that called.", "VAL"),
+    Form("PAUSE", "", "Pause until PROCEED.", "VAL"),
+    Form("STOP", "", "End this cycle of the program.", "VAL"),
+    Form("HALT", "", "End the program, whatever cycles are left.", "VAL"),
 )  # fmt: skip
 
 _DIALOGUE: Final = (
-    form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", "dialogue", own=True),
-    form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", "dialogue",
-         own=True),
-    form("REMARK", "text:text?", "A comment.", "VAL", "dialogue", own=True, usage="REMARK text"),
-    form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", "names", own=True,
+    Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL"),
+    Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II"),
+    Form("REMARK", "text:text?", "A comment.", "VAL", usage="REMARK text"),
+    Form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+",
          usage="AUTO [REAL|LOC] name, .."),
-    form("LOCAL", "name:variable*", "Names of this program alone.", "V+", "names", own=True,
-         usage="LOCAL [REAL|LOC] name, .."),
-    form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+", "names", own=True,
+    Form("LOCAL", "name:variable*", "Names of this program alone.", "V+", usage="LOCAL [REAL|LOC] name, .."),
+    Form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+",
          usage="GLOBAL [REAL|LOC] name, .."),
 )  # fmt: skip
 
-INSTRUCTIONS: Final[dict[str, InstructionForm]] = {
-    row.keyword: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
+INSTRUCTIONS: Final[dict[str, Form]] = {
+    row.name: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
 }
 """Keywords of a program's lines."""
 
@@ -348,85 +292,85 @@ UNAVAILABLE: Final = {
 """Those of them without whose work a program would do something else: an error where it comes there, and why."""
 
 _REAL_FUNCTIONS: Final = (
-    function("ABS", "x", "real", "Absolute value.", "VAL-II"),
-    function("ASC", "text:string, index?", "real", "Code of a character.", "VAL-II"),
-    function("ATAN2", "y, x", "real", "Angle of a direction [deg].", "VAL-II"),
-    function("BMASK", "bit*", "real", "A number with these bits set, from 1.", "V+"),
-    function("BITS", "first, count?", "real", "Signals from a first one on, as a number.", "V+"),
-    function("COS", "angle", "real", "Cosine of an angle [deg].", "VAL-II"),
-    function("DEFINED", "variable:any", "real", "Whether a variable has a value.", "V+"),
-    function("DISTANCE", "a:frame, b:frame", "real", "Distance of two locations [mm].", "VAL-II"),
-    function("DX", "a:frame", "real", "X of a location [mm].", "VAL-II"),
-    function("DY", "a:frame", "real", "Y of a location [mm].", "VAL-II"),
-    function("DZ", "a:frame", "real", "Z of a location [mm].", "VAL-II"),
-    function("FRACT", "x", "real", "Fractional part.", "VAL-II"),
-    function("INRANGE", "a:location", "real", "0 if a location can be reached.", "V+"),
-    function("INT", "x", "real", "Integer part.", "VAL-II"),
-    function("LAST", "array:array", "real", "Largest index of an array.", "V+"),
-    function("LEN", "text:string", "real", "Length of a string.", "VAL-II"),
-    function("MAX", "x*", "real", "Largest of values.", "V+"),
-    function("MIN", "x*", "real", "Smallest of values.", "V+"),
-    function("OUTSIDE", "low, x, high", "real", "Whether a value is outside a range.", "V+"),
-    function("PARAMETER", "name:any", "real", "Value of a parameter.", "V+"),
-    function("PI", "", "real", "3.14159..", "VAL-II", constant=True),
-    function("POS", "text:string, part:string, from?", "real", "Where a string has another; 0 for nowhere.", "V+"),
-    function("RANDOM", "", "real", "A random number from 0 to 1.", "V+", constant=True),
-    function("SIG", "number*", "real", "Whether all these signals are on, or off where negative.", "VAL-II"),
-    function("SIGN", "x", "real", "-1 or 1.", "VAL-II"),
-    function("SIN", "angle", "real", "Sine of an angle [deg].", "VAL-II"),
-    function("SPEED", "which", "real", "1: the monitor speed [%].", "V+"),
-    function("SQR", "x", "real", "Square.", "V+"),
-    function("SQRT", "x", "real", "Square root.", "VAL-II"),
-    function("SWITCH", "name:any", "real", "Whether a switch is on.", "V+"),
-    function("TAN", "angle", "real", "Tangent of an angle [deg].", "V+"),
-    function("TIMER", "number", "real", "Seconds since a timer was set to 0.", "VAL-II"),
-    function("VAL", "text:string", "real", "The number that a string begins with.", "VAL-II"),
-    function("TRUE", "", "real", "-1.", "VAL-II", constant=True),
-    function("FALSE", "", "real", "0.", "VAL-II", constant=True),
-    function("ON", "", "real", "-1.", "VAL-II", constant=True),
-    function("OFF", "", "real", "0.", "VAL-II", constant=True),
+    Form("ABS", "x -> real", "Absolute value.", "VAL-II"),
+    Form("ASC", "text:string, index?=1 -> real", "Code of a character.", "VAL-II"),
+    Form("ATAN2", "y, x -> real", "Angle of a direction [deg].", "VAL-II"),
+    Form("BMASK", "bit*=0 -> real", "A number with these bits set, from 1.", "V+"),
+    Form("BITS", "first, count?=1 -> real", "Signals from a first one on, as a number.", "V+"),
+    Form("COS", "angle -> real", "Cosine of an angle [deg].", "VAL-II"),
+    Form("DEFINED", "variable:any -> real", "Whether a variable has a value.", "V+"),
+    Form("DISTANCE", "a:frame, b:frame -> real", "Distance of two locations [mm].", "VAL-II"),
+    Form("DX", "a:frame -> real", "X of a location [mm].", "VAL-II"),
+    Form("DY", "a:frame -> real", "Y of a location [mm].", "VAL-II"),
+    Form("DZ", "a:frame -> real", "Z of a location [mm].", "VAL-II"),
+    Form("FRACT", "x -> real", "Fractional part.", "VAL-II"),
+    Form("INRANGE", "a:location -> real", "0 if a location can be reached.", "V+"),
+    Form("INT", "x -> real", "Integer part.", "VAL-II"),
+    Form("LAST", "array:array -> real", "Largest index of an array.", "V+"),
+    Form("LEN", "text:string -> real", "Length of a string.", "VAL-II"),
+    Form("MAX", "x* -> real", "Largest of values.", "V+"),
+    Form("MIN", "x* -> real", "Smallest of values.", "V+"),
+    Form("OUTSIDE", "low, x, high -> real", "Whether a value is outside a range.", "V+"),
+    Form("PARAMETER", "name:any -> real", "Value of a parameter.", "V+"),
+    Form("PI", "-> real", "3.14159..", "VAL-II", constant=True),
+    Form("POS", "text:string, part:string, from?=1 -> real", "Where a string has another; 0 for nowhere.", "V+"),
+    Form("RANDOM", "-> real", "A random number from 0 to 1.", "V+", constant=True),
+    Form("SIG", "number* -> real", "Whether all these signals are on, or off where negative.", "VAL-II"),
+    Form("SIGN", "x -> real", "-1 or 1.", "VAL-II"),
+    Form("SIN", "angle -> real", "Sine of an angle [deg].", "VAL-II"),
+    Form("SPEED", "which -> real", "1: the monitor speed [%].", "V+"),
+    Form("SQR", "x -> real", "Square.", "V+"),
+    Form("SQRT", "x -> real", "Square root.", "VAL-II"),
+    Form("SWITCH", "name:any -> real", "Whether a switch is on.", "V+"),
+    Form("TAN", "angle -> real", "Tangent of an angle [deg].", "V+"),
+    Form("TIMER", "number -> real", "Seconds since a timer was set to 0.", "VAL-II"),
+    Form("VAL", "text:string -> real", "The number that a string begins with.", "VAL-II"),
+    Form("TRUE", "-> real", "-1.", "VAL-II", constant=True),
+    Form("FALSE", "-> real", "0.", "VAL-II", constant=True),
+    Form("ON", "-> real", "-1.", "VAL-II", constant=True),
+    Form("OFF", "-> real", "0.", "VAL-II", constant=True),
 )  # fmt: skip
 
 _STRING_FUNCTIONS: Final = (
-    function("$CHR", "code", "string", "The character of a code.", "VAL-II"),
-    function("$DECODE", "$variable:variable, separators:string, mode?", "string",
-             "What stands before, or with mode 1 the run of, separators; it's taken out of the variable.", "V+"),
-    function("$ENCODE", "item:any?*", "string", "What TYPE would print.", "VAL-II"),
-    function("$MID", "text:string, from, length", "string", "Part of a string.", "VAL-II"),
-    function("$TRUNCATE", "text:string", "string", "A string up to its first character of code 0.", "V+"),
+    Form("$CHR", "code -> string", "The character of a code.", "VAL-II"),
+    Form("$DECODE", "$variable:variable, separators:string, mode?=0 -> string",
+         "What stands before, or with mode 1 the run of, separators; it's taken out of the variable.", "V+"),
+    Form("$ENCODE", "item:any?* -> string", "What TYPE would print.", "VAL-II"),
+    Form("$MID", "text:string, from, length -> string", "Part of a string.", "VAL-II"),
+    Form("$TRUNCATE", "text:string -> string", "A string up to its first character of code 0.", "V+"),
 )  # fmt: skip
 
 _LOCATION_FUNCTIONS: Final = (
-    function("TRANS", "x?, y?, z?, o?, a?, t?", "frame", "A transformation [mm, deg]; without angles, no turn.",
-             "VAL-II"),
-    function("SHIFT", "a:frame, dx?, dy?, dz?", "frame", "A location shifted in world axes [mm].", "VAL-II",
-             usage="SHIFT(a BY dx, dy, dz)"),
-    function("INVERSE", "a:frame", "frame", "The transformation back.", "VAL"),
-    function("FRAME", "a:frame, b:frame, c:frame, d:frame", "frame",
-             "A frame at d: x from a to b, c on the side of y.", "VAL"),
-    function("RX", "angle", "frame", "A turn about x [deg].", "V+"),
-    function("RY", "angle", "frame", "A turn about y [deg].", "V+"),
-    function("RZ", "angle", "frame", "A turn about z [deg].", "V+"),
-    function("NULL", "", "frame", "No way and no turn.", "VAL", constant=True),
-    function("HERE", "", "frame", "Where the tool is.", "VAL", constant=True),
-    function("DEST", "", "frame", "Where the tool goes.", "VAL-II", constant=True),
-    function("#PPOINT", "j1?, j2?, j3?, j4?, j5?, j6?", "location", "A precision point [deg].", "VAL-II"),
-    function("#HERE", "", "location", "Where the arm is, as a precision point.", "ours", constant=True),
-    function("#DEST", "", "location", "Where the arm goes, as a precision point.", "V+", constant=True),
+    Form("TRANS", "x?=0, y?=0, z?=0, o?=90, a?=-90, t?=0 -> frame",
+         "A transformation [mm, deg]; without angles, no turn.", "VAL-II"),
+    Form("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0 -> frame", "A location shifted in world axes [mm].", "VAL-II",
+         usage="SHIFT(a BY dx, dy, dz)"),
+    Form("INVERSE", "a:frame -> frame", "The transformation back.", "VAL"),
+    Form("FRAME", "a:frame, b:frame, c:frame, d:frame -> frame", "A frame at d: x from a to b, c on the side of y.",
+         "VAL"),
+    Form("RX", "angle -> frame", "A turn about x [deg].", "V+"),
+    Form("RY", "angle -> frame", "A turn about y [deg].", "V+"),
+    Form("RZ", "angle -> frame", "A turn about z [deg].", "V+"),
+    Form("NULL", "-> frame", "No way and no turn.", "VAL", constant=True),
+    Form("HERE", "-> frame", "Where the tool is.", "VAL", constant=True),
+    Form("DEST", "-> frame", "Where the tool goes.", "VAL-II", constant=True),
+    Form("#PPOINT", "j1?=0, j2?=0, j3?=0, j4?=0, j5?=0, j6?=0 -> location", "A precision point [deg].", "VAL-II"),
+    Form("#HERE", "-> location", "Where the arm is, as a precision point.", "ours", constant=True),
+    Form("#DEST", "-> location", "Where the arm goes, as a precision point.", "V+", constant=True),
 )  # fmt: skip
 
 _IDLE_FUNCTIONS: Final = (
-    function("IOSTAT", "lun:any, mode:any?", "real", "State of a file.", "V+", idle=True),
-    function("GETC", "lun:any, mode:any?", "real", "A character of a file.", "V+", idle=True),
-    function("LNGB", "text:string, from:any?", "real", "An integer of bytes.", "V+", idle=True),
-    function("FLTB", "text:string, from:any?", "real", "A number of bytes.", "V+", idle=True),
-    function("TASK", "mode:any?, number:any?", "real", "State of a task.", "V+", idle=True),
-    function("$ERROR", "code:any", "string", "Text of an error.", "V+", idle=True),
-    function("$LNGB", "value:any", "string", "Bytes of an integer.", "V+", idle=True),
-    function("$FLTB", "value:any", "string", "Bytes of a number.", "V+", idle=True),
+    Form("IOSTAT", "lun:any, mode:any? -> real", "State of a file.", "V+", idle=True),
+    Form("GETC", "lun:any, mode:any? -> real", "A character of a file.", "V+", idle=True),
+    Form("LNGB", "text:string, from:any? -> real", "An integer of bytes.", "V+", idle=True),
+    Form("FLTB", "text:string, from:any? -> real", "A number of bytes.", "V+", idle=True),
+    Form("TASK", "mode:any?, number:any? -> real", "State of a task.", "V+", idle=True),
+    Form("$ERROR", "code:any -> string", "Text of an error.", "V+", idle=True),
+    Form("$LNGB", "value:any -> string", "Bytes of an integer.", "V+", idle=True),
+    Form("$FLTB", "value:any -> string", "Bytes of a number.", "V+", idle=True),
 )  # fmt: skip
 
-FUNCTIONS: Final[dict[str, Function]] = {
+FUNCTIONS: Final[dict[str, Form]] = {
     row.name: row for row in (*_REAL_FUNCTIONS, *_STRING_FUNCTIONS, *_LOCATION_FUNCTIONS, *_IDLE_FUNCTIONS)
 }
 """Functions and constants, with their prefixes."""
@@ -476,22 +420,18 @@ FORMATS: Final = {
 }  # fmt: skip
 """Control items of TYPE and $ENCODE."""
 
-SWITCHES: Final[dict[str, Switch]] = {
-    row.name: row
-    for row in (
-        Switch("CP", True, "Continuous path: motions go round their destinations.", "VAL-II"),
-        Switch("DRY.RUN", False, "Programs run without motion.", "V+"),
-        Switch("MESSAGES", True, "TYPE prints.", "VAL-II"),
-        Switch("POWER", True, "The arm has power.", "V+"),
-    )
-}
+_SWITCHES: Final = (
+    Switch("CP", True, "Continuous path: motions go round their destinations.", "VAL-II"),
+    Switch("DRY.RUN", False, "Programs run without motion.", "V+"),
+    Switch("MESSAGES", True, "TYPE prints.", "VAL-II"),
+    Switch("POWER", True, "The arm has power.", "V+"),
+)
+SWITCHES: Final = {row.name: row for row in _SWITCHES}
 """What ENABLE and DISABLE turn."""
 
-PARAMETERS: Final[dict[str, Parameter]] = {
-    row.name: row
-    for row in (
-        Parameter("HAND.TIME", 0.05, 0.0, 60.0, "s", "How long OPENI, CLOSEI and RELAXI take.", "VAL-II"),
-        Parameter("HAND.LOAD", 0.0, 0.0, 20.0, "kg", "What the real hand holds while it's closed.", "ours"),
-    )
-}
+_PARAMETERS: Final = (
+    Parameter("HAND.TIME", 0.05, 0.0, 60.0, "s", "How long OPENI, CLOSEI and RELAXI take.", "VAL-II"),
+    Parameter("HAND.LOAD", 0.0, 0.0, 20.0, "kg", "What the real hand holds while it's closed.", "ours"),
+)
+PARAMETERS: Final = {row.name: row for row in _PARAMETERS}
 """What PARAMETER sets."""

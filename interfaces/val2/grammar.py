@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import Function, nearest
+from interfaces.val2.forms import Form, nearest
 from interfaces.val2.syntax import (
     Apply,
     Binary,
@@ -252,9 +252,7 @@ def _misplaced(operator: str, at: TextPosition) -> ValError:
     return ValError("Syntax error", f"{operator} can't stand here; parentheses may be missing", place=at)
 
 
-def _arguments(
-    node: Node, function: Function, at: TextPosition, depth: int
-) -> tuple[Expression | Format | None, ...]:
+def _arguments(node: Node, function: Form, at: TextPosition, depth: int) -> tuple[Expression | Format | None, ...]:
     line = at.line
     arguments: list[Expression | Format | None] = []
     for child in node.children:

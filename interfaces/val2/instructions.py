@@ -9,259 +9,220 @@ destination. RIGHTY and its like let the next motion begin at rest.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator
 from typing import Any, Final, Protocol, TypeAlias
 
-from interfaces.val2.arithmetic import Real, Slots, whole
-from interfaces.val2.context import ARM, SLICE, SPECIAL, Action, Context, Finished, StepFunction, Suspend, Waiting
+from interfaces.val2 import formats, forms, kinds
+from interfaces.val2.context import (
+    ARM,
+    SLICE,
+    SPECIAL,
+    Action,
+    Asked,
+    Context,
+    Finished,
+    StepFunction,
+    Suspend,
+    Typed,
+    Waiting,
+)
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
-from interfaces.val2.memory import where
-from interfaces.val2.ports import ALTER_PERIOD
-from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Instruction, Number, Unary, Variable
-from interfaces.val2.values import NULL, Transformation, about_z
+from interfaces.val2.forms import OperandSlot
+from interfaces.val2.functions import whole
+from interfaces.val2.memory import Slots, VariableSlot, mismatch
+from interfaces.val2.motion.places import ALTER_PERIOD
+from interfaces.val2.syntax import (
+    Apply,
+    Binary,
+    Compound,
+    Expression,
+    Format,
+    Instruction,
+    Number,
+    Unary,
+    Variable,
+)
+from interfaces.val2.values import NULL, Location, Transformation, about_z
 
-Ask: TypeAlias = Callable[[], None]
+Ask: TypeAlias = Callable[[], object]
 """Asks for what an instruction wants; its operands have been evaluated."""
+Preparation: TypeAlias = Callable[..., Ask]
+"""Of the context, the instruction, and the values of its operands: what asks."""
 
 
-class Operands:
-    """The operands of one instruction, as closures."""
-
-    def __init__(self, x: Expressions, instruction: Instruction) -> None:
-        self.x, self.given, self.instruction = x, instruction.operands, instruction
-
-    def present(self, i: int) -> bool:
-        """Whether it's there."""
-        return i < len(self.given) and self.given[i] is not None
-
-    def expression(self, i: int) -> Expression:
-        """An operand.
-
-        Raises:
-            ValError: If it's missing.
-        """
-        if self.present(i):
-            return self.given[i]  # type: ignore[return-value]
-        raise ValError("Missing argument", self.instruction.keyword, place=where(self.instruction.at))
-
-    def real(self, i: int, otherwise: float | None = None) -> Real:
-        """A real; without `otherwise` it must be there."""
-        if otherwise is not None and not self.present(i):
-            return lambda _: otherwise
-        return self.x.real(self.expression(i))
-
-    def reals(self, count: int, otherwise: float = 0.0) -> list[Real]:
-        """The first few, those that were left out filled up."""
-        return [self.real(i, otherwise) for i in range(count)]
-
-    def says(self, word: str) -> bool:
-        """Whether a word follows."""
-        return word in self.instruction.words
+def _move(c: Context, i: Instruction, location: Location, hand: float | None = None) -> Ask:
+    """MOVET's opening [mm] is over 0; TRUE opens, 0 closes."""
+    opening = hand if hand is None or hand > 0.0 else hand != 0.0
+    straight = i.keyword in ("MOVES", "MOVEST")
+    return lambda: c.arm.move(location, straight=straight, hand=opening, now=c.now)
 
 
-Preparation: TypeAlias = Callable[[Operands, Context], Callable[[Slots], Ask]]
-"""Makes a closure that evaluates an instruction's operands, and gives what then asks."""
+def _approach(c: Context, i: Instruction, location: Location, height: float) -> Ask:
+    return lambda: c.arm.approach(location, height, straight=i.keyword == "APPROS", now=c.now)
 
 
-def numbers(o: Operands, count: int, ask: Callable[..., None], *, all_given: bool = True) -> Callable[[Slots], Ask]:
-    """Prepare a call with the first few operands, reals all; `all_given` if none of them may be left out."""
-    parts = [o.real(i) for i in range(count)] if all_given else o.reals(count)
-
-    def prepare(s: Slots) -> Ask:
-        values = [p(s) for p in parts]
-        return lambda: ask(*values)
-
-    return prepare
+def _depart(c: Context, i: Instruction, distance: float) -> Ask:
+    return lambda: c.arm.depart(distance, straight=i.keyword == "DEPARTS", now=c.now)
 
 
-def _hand(value: float) -> float | bool:
-    """Of MOVET: an opening [mm] over 0; TRUE opens, 0 closes."""
-    return value if value > 0.0 else value != 0.0
-
-
-def _move(o: Operands, c: Context, *, straight: bool) -> Callable[[Slots], Ask]:
-    target = o.x.location(o.expression(0))
-    hand = o.real(1) if o.instruction.keyword in {"MOVET", "MOVEST"} else None
-
-    def prepare(s: Slots) -> Ask:
-        location = target(s)
-        opening = None if hand is None else _hand(hand(s))
-        return lambda: c.arm.move(location, straight=straight, hand=opening, now=c.now)
-
-    return prepare
-
-
-def _approach(o: Operands, c: Context, *, straight: bool) -> Callable[[Slots], Ask]:
-    target, distance = o.x.location(o.expression(0)), o.real(1)
-
-    def prepare(s: Slots) -> Ask:
-        location, height = target(s), distance(s)
-        return lambda: c.arm.approach(location, height, straight=straight, now=c.now)
-
-    return prepare
-
-
-def _drive(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    joint, change, speed = o.real(0), o.real(1), o.real(2, 100.0)
-
-    def prepare(s: Slots) -> Ask:
-        number, angle, percent = joint(s), change(s), speed(s)
-        if number not in range(1, 7):
-            raise ValError("Illegal joint number", f"{number:.9g}: 1 to 6")
-        c.capped("DRIVE at", percent)
-        return lambda: c.arm.drive(int(number), angle, percent, now=c.now)
-
-    return prepare
+def _drive(c: Context, _: Instruction, joint: float, angle: float, percent: float) -> Ask:
+    if joint not in range(1, 7):
+        raise ValError("Illegal joint number", f"{joint:.9g}: 1 to 6")
+    c.capped("DRIVE at", percent)
+    return lambda: c.arm.drive(int(joint), angle, percent, now=c.now)
 
 
 MOTIONS: Final[dict[str, Preparation]] = {
-    "MOVE": lambda o, c: _move(o, c, straight=False),
-    "MOVES": lambda o, c: _move(o, c, straight=True),
-    "MOVET": lambda o, c: _move(o, c, straight=False),
-    "MOVEST": lambda o, c: _move(o, c, straight=True),
-    "APPRO": lambda o, c: _approach(o, c, straight=False),
-    "APPROS": lambda o, c: _approach(o, c, straight=True),
-    "DEPART": lambda o, c: numbers(o, 1, lambda d: c.arm.depart(d, straight=False, now=c.now)),
-    "DEPARTS": lambda o, c: numbers(o, 1, lambda d: c.arm.depart(d, straight=True, now=c.now)),
+    **dict.fromkeys(("MOVE", "MOVES", "MOVET", "MOVEST"), _move),
+    **dict.fromkeys(("APPRO", "APPROS"), _approach),
+    **dict.fromkeys(("DEPART", "DEPARTS"), _depart),
     "DRIVE": _drive,
-    "DRAW": lambda o, c: numbers(o, 3, lambda *d: c.arm.draw(*d, now=c.now), all_given=False),
-    "READY": lambda _, c: lambda _: lambda: c.arm.go_ready(now=c.now),
-    "NEST": lambda _, c: lambda _: lambda: c.arm.nest(now=c.now),
-    "ALIGN": lambda _, c: lambda _: lambda: c.arm.align(now=c.now),
-    "DELAY": lambda o, c: numbers(o, 1, lambda t: c.arm.delay(t, now=c.now)),
+    "DRAW": lambda c, _, *way: lambda: c.arm.draw(*way, now=c.now),
+    "READY": lambda c, _: lambda: c.arm.go_ready(now=c.now),
+    "NEST": lambda c, _: lambda: c.arm.nest(now=c.now),
+    "ALIGN": lambda c, _: lambda: c.arm.align(now=c.now),
+    "DELAY": lambda c, _, seconds: lambda: c.arm.delay(seconds, now=c.now),
 }
 """What is asked for as a motion."""
 
 
-_CONFIGURATIONS: Final = ("RIGHTY", "LEFTY", "ABOVE", "BELOW", "FLIP", "NOFLIP")
+def _speed(c: Context, i: Instruction, speed: float, turn: float | None) -> Ask:
+    c.capped("SPEED of turning", turn or 0.0)
+    if "MONITOR" in i.words:
+        c.capped("Monitor SPEED", speed)
+        return lambda: c.arm.set_monitor_speed(speed, now=c.now)
+    unit = next((u for u in ("MMPS", "IPS") if u in i.words), "%")
+    c.capped("SPEED", speed, c.arm.fastest(unit), unit)
+    return lambda: c.arm.set_speed(speed, turn=turn, unit=unit, always=_always(i))
 
 
-def _speed(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    value, turn = o.real(0), o.real(1) if o.present(1) else None
-    unit = next((u for u in ("MMPS", "IPS") if o.says(u)), "%")
-    always = o.says("ALWAYS")
-
-    def prepare(s: Slots) -> Ask:
-        speed, turning = value(s), None if turn is None else turn(s)
-        c.capped("SPEED of turning", turning or 0.0)
-        if o.says("MONITOR"):
-            c.capped("Monitor SPEED", speed)
-            return lambda: c.arm.set_monitor_speed(speed, now=c.now)
-        c.capped("SPEED", speed, c.arm.fastest(unit), unit)
-        return lambda: c.arm.set_speed(speed, turn=turning, unit=unit, always=always)
-
-    return prepare
+def _always(i: Instruction) -> bool:
+    return "ALWAYS" in i.words
 
 
-def _accelerate(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    up = o.real(0)
-    down = o.real(1) if o.present(1) else up
-
-    def prepare(s: Slots) -> Ask:
-        values = up(s), down(s)
-        c.capped("ACCEL", max(values))
-        return lambda: c.arm.set_acceleration(*values)
-
-    return prepare
+def _accelerate(c: Context, _: Instruction, up: float, down: float | None) -> Ask:
+    values = up, up if down is None else down
+    c.capped("ACCEL", max(values))
+    return lambda: c.arm.set_acceleration(*values)
 
 
-def _tolerance(o: Operands, c: Context, *, fine: bool) -> Callable[[Slots], Ask]:
-    percent, always = o.real(0) if o.present(0) else None, o.says("ALWAYS")
-
-    def prepare(s: Slots) -> Ask:
-        value = None if percent is None else percent(s)
-        return lambda: c.arm.set_tolerance(value, fine=fine, always=always)
-
-    return prepare
+def _tolerance(c: Context, i: Instruction, percent: float | None) -> Ask:
+    return lambda: c.arm.set_tolerance(percent, fine=i.keyword == "FINE", always=_always(i))
 
 
-def _configure(o: Operands, c: Context) -> Callable[[Slots], Ask]:
+def _configure(c: Context, i: Instruction) -> Ask:
     def ask() -> None:
-        c.arm.set_configuration(o.instruction.keyword)
+        c.arm.set_configuration(i.keyword)
         c.stop_first = True
 
-    return lambda _: ask
+    return ask
 
 
-def _signal(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    parts = [o.real(i) for i in range(max(1, len(o.given)))]
+def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> Ask:
+    index = c.timer(number)
 
-    def prepare(s: Slots) -> Ask:
-        numbers = [p(s) for p in parts]
-        return lambda: c.signals.set(numbers)
-
-    return prepare
-
-
-def _set_timer(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    number, value = o.real(0), o.real(1)
-
-    def prepare(s: Slots) -> Ask:
-        i, seconds = c.timer(number(s)), value(s)
-
-        def ask() -> None:
-            c.timers[i] = c.now - seconds
-
-        return ask
-
-    return prepare
-
-
-def _set_parameter(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    value, name = o.real(0), next(iter(o.instruction.words), "")
-
-    def prepare(s: Slots) -> Ask:
-        number = value(s)
-
-        return lambda: c.parameter(name, number)
-
-    return prepare
-
-
-def _switch(o: Operands, c: Context, *, on: bool) -> Callable[[Slots], Ask]:
     def ask() -> None:
-        for name in o.instruction.words:
-            c.switch(name, on)
+        c.timers[index] = c.now - seconds
 
-    return lambda _: ask
+    return ask
 
 
-def _alter(o: Operands, c: Context) -> Callable[[Slots], Ask]:
+def _switch(c: Context, i: Instruction) -> Ask:
+    def ask() -> None:
+        for name in i.words:
+            c.switch(name, i.keyword == "ENABLE")
+
+    return ask
+
+
+AT_ONCE: Final[dict[str, Preparation]] = {
+    **dict.fromkeys(("RIGHTY", "LEFTY", "ABOVE", "BELOW", "FLIP", "NOFLIP"), _configure),
+    "ACCEL": _accelerate,
+    "AT": lambda c, _, t: lambda: c.arm.at(t),
+    "CLOSE": lambda c, _: lambda: c.arm.set_hand(False),
+    "COARSE": _tolerance,
+    "DISABLE": _switch,
+    "DURATION": lambda c, i, t: lambda: c.arm.set_duration(t, always=_always(i)),
+    "ENABLE": _switch,
+    "FINE": _tolerance,
+    "IGNORE": lambda c, _, signal: lambda: c.reactions.ignore(signal),
+    "NONULL": lambda c, i: lambda: c.arm.set_nulling(False, always=_always(i)),
+    "NULL": lambda c, i: lambda: c.arm.set_nulling(True, always=_always(i)),
+    "OPEN": lambda c, _: lambda: c.arm.set_hand(True),
+    "PARAMETER": lambda c, i, value: lambda: c.parameter(i.words[0], value),
+    "RELAX": lambda c, _: lambda: c.arm.set_hand(None),
+    "RESET": lambda c, _: c.signals.reset,
+    "SIGNAL": lambda c, _, *numbers: lambda: c.signals.set(numbers),
+    "SPEED": _speed,
+    "TIMER": _set_timer,
+}
+"""What is done at once, and takes no time."""
+
+
+def _alter(c: Context, i: Instruction, _channel: float, mode: float, *correction: float) -> Ask:
     """ALTER; what is given behind the mode is the first correction."""
-    _, mode, *parts = o.reals(8)
-    corrects = any(o.present(i) for i in range(2, 8))
+    bits, corrects = whole(mode), any(operand is not None for operand in i.operands[2:])
 
-    def prepare(s: Slots) -> Ask:
-        bits, values = whole(mode(s)), tuple(p(s) for p in parts)
+    def ask() -> None:
+        c.arm.set_alter(bits, now=c.now)
+        if corrects:
+            _correct(c, i, *correction)()
 
-        def ask() -> None:
-            c.arm.set_alter(bits, now=c.now)
-            if corrects:
-                c.powered()
-                c.arm.alter(values, now=c.now)
-
-        return ask
-
-    return prepare
+    return ask
 
 
-def _correct(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    def ask(*values: float) -> None:
+def _correct(c: Context, _: Instruction, *values: float) -> Ask:
+    def ask() -> None:
         c.powered()
         c.arm.alter(values, now=c.now)
 
-    return numbers(o, 6, ask, all_given=False)
+    return ask
 
 
-def _here(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    x, target = o.x, o.expression(0)
-    frames = []
+ALTERING: Final[dict[str, Preparation]] = {
+    **dict.fromkeys(("ALTER", "ALTON"), _alter),
+    **dict.fromkeys(("ALTOFF", "NOALTER"), lambda c, _: lambda: c.arm.set_alter(None, now=c.now)),
+    "ALTOUT": _correct,
+}
+"""What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
+
+
+def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> Ask:
+    if isinstance(first, Transformation):
+        return lambda: c.arm.set_base(first)
+    *way, turn = others
+    X = about_z(turn).X.copy()
+    X[:3, 3] = first, *way
+    return lambda: c.arm.set_base(Transformation(X))
+
+
+AT_REST: Final[dict[str, Preparation]] = {
+    "BASE": _base,
+    "CLOSEI": lambda c, _: lambda: c.arm.actuate(False, now=c.now),
+    "OPENI": lambda c, _: lambda: c.arm.actuate(True, now=c.now),
+    "RELAXI": lambda c, _: lambda: c.arm.actuate(None, now=c.now),
+    "TOOL": lambda c, _, tool: lambda: c.arm.set_tool(NULL if tool is None else tool),
+}
+"""What is done when the arm stands."""
+
+
+def _prepared(x: Expressions, i: Instruction, make: Preparation) -> Callable[[Slots], Ask]:
+    """What evaluates an instruction's operands, and gives what then asks."""
+    slots, c = forms.INSTRUCTIONS[i.keyword].slots, x.context
+    if i.keyword == "BASE" and len(i.operands) == 1 and not isinstance(i.operands[0], Number | Unary | Binary):
+        slots = (OperandSlot("transformation", "frame"),)
+    parts = x.operands(slots, i.operands, i.keyword, i.at)
+    return lambda s: make(c, i, *[p(s) for p in parts])
+
+
+def _here(x: Expressions, i: Instruction) -> Callable[[Slots], Ask]:
+    c, frames, target = x.context, [], i.operands[0]
     if isinstance(target, Compound):
         frames, target = [x.transformation(p) for p in target.parts[:-1]], target.parts[-1]
     if not isinstance(target, Variable) or target.prefix == "$" or (frames and target.prefix):
-        raise ValError("Invalid location", "HERE takes a name, or a compound that ends in one",
-                       place=where(o.instruction.at))  # fmt: skip
+        raise ValError("Invalid location", "HERE takes a name, or a compound that ends in one", place=i.at)
     name, slot = target, x.reference(target)
 
     def prepare(s: Slots) -> Ask:
@@ -273,81 +234,6 @@ def _here(o: Operands, c: Context) -> Callable[[Slots], Ask]:
         return lambda: c.memory.store(slot(s), value, name)
 
     return prepare
-
-
-AT_ONCE: Final[dict[str, Preparation]] = {
-    **dict.fromkeys(_CONFIGURATIONS, _configure),
-    "ACCEL": _accelerate,
-    "AT": lambda o, c: numbers(o, 1, c.arm.at),
-    "CLOSE": lambda _, c: lambda _: lambda: c.arm.set_hand(False),
-    "COARSE": lambda o, c: _tolerance(o, c, fine=False),
-    "DISABLE": lambda o, c: _switch(o, c, on=False),
-    "DURATION": lambda o, c: numbers(o, 1, lambda t: c.arm.set_duration(t, always=o.says("ALWAYS"))),
-    "ENABLE": lambda o, c: _switch(o, c, on=True),
-    "FINE": lambda o, c: _tolerance(o, c, fine=True),
-    "HERE": _here,
-    "IGNORE": lambda o, c: numbers(o, 1, c.reactions.ignore),
-    "NONULL": lambda o, c: lambda _: lambda: c.arm.set_nulling(False, always=o.says("ALWAYS")),
-    "NULL": lambda o, c: lambda _: lambda: c.arm.set_nulling(True, always=o.says("ALWAYS")),
-    "OPEN": lambda _, c: lambda _: lambda: c.arm.set_hand(True),
-    "PARAMETER": _set_parameter,
-    "RELAX": lambda _, c: lambda _: lambda: c.arm.set_hand(None),
-    "RESET": lambda _, c: lambda _: c.signals.reset,
-    "SIGNAL": _signal,
-    "SPEED": _speed,
-    "TIMER": _set_timer,
-}
-"""What is done at once, and takes no time."""
-
-ALTERING: Final[dict[str, Preparation]] = {
-    "ALTER": _alter,
-    "ALTOFF": lambda _, c: lambda _: lambda: c.arm.set_alter(None, now=c.now),
-    "ALTON": _alter,
-    "ALTOUT": _correct,
-    "NOALTER": lambda _, c: lambda _: lambda: c.arm.set_alter(None, now=c.now),
-}
-"""What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
-
-
-def _tool(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    tool = o.x.transformation(o.expression(0)) if o.present(0) else (lambda _: NULL)
-
-    def prepare(s: Slots) -> Ask:
-        value = tool(s)
-        return lambda: c.arm.set_tool(value)
-
-    return prepare
-
-
-def _base(o: Operands, c: Context) -> Callable[[Slots], Ask]:
-    if len(o.given) == 1 and o.present(0) and not isinstance(o.given[0], Number | Unary | Binary):
-        frame = o.x.transformation(o.expression(0))
-
-        def whole_frame(s: Slots) -> Ask:
-            base = frame(s)
-            return lambda: c.arm.set_base(base)
-
-        return whole_frame
-    parts = o.reals(4)
-
-    def prepare(s: Slots) -> Ask:
-        *translation, turn = (p(s) for p in parts)
-        X = about_z(turn).X.copy()
-        X[:3, 3] = translation
-        value = Transformation(X)
-        return lambda: c.arm.set_base(value)
-
-    return prepare
-
-
-AT_REST: Final[dict[str, Preparation]] = {
-    "BASE": _base,
-    "CLOSEI": lambda _, c: lambda _: lambda: c.arm.actuate(False, now=c.now),
-    "OPENI": lambda _, c: lambda _: lambda: c.arm.actuate(True, now=c.now),
-    "RELAXI": lambda _, c: lambda _: lambda: c.arm.actuate(None, now=c.now),
-    "TOOL": _tool,
-}
-"""What is done when the arm stands."""
 
 
 Pause: TypeAlias = Generator[float, None, None]
@@ -422,56 +308,47 @@ def _altering(context: Context, ask: Ask, following: int, *, ends: bool) -> Gene
     return following
 
 
-def _changes(e: Expression | object) -> bool:
+def _changes(e: Expression) -> bool:
     """Whether the value of an expression changes with time alone."""
-    match e:
-        case Apply(function, arguments):
-            return function in _CHANGING or any(_changes(a) for a in arguments)
-        case Unary(_, operand):
-            return _changes(operand)
-        case Binary(_, left, right):
-            return _changes(left) or _changes(right)
-        case Compound(parts) | Variable(_, parts):
-            return any(_changes(p) for p in parts)
-        case _:
-            return False
+    return any(isinstance(part, Apply) and part.function in _CHANGING for part in kinds.parts(e))
 
 
-def _condition(o: Operands) -> Callable[[Slots], bool]:
-    """WAIT's; a bare number is a signal's, as in VAL."""
-    e = o.expression(0)
+def _wait(x: Expressions, i: Instruction, following: int) -> StepFunction:
+    """WAIT's condition; a bare number is a signal's, as in VAL. WAIT alone: a slice."""
+    if not i.operands:
+        return _sleep(x, i, following)
+    (e,), c = i.operands, x.context
     number = e.operand if isinstance(e, Unary) and e.operator == "-" else e
-    return o.x.condition(Apply("SIG", (e,), e.at) if isinstance(number, Number) else e)
-
-
-def _wait(o: Operands, c: Context, following: int) -> StepFunction:
-    if not o.present(0):
-        return _sleep(o, c, following)
-    test = _condition(o)
-    polled = _changes(o.given[0])
+    test = x.condition(Apply("SIG", (e,), e.at) if isinstance(number, Number) else e)
+    polled = _changes(e)
 
     def waiting(s: Slots) -> Generator[float, None, int]:
         while not test(s):
-            yield c.now + SLICE if polled else float("inf")
+            yield c.now + SLICE if polled else math.inf
         return following
 
     return lambda s: _special(c, Waiting(waiting(s), interruptible=True))
 
 
-def _sleep(o: Operands, c: Context, following: int) -> StepFunction:
-    """WAIT alone: a slice; WAIT.EVENT: a time, or for ever, as there are no other programs to send events."""
-    seconds = o.real(1, float("inf")) if o.instruction.keyword == "WAIT.EVENT" else o.real(0, SLICE)
+def _sleep(x: Expressions, i: Instruction, following: int) -> StepFunction:
+    """WAIT.EVENT: a time, or for ever, as there are no other programs to send events."""
+    c, *_, seconds = x.context, *x.operands(forms.INSTRUCTIONS[i.keyword].slots, i.operands, i.keyword, i.at)
+    otherwise = SLICE if i.keyword == "WAIT" else math.inf
 
     def waiting(until: float) -> Generator[float, None, int]:
         while c.now < until:
             yield until
         return following
 
-    return lambda s: _special(c, Waiting(waiting(c.now + seconds(s)), interruptible=True))
+    def sleep(s: Slots) -> int:
+        given = seconds(s)
+        return _special(c, Waiting(waiting(c.now + (otherwise if given is None else given)), interruptible=True))
+
+    return sleep
 
 
-def _grasp(o: Operands, c: Context, following: int, label: int | None) -> StepFunction:
-    least = o.real(0)
+def _grasp(x: Expressions, i: Instruction, following: int, label: int | None) -> StepFunction:
+    c, least = x.context, x.real(i.operands[0])
 
     def grasping(opening: float) -> Generator[float, None, int]:
         yield from _standing(c, lambda: c.arm.actuate(False, now=c.now), None)
@@ -484,7 +361,7 @@ def _grasp(o: Operands, c: Context, following: int, label: int | None) -> StepFu
     return lambda s: _special(c, Waiting(grasping(least(s))))
 
 
-def _timed(c: Context, time: Real, prepare: Callable[[Slots], Ask]) -> Callable[[Slots], Ask]:
+def _timed(c: Context, time: Callable[[Slots], float], prepare: Callable[[Slots], Ask]) -> Callable[[Slots], Ask]:
     """Ask for a motion at a time; where it can't be, the time isn't for the next one."""
 
     def timed(s: Slots) -> Ask:
@@ -515,50 +392,127 @@ def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) ->
     Raises:
         ValError: If there's none of this keyword, or an operand is missing or of a wrong type.
     """
-    c, o, following = x.context, Operands(x, i), index + 1
-    if (motion := MOTIONS.get(i.keyword)) is not None:
-        prepare = motion(o, c) if i.begins is None else _timed(c, x.real(i.begins), motion(o, c))
-        return lambda s: _special(c, Waiting(_moving(c, prepare(s), following)))
-    if (at_once := AT_ONCE.get(i.keyword)) is not None:
-        prepare = at_once(o, c)
+    c, following = x.context, index + 1
+    if i.keyword in MOTIONS:
+        motion = _prepared(x, i, MOTIONS[i.keyword])
+        timed = motion if i.begins is None else _timed(c, x.real(i.begins), motion)
+        return lambda s: _special(c, Waiting(_moving(c, timed(s), following)))
+    if i.keyword in AT_ONCE or i.keyword == "HERE":
+        prepare = _here(x, i) if i.keyword == "HERE" else _prepared(x, i, AT_ONCE[i.keyword])
 
         def now(s: Slots) -> int:
             prepare(s)()
             return _special(c, following)
 
         return now
-    if (altering := ALTERING.get(i.keyword)) is not None:
-        ask_for = altering(o, c)
+    if i.keyword in ALTERING:
+        altering = _prepared(x, i, ALTERING[i.keyword])
         corrects = i.keyword == "ALTOUT" or len(i.operands) > 2
 
         def alter(s: Slots) -> int:
-            ask = ask_for(s)
+            ask = altering(s)
             ask()
             return _special(c, Waiting(_altering(c, ask, following, ends=not corrects)))
 
         return alter
-    if (at_rest := AT_REST.get(i.keyword)) is not None:
-        prepare = at_rest(o, c)
-        return lambda s: _special(c, Waiting(_standing(c, prepare(s), following)))
+    if i.keyword in AT_REST:
+        at_rest = _prepared(x, i, AT_REST[i.keyword])
+        return lambda s: _special(c, Waiting(_standing(c, at_rest(s), following)))
     match i.keyword:
-        case "BREAK":
-            return lambda _: _special(c, Waiting(_standing(c, None, following)))
-        case "BRAKE":
+        case "BREAK" | "BRAKE":
 
-            def brake(_: Slots) -> int:
-                c.arm.brake(now=c.now)
+            def stop(_: Slots) -> int:
+                if i.keyword == "BRAKE":
+                    c.arm.brake(now=c.now)
                 return _special(c, Waiting(_standing(c, None, following)))
 
-            return brake
+            return stop
+        case "TYPE":
+            return _type(x, i, following)
+        case "PROMPT":
+            return _prompt(x, i, following)
         case "WAIT":
-            return _wait(o, c, following)
+            return _wait(x, i, following)
         case "WAIT.EVENT":
-            return _sleep(o, c, following)
+            return _sleep(x, i, following)
         case "GRASP":
-            return _grasp(o, c, following, jump)
+            return _grasp(x, i, following, jump)
         case "PAUSE":
             return lambda _: _special(c, Waiting(_standing(c, None, Suspend(following))))
         case "STOP" | "HALT":
             return lambda _: _special(c, Waiting(_standing(c, None, Finished(i.keyword))))
         case _:
-            raise ValError("Unknown instruction", i.keyword, place=where(i.at))
+            raise ValError("Unknown instruction", i.keyword, place=i.at)
+
+
+# Dialogue.
+
+
+def _type(x: Expressions, i: Instruction, following: int) -> StepFunction:
+    context = x.context
+    parts = [o if isinstance(o, Format) else x.value(o) for o in i.operands]
+
+    def type_(s: Slots) -> int:
+        text, ends = formats.spelled([p if isinstance(p, Format) else p(s) for p in parts])
+        if context.switches["MESSAGES"]:
+            context.events.append(Typed(text + "\n" if ends else text))
+        return context.go_on(following)
+
+    return type_
+
+
+def _prompt(x: Expressions, i: Instruction, following: int) -> StepFunction:
+    """Ask, and ask again until the answer is what is wanted."""
+    context, text, names = x.context, x.string(i.operands[0]), i.operands[1:]
+    slots = [x.reference(v) for v in names]
+    if any(v.prefix == "#" for v in names):
+        raise mismatch(next(v for v in names if v.prefix == "#"))
+
+    def asking(question: str, targets: list[VariableSlot]) -> Generator[float, None, int]:
+        context.answers.clear()
+        context.asking = True
+        try:
+            while True:
+                context.events.append(Asked(question))
+                while not context.answers:
+                    yield math.inf
+                values = _answers(context.answers.pop(), names)
+                if values is not None:
+                    break
+                context.events.append(Typed(f"*Illegal value* {_wanted(names)}\n"))
+        finally:
+            context.asking = False
+        for slot, value, name in zip(targets, values, names, strict=True):
+            context.memory.store(slot, value, name)
+        return following
+
+    def ask(s: Slots) -> int:
+        context.pending = Waiting(asking(text(s), [slot(s) for slot in slots]))
+        return SPECIAL
+
+    return ask
+
+
+def _answers(line: str, names: tuple[Variable, ...]) -> list[float | str] | None:
+    """The values in an answer: parted by commas or blanks; a string at the end takes what is left.
+
+    Returns:
+        None if it isn't what is wanted.
+    """
+    rest = line.strip("\r\n")
+    values: list[float | str] = []
+    for n, name in enumerate(names, 1):
+        if n == len(names) and name.prefix:
+            return [*values, rest if n == 1 else rest.strip()]
+        rest = rest.strip()
+        end = next((k for k, c in enumerate(rest) if c == "," or (c.isspace() and not name.prefix)), len(rest))
+        field, rest = rest[:end].strip(), rest[end:].lstrip().removeprefix(",")
+        value = field if name.prefix else formats.whole_number(field)
+        if value is None:
+            return None
+        values.append(value)
+    return None if rest.strip() and names else values
+
+
+def _wanted(names: tuple[Variable, ...]) -> str:
+    return ", ".join(f"{v.name}: {'a string' if v.prefix else 'a number'}" for v in names)

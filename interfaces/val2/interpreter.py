@@ -24,7 +24,7 @@ from interfaces.val2.context import (
 )
 from interfaces.val2.errors import ValError
 from interfaces.val2.instructions import until
-from interfaces.val2.memory import VariableSlot, where
+from interfaces.val2.memory import VariableSlot
 from interfaces.val2.signals import Reaction
 from vrs.errors import VrsError
 
@@ -274,7 +274,7 @@ class Task:
         frame.drop()
         if frame.name:
             steps = frame.code.program.steps
-            place = where(steps[frame.pc].at) if frame.pc < len(steps) else None
+            place = steps[frame.pc].at if frame.pc < len(steps) else None
             error = error.at(program=frame.name, step=frame.step, place=place)
         self.state, self.word, self._interrupted = ProgramState.PAUSED, "ERROR", True
         self.context.events.append(ProgramFailed(error))

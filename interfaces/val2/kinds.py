@@ -10,25 +10,15 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.forms import Kind
 from interfaces.val2.syntax import (
     Apply,
-    Assign,
     Binary,
-    Call,
-    Case,
     Compound,
-    Conditional,
     Expression,
-    For,
     Format,
-    Goto,
     Instruction,
     Number,
-    Prompt,
-    React,
     Statement,
     Text,
-    Type,
     Unary,
-    Value,
     Variable,
 )
 
@@ -56,99 +46,82 @@ def parts(expression: Expression) -> Iterator[Expression]:
         yield from parts(child)
 
 
-def reads(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
-    """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
-    match statement:
-        case Assign(target, value, "SET"):
-            yield value, "point" if target.prefix == "#" else "frame"
-        case Assign(_, value, "DECOMPOSE"):
-            yield value, "location"
-        case Assign(target, value):
-            yield value, "string" if target.prefix == "$" else "real"
-        case Instruction("HERE", (Compound(parts=(*others, _)),)):
+def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
+    """The operands of an instruction, and what kind each has to be of: `variable` for what it may set."""
+    match i:
+        case Instruction("=" | "SET", (target, value)):
+            yield target, "variable"
+            if i.keyword == "=":
+                yield value, "string" if target.prefix == "$" else "real"
+            else:
+                yield value, "point" if target.prefix == "#" else "frame"
+        case Instruction("HERE", (target,)):
+            *others, last = target.parts if isinstance(target, Compound) else (target,)
             yield from ((other, "frame") for other in others)
-        case Instruction("HERE"):
-            pass
+            if isinstance(last, Variable):
+                yield last, "variable"
         case Instruction("BASE", (Variable() | Apply() | Compound() as only,)):
             yield only, "any"
-        case Instruction(keyword, operands):
-            row = forms.INSTRUCTIONS[keyword]
-            slots = row.slots
-            for i, operand in enumerate(operands):
-                if operand is not None and slots:
-                    yield operand, slots[min(i, len(slots) - 1)].kind
-        case Conditional(_, condition) | Goto(_, condition) if condition is not None:
-            yield condition, "real"
-        case For(_, start, stop, step):
-            yield from ((part, "real") for part in (start, stop, step) if part is not None)
-        case Case(value):
-            yield value, "any"
-        case Value(values):
-            yield from ((value, "any") for value in values)
-        case Call(arguments=arguments):
-            yield from ((a, "any") for a in arguments if a is not None and not isinstance(a, Variable))
-        case React(signal):
-            yield signal, "real"
-        case Type(items):
-            yield from ((item, "any") for item in items if not isinstance(item, Format))
-        case Prompt(text):
-            yield text, "string"
+        case Instruction("CALL" | "GOSUB", given):
+            yield from ((a, "variable" if isinstance(a, Variable) else "any") for a in given if a is not None)
+        case Instruction(keyword, operands) if keyword not in ("", "AUTO", "LOCAL", "GLOBAL"):
+            slots = forms.INSTRUCTIONS[keyword].slots
+            for n, operand in enumerate(operands if slots else ()):
+                if operand is not None and not isinstance(operand, Format):
+                    yield operand, slots[min(n, len(slots) - 1)].kind
+
+
+def reads(statement: Statement) -> list[tuple[Expression, Kind]]:
+    """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
+    found = [one for one in _operands(statement) if one[1] != "variable"]
     if isinstance(statement, Instruction) and statement.begins is not None:
-        yield statement.begins, "real"
-    for target in writes(statement):
-        yield from ((index, "real") for index in target.indices)
+        found.append((statement.begins, "real"))
+    return found + [(index, "real") for target in writes(statement) for index in target.indices]
 
 
 def writes(statement: Statement) -> Iterator[Variable]:
-    """The variables that a statement may set."""
-    match statement:
-        case Assign(target):
-            yield target
-        case Instruction("HERE", (Variable() as target,)):
-            yield target
-        case Instruction("HERE", (Compound(parts=(*_, Variable() as target)),)):
-            yield target
-        case For(variable):
-            yield variable
-        case Prompt(_, targets):
-            yield from targets
-        case Call(arguments=arguments):
-            yield from (a for a in arguments if isinstance(a, Variable))
-    for expression, _ in _decoded(statement):
-        for part in parts(expression):
-            match part:
-                case Apply("$DECODE", (Variable() as target, *_)):
-                    yield target
+    """The variables that a statement may set; `$DECODE` shortens its first argument."""
+    for operand, kind in _operands(statement):
+        if kind == "variable" and isinstance(operand, Variable):
+            yield operand
+        elif statement.keyword in ("=", "TYPE"):
+            for part in parts(operand):
+                match part:
+                    case Apply("$DECODE", (Variable() as target, *_)):
+                        yield target
 
 
-def _decoded(statement: Statement) -> Iterator[tuple[Expression, Kind]]:
-    """Where `$DECODE` may stand, which shortens its first argument."""
-    match statement:
-        case Assign(_, value, ""):
-            yield value, "any"
-        case Type(items):
-            yield from ((item, "any") for item in items if not isinstance(item, Format))
+def wanted(expression: Expression) -> Iterator[tuple[Expression, Kind]]:
+    """The parts of an expression, and what kind each has to be of; those of `+` and relations have to be alike."""
+    if isinstance(expression, Apply):
+        slots = forms.FUNCTIONS[expression.function].slots
+        for i, argument in enumerate(expression.arguments):
+            if argument is not None and not isinstance(argument, Format):
+                yield argument, slots[i].kind if i < len(slots) else slots[-1].kind
+    else:
+        kind: Kind = "frame" if isinstance(expression, Compound) else "real"
+        yield from ((child, kind) for child in children(expression))
 
 
-POINT: Final = "precision point"
+POINT: Final = "point"
 _RELATIONS: Final = ("==", "<>", "<", "<=", ">", ">=")
 _SHOWN: Final[Mapping[str, str]] = {
     "real": "a number", "string": "a string", "frame": "a transformation", "location": "a location",
-    POINT: "a precision point", "point": "a precision point",
+    "point": "a precision point",
 }  # fmt: skip
 _FITS: Final[Mapping[str, tuple[str, ...]]] = {
     "real": ("real",),
     "string": ("string",),
     "frame": ("frame",),
-    "point": (POINT,),
-    "location": ("frame", POINT, "location"),
+    "point": ("point",),
+    "location": ("frame", "point", "location"),
 }
 _STANDING: Final = ("HERE", "DEST")
 """Functions that give joints where a precision point is wanted."""
 
 
 def kind_of(expression: Expression, known: Mapping[str, str]) -> str:
-    """`real`, `string`, `frame`, `precision point`, or nothing if it can't be told.
+    """`real`, `string`, `frame`, `point`, or nothing if it can't be told.
 
     Args:
         expression: The expression.
@@ -172,34 +145,25 @@ def kind_of(expression: Expression, known: Mapping[str, str]) -> str:
             return "real"
 
 
-def mistakes(expression: Expression, wanted: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
+def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
     """What in an expression can't be of the kind that it has to be of.
 
     Args:
         expression: The expression.
-        wanted: What it has to be.
+        asked: What it has to be.
         known: What is known of names without a prefix.
     """
     kind = kind_of(expression, known)
-    if wanted == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
+    if asked == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
         kind = POINT
-    if kind and wanted in _FITS and kind not in _FITS[wanted]:
-        yield ValError("Mixed types", f"{_SHOWN[kind]} where {_SHOWN[wanted]} is wanted", place=expression.at)
+    if kind and asked in _FITS and kind not in _FITS[asked]:
+        yield ValError("Mixed types", f"{_SHOWN[kind]} where {_SHOWN[asked]} is wanted", place=expression.at)
         return
-    match expression:
-        case Apply(name, arguments):
-            slots = forms.FUNCTIONS[name].slots
-            for i, argument in enumerate(arguments):
-                if argument is not None and not isinstance(argument, Format):
-                    yield from mistakes(argument, slots[min(i, len(slots) - 1)].kind, known)
-        case Compound(parts):
-            for part in parts:
-                yield from mistakes(part, "frame", known)
-        case Binary(operator, left, right) if operator == "+" or operator in _RELATIONS:
-            yield from _alike(expression, left, right, known)
-        case _:
-            for child in children(expression):
-                yield from mistakes(child, "real", known)
+    if isinstance(expression, Binary) and (expression.operator == "+" or expression.operator in _RELATIONS):
+        yield from _alike(expression, expression.left, expression.right, known)
+    else:
+        for part, kind_of_part in wanted(expression):
+            yield from mistakes(part, kind_of_part, known)
 
 
 def _alike(whole: Binary, left: Expression, right: Expression, known: Mapping[str, str]) -> Iterable[ValError]:
@@ -208,7 +172,6 @@ def _alike(whole: Binary, left: Expression, right: Expression, known: Mapping[st
     if kinds == {"real", "string"}:
         yield ValError("Mixed types", f"a number and a string with {whole.operator} between them", place=whole.at)
         return
-    wanted: Kind = "string" if kinds == {"string"} else "real"
     if kinds:
-        yield from mistakes(left, wanted, known)
-        yield from mistakes(right, wanted, known)
+        for part in (left, right):
+            yield from mistakes(part, "string" if kinds == {"string"} else "real", known)

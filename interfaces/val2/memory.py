@@ -7,10 +7,10 @@ name is a scalar or an array, never both; the elements of an array are of one ty
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
-from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.syntax import NOWHERE, Number, Program, Unary, Variable
+from interfaces.val2.errors import NOWHERE, TextPosition, ValError
+from interfaces.val2.syntax import Number, Program, Unary, Variable
 from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
 MOST_VALUES: Final = 100_000
@@ -21,6 +21,8 @@ LONGEST_STRING: Final = 1_024
 """Characters."""
 
 Key: TypeAlias = int | tuple[int, ...]
+Slots: TypeAlias = list[Any]
+"""Of a call: a `VariableSlot` for each name, then what FOR keeps."""
 KINDS: Final = {"real": float, "string": str, "location": Transformation, "point": PrecisionPoint}
 """Types of values by the words of `Memory.listing`."""
 
@@ -50,20 +52,15 @@ def shown(name: str, key: Key | None = None) -> str:
     return f"{name}[{','.join(map(str, key if isinstance(key, tuple) else (key,)))}]"
 
 
-def where(at: TextPosition) -> TextPosition | None:
-    """A place, unless it's nowhere."""
-    return at if at.line else None
-
-
 def undefined(variable: Variable, key: Key | None = None, *, location: bool = False) -> ValError:
     """The error of reading what is unset."""
     what = "Undefined location" if location or variable.prefix == "#" else "Undefined value"
-    return ValError(what, shown(variable.name, key), place=where(variable.at))
+    return ValError(what, shown(variable.name, key), place=variable.at)
 
 
 def mismatch(variable: Variable) -> ValError:
     """The error of a name that is used as what it isn't."""
-    return ValError("Variable type mismatch", variable.name, place=where(variable.at))
+    return ValError("Variable type mismatch", variable.name, place=variable.at)
 
 
 def index(value: float, at: TextPosition = NOWHERE) -> int:
@@ -73,7 +70,7 @@ def index(value: float, at: TextPosition = NOWHERE) -> int:
         ValError: If it's negative or over 32,767.
     """
     if not -1.0 < value < LARGEST_INDEX + 1:
-        raise ValError("Invalid array index", f"{value:.9g}: 0 to {LARGEST_INDEX}", place=where(at))
+        raise ValError("Invalid array index", f"{value:.9g}: 0 to {LARGEST_INDEX}", place=at)
     return int(value)
 
 
@@ -140,7 +137,7 @@ class Memory:
         elif type(old) is not type(value):
             raise mismatch(variable)
         if isinstance(value, str) and len(value) > LONGEST_STRING:
-            raise ValError("String too long", f"{LONGEST_STRING} characters at most", place=where(variable.at))
+            raise ValError("String too long", f"{LONGEST_STRING} characters at most", place=variable.at)
         slot.value = value
 
     def release(self, slot: VariableSlot) -> None:
@@ -245,7 +242,7 @@ def _key(variable: Variable) -> Key | None:
         elif isinstance(part, Unary) and part.operator == "-" and isinstance(part.operand, Number):
             keys.append(index(-part.operand.value, variable.at))
         else:
-            raise ValError("Invalid array index", variable.name, place=where(variable.at))
+            raise ValError("Invalid array index", variable.name, place=variable.at)
     if len(keys) > MOST_DIMENSIONS:
         raise ValError("Invalid array index", f"{variable.name}: {MOST_DIMENSIONS} dimensions at most")
     return keys[0] if len(keys) == 1 else tuple(keys)

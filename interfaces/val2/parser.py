@@ -13,8 +13,8 @@ from interfaces.val2.forms import nearest
 from interfaces.val2.printer import print_step
 from interfaces.val2.statements import HIGHEST_LABEL, OperandText
 from interfaces.val2.syntax import (
+    BLANK,
     Expression,
-    PlainStatement,
     Program,
     Step,
     Variable,
@@ -95,9 +95,7 @@ def cached_step(text: str, line: int) -> Step:
     """The step of a line that is short enough; files repeat their lines."""
     if remark := _REMARK.match(text):
         label, _ = _label(text, line)
-        return Step(
-            PlainStatement.BLANK, label, text[remark.end() :].rstrip(), TextPosition(line, remark.start(1) + 1)
-        )
+        return Step(BLANK, label, text[remark.end() :].rstrip(), TextPosition(line, remark.start(1) + 1))
     code, comment = split_comment(text, line)
     label, begin = _label(code, line)
     found = _HEAD.match(code, begin)
@@ -106,7 +104,7 @@ def cached_step(text: str, line: int) -> Step:
         if begin < len(code):
             detail = f"unexpected {code[begin]!r}; allowed: an instruction, or a variable and '='"
             raise ValError("Syntax error", detail, place=TextPosition(line, begin + 1))
-        return Step(PlainStatement.BLANK, label, comment, TextPosition(line, 1))
+        return Step(BLANK, label, comment, TextPosition(line, 1))
     at = TextPosition(line, found.start(1) + 1)
     keyword = found[1].upper()
     if found[2]:
@@ -233,7 +231,7 @@ def unknown_directive(line: str, number: int) -> ValError:
 def _trimmed(steps: list[Step]) -> tuple[Step, ...]:
     """Without the blank lines at the end, where none says that they're the program's."""
     end = len(steps)
-    while end and steps[end - 1] == Step(PlainStatement.BLANK):
+    while end and steps[end - 1] == Step(BLANK):
         end -= 1
     return tuple(steps[:end])
 

@@ -65,7 +65,7 @@ class Player:
         self._controller = controller = Controller(self.arm, parameters=self.arm.parameters, rng=self.rng)
         for program in self.source.programs:
             controller.memory.programs[program.name] = program
-        for entry in (*self.source.locations, *self.source.reals, *self.source.strings):
+        for entry in self.source.values:
             controller.memory.set(entry.variable, entry.value)
         controller.cell = self.source.signals
 

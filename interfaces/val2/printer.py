@@ -8,31 +8,17 @@ from typing import Final
 from interfaces.val2 import forms
 from interfaces.val2.syntax import (
     Apply,
-    Assign,
     Binary,
-    Call,
-    Case,
     Compound,
-    Conditional,
     Expression,
-    For,
     Format,
-    Goto,
     Ignored,
-    Instruction,
-    Local,
-    LoopJump,
     Number,
-    PlainStatement,
     Program,
-    Prompt,
-    React,
     Statement,
     Step,
     Text,
-    Type,
     Unary,
-    Value,
     Variable,
 )
 
@@ -144,69 +130,40 @@ def _format(item: Format) -> str:
     return f"/{item.code}{width}" + ("" if item.decimals is None else f".{item.decimals}")
 
 
-_OPENING: Final = {"IF": "THEN", "WHILE": "DO", "UNTIL": ""}
-"""What stands behind the condition of a keyword."""
-
-
 def print_statement(statement: Statement) -> str:
     """The text of a statement."""
-    match statement:
-        case PlainStatement():
-            return statement.value
-        case Assign(target, value, keyword):
-            return f"{keyword} {_variable(target)} = {print_expression(value)}".lstrip()
-        case Instruction():
-            return _instruction(statement)
-        case Conditional(keyword, condition):
-            return f"{keyword} {print_expression(condition)} {_OPENING[keyword]}".rstrip()
-        case For(variable, start, stop, step):
-            head = f"FOR {_variable(variable)} = {print_expression(start)} TO {print_expression(stop)}"
-            return head if step is None else f"{head} STEP {print_expression(step)}"
-        case Case(value):
-            return f"CASE {print_expression(value)} OF"
-        case Value(values):
-            return f"VALUE {_listed(values)}:"
-        case LoopJump(keyword, count):
-            return keyword if count == 1 else f"{keyword} {count}"
-        case Goto(label, condition):
-            return f"GOTO {label}" if condition is None else f"IF {print_expression(condition)} GOTO {label}"
-        case _:
-            return _other(statement)
-
-
-def _other(statement: Statement) -> str:
-    match statement:
-        case Call(program, arguments, keyword):
-            call = f"{keyword} {program}"
-            return call if keyword == "GOSUB" and not arguments else f"{call}({_listed(arguments)})"
-        case React(signal, program, immediate, always):
-            head = f"{'REACTI' if immediate else 'REACT'} {print_expression(signal)}"
-            return head + (f", {program}" if program else "") + (" ALWAYS" if always else "")
-        case Type(items):
-            return f"TYPE {_listed(items)}".rstrip()
-        case Prompt(text, targets):
-            return f"PROMPT {_listed((text, *targets))}"
-        case Local(keyword, names, kind):
-            return " ".join(filter(None, (keyword, kind, _listed(names))))
-        case Ignored(keyword, rest):
-            return f"{keyword} {rest}".rstrip()
-        case _:
-            raise AssertionError(statement)
-
-
-def _instruction(statement: Instruction) -> str:
+    if isinstance(statement, Ignored):
+        return f"{statement.keyword} {statement.rest}".rstrip()
     if statement.begins is not None:
-        return f"AT {print_expression(statement.begins)} {_instruction(replace(statement, begins=None))}"
-    keyword, operands = statement.keyword, statement.operands
-    match keyword:
-        case "PARAMETER":
-            return f"PARAMETER {statement.words[0]} = {_listed(operands)}"
-        case "TIMER":
-            index, value = (_item(o) for o in operands)
-            return f"TIMER {index} = {value}"
-        case "ENABLE" | "DISABLE":
-            return f"{keyword} {', '.join(statement.words)}"
-    return " ".join(filter(None, (keyword, _listed(operands), *statement.words)))
+        return f"AT {print_expression(statement.begins)} {print_statement(replace(statement, begins=None))}"
+    keyword, words, listed = statement.keyword, statement.words, _listed(statement.operands)
+    match keyword, [_item(operand) for operand in statement.operands]:
+        case "=", [target, value]:
+            return f"{target} = {value}"
+        case "SET" | "DECOMPOSE" | "TIMER", [target, value]:
+            return f"{keyword} {target} = {value}"
+        case "PARAMETER", [value]:
+            return f"PARAMETER {words[0]} = {value}"
+        case "IF", [condition, *label]:
+            return f"IF {condition} GOTO {label[0]}" if label else f"IF {condition} THEN"
+        case "WHILE", [condition]:
+            return f"WHILE {condition} DO"
+        case "FOR", [variable, start, stop, *step]:
+            return " ".join([f"FOR {variable} = {start} TO {stop}", *(f"STEP {by}" for by in step)])
+        case "CASE", [value]:
+            return f"CASE {value} OF"
+        case "VALUE", _:
+            return f"VALUE {listed}:"
+        case "CALL" | "GOSUB", given:
+            return f"{keyword} {statement.program}" + (f"({listed})" if given or keyword == "CALL" else "")
+        case "REACT" | "REACTI", [signal]:
+            called = f"{signal}, {statement.program}" if statement.program else signal
+            return " ".join([keyword, called, *words])
+        case "ENABLE" | "DISABLE", _:
+            return f"{keyword} {', '.join(words)}"
+        case "AUTO" | "LOCAL" | "GLOBAL", _:
+            return " ".join([keyword, *words, listed])
+    return " ".join(filter(None, (keyword, listed, *words)))
 
 
 def print_step(step: Step) -> str:
@@ -223,28 +180,23 @@ def print_program(program: Program) -> str:
     lines = [f".PROGRAM {program.name}({parameters}){comment}"]
     level = 0
     for step in program.steps:
-        out, inside = _shape(step.statement)
+        i = step.statement
+        goes = isinstance(i, Ignored) or (i.keyword == "IF" and len(i.operands) > 1)
+        out, inside = (0, 0) if goes else _SHAPES.get(i.keyword, (0, 0))
         level = max(level - out, 0)
         lines.append(_line(step, level))
         level += inside
     return "\n".join([*lines, ".END", ""])
 
 
-def _shape(statement: Statement) -> tuple[int, int]:
-    """How many levels a statement stands further out, and how many what follows it stands further in."""
-    match statement:
-        case PlainStatement.END | Conditional("UNTIL"):
-            return 1, 0
-        case PlainStatement.ELSE | Value() | PlainStatement.ANY:
-            return 1, 1
-        case Conditional() | For() | Case() | PlainStatement.DO:
-            return 0, 1
-    return 0, 0
+_SHAPES: Final = {
+    **dict.fromkeys(("END", "UNTIL"), (1, 0)),
+    **dict.fromkeys(("ELSE", "VALUE", "ANY"), (1, 1)),
+    **dict.fromkeys(("IF", "WHILE", "FOR", "CASE", "DO"), (0, 1)),
+}
+"""How many levels a statement stands further out, and how many what follows it stands further in."""
 
 
 def _line(step: Step, level: int) -> str:
-    label = "" if step.label is None else str(step.label)
-    text = print_statement(step.statement)
-    comment = "" if step.comment is None else f";{step.comment}"
-    body = " ".join(filter(None, (text, comment)))
+    label, body = "" if step.label is None else str(step.label), print_step(replace(step, label=None))
     return (label.ljust(MARGIN - 1) + " " + " " * (INDENT * level) + body).rstrip() if body or label else ""

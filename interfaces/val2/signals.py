@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.syntax import NOWHERE, Expression
+from interfaces.val2.errors import NOWHERE, TextPosition, ValError
+from interfaces.val2.syntax import Expression
 
 OUTPUTS: Final = range(1, 33)
 INPUTS: Final = range(1001, 1033)

@@ -60,6 +60,11 @@ class SourceFile:
     strings: tuple[NamedValue, ...] = ()
     signals: tuple[SignalRule, ...] = ()
 
+    @property
+    def values(self) -> tuple[NamedValue, ...]:
+        """Of all variables."""
+        return (*self.locations, *self.reals, *self.strings)
+
 
 def parse_file(text: str, name: str) -> SourceFile:
     """What the text of a file holds.

@@ -5,36 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import MISSING, TOO_MANY, InstructionForm, nearest
+from interfaces.val2.forms import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.grammar import Node, Worded
 from interfaces.val2.syntax import (
     Apply,
-    Assign,
-    Call,
-    Case,
     Compound,
-    Conditional,
     Expression,
-    For,
-    Format,
-    Goto,
     Ignored,
     Instruction,
-    Local,
-    LoopJump,
     Number,
-    PlainStatement,
-    Prompt,
-    React,
     Statement,
     Text,
-    Type,
     Unary,
-    Value,
     Variable,
 )
 
@@ -110,7 +96,29 @@ class OperandText:
             return None
         return Apply(name, tuple(arguments), TextPosition(self.line, plain.start(1) + 1))
 
-    def require(self, form: InstructionForm) -> None:
+    def by_rule(self, row: Form, start: str) -> list[Any]:
+        """The operands that a rule of the grammar finds, by an instruction's slots; words between them left out.
+
+        Raises:
+            ValError: If the text isn't what the rule says.
+        """
+        if row.slots[0].required:
+            self.require(row)
+        elif self.empty:
+            return []
+        nodes = [node for node in self.tree(start) if getattr(node, "type", "") not in _BETWEEN]
+        return [self._by_kind(node, row.slots[min(n, len(row.slots) - 1)].kind) for n, node in enumerate(nodes)]
+
+    def _by_kind(self, node: Node, kind: str) -> Any:
+        if node is None:
+            return None
+        if kind == "variable":
+            return grammar.variable(node, self.line)
+        if kind == "label":
+            return label_of(self.expression(node), self)
+        return grammar.form_of(node, self.line) if getattr(node, "type", "") == "FORMAT" else self.expression(node)
+
+    def require(self, form: Form) -> None:
         """See that there's something.
 
         Raises:
@@ -120,9 +128,7 @@ class OperandText:
             raise ValError(MISSING, form.usage, place=self.end)
 
 
-def operands_and_words(
-    row: InstructionForm, given: list[Worded]
-) -> tuple[list[Expression | None], tuple[str, ...]]:
+def operands_and_words(row: Form, given: list[Worded]) -> tuple[list[Expression | None], tuple[str, ...]]:
     """Tell operands from words, which look like variables where no operand stands before them.
 
     Raises:
@@ -143,7 +149,7 @@ def operands_and_words(
     return operands, _ordered(row, found)
 
 
-def _ordered(row: InstructionForm, found: list[tuple[str, TextPosition]]) -> tuple[str, ...]:
+def _ordered(row: Form, found: list[tuple[str, TextPosition]]) -> tuple[str, ...]:
     words = []
     for group in row.words:
         here = [(word, at) for word, at in found if word in group]
@@ -164,7 +170,7 @@ def as_word(operand: Expression | None) -> str:
     return operand.value.upper() if isinstance(operand, Text) else ""
 
 
-def count(row: InstructionForm, operands: list[Expression | None], rest: OperandText) -> None:
+def count(row: Form, operands: list[Expression | None], rest: OperandText) -> None:
     """Count the operands.
 
     Raises:
@@ -178,34 +184,14 @@ def count(row: InstructionForm, operands: list[Expression | None], rest: Operand
             raise ValError(MISSING, f"{slot.name}; allowed: {row.usage}", place=rest.end)
 
 
-def label(token: Node, rest: OperandText) -> int:
-    """The label of a token.
-
-    Raises:
-        ValError: If there can't be such a label.
-    """
-    return checked_label(grammar.number(token, rest.line), TextPosition(rest.line, token.column))
-
-
-def checked_label(value: float, at: TextPosition) -> int:
-    """The label of a number.
-
-    Raises:
-        ValError: If there can't be such a label.
-    """
-    if not value.is_integer() or value > HIGHEST_LABEL:
-        raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=at)
-    return int(value)
-
-
-def label_of(operand: Expression | None, rest: OperandText) -> int:
+def label_of(operand: Expression | None, rest: OperandText) -> Number:
     """The label that an operand names.
 
     Raises:
         ValError: If it isn't one.
     """
-    if isinstance(operand, Number):
-        return checked_label(operand.value, operand.at)
+    if isinstance(operand, Number) and operand.value.is_integer() and operand.value <= HIGHEST_LABEL:
+        return operand
     raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=operand.at if operand else rest.start)
 
 
@@ -223,6 +209,13 @@ def reject_misspelling(kind: str, names: list[str], known: Collection[str], at: 
 
 MOST_LOOPS: Final = 100
 """What EXIT and NEXT may count."""
+_BETWEEN: Final = ("EQUALS", "TO", "STEP", "BY", "THEN", "GOTO", "DO", "OF")
+"""Words of the grammar between operands."""
+_RULES: Final = {
+    "SET": "assignment", "DECOMPOSE": "assignment", "TIMER": "timing", "IF": "branch", "WHILE": "while",
+    "UNTIL": "until", "FOR": "loop", "CASE": "case", "TYPE": "items",
+}  # fmt: skip
+"""What of the grammar stands behind keywords."""
 _CHANNEL: Final = re.compile(
     r"(\s*)\(([^()]*)\)(\s*)(?=[0-9.(A-Za-z])(?!(?:AND|X?OR|MOD|B(?:AND|X?OR)|EQ|NE|L[TE]|G[TE])(?![A-Za-z0-9_.]))",
     re.IGNORECASE | re.ASCII,
@@ -242,11 +235,14 @@ def statement(keyword: str, rest: OperandText) -> Statement:
     Raises:
         ValError: If that can't be.
     """
-    if keyword in _OWN:
-        return _OWN[keyword](keyword, rest)
     row = forms.INSTRUCTIONS.get(keyword)
+    if row is not None and keyword in _RULES:
+        operands = rest.by_rule(row, _RULES[keyword])
+        while operands and operands[-1] is None:
+            operands.pop()
+        return Instruction(keyword, tuple(operands), (), rest.at)
     if row is not None:
-        return _instruction(row, rest)
+        return _OWN.get(keyword, _instruction)(row, rest)
     if keyword in forms.IGNORED:
         return Ignored(keyword, rest.text.strip(), rest.at)
     if rest.text.lstrip().startswith("=="):
@@ -259,14 +255,9 @@ def statement(keyword: str, rest: OperandText) -> Statement:
 
 def assignment(rest: OperandText) -> Statement:
     """`x = 3`, or a location without SET before it."""
-    target, value = _assigned(rest)
+    target, value = rest.by_rule(forms.INSTRUCTIONS["SET"], "assignment")
     located = target.prefix == "#" or _is_location(value)
-    return Assign(target, value, "SET" if located else "")
-
-
-def _assigned(rest: OperandText) -> tuple[Variable, Expression]:
-    left, _, right = rest.tree("assignment")
-    return grammar.variable(left, rest.line), rest.expression(right)
+    return Instruction("SET" if located else "=", (target, value), (), rest.at)
 
 
 def _is_location(value: Expression) -> bool:
@@ -275,24 +266,24 @@ def _is_location(value: Expression) -> bool:
     return isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
 
 
-def _instruction(row: InstructionForm, rest: OperandText) -> Statement:
-    if row.keyword in ("ACCEL", "ALTER", "ALTON"):
+def _instruction(row: Form, rest: OperandText) -> Instruction:
+    if row.name in ("ACCEL", "ALTER", "ALTON"):
         _open_channel(row, rest)
     operands, words = operands_and_words(row, rest.operands())
-    if row.keyword == "ACCEL" and len(operands) == 3:
+    if row.name == "ACCEL" and len(operands) == 3:
         operands = operands[1:]
     count(row, operands, rest)
-    if row.keyword == "GRASP" and len(operands) == 2:
-        operands[1] = Number(label_of(operands[1], rest), operands[1].at if operands[1] else rest.start)
-    if row.keyword == "WAIT" and operands:
+    if row.name == "GRASP" and len(operands) == 2:
+        operands[1] = label_of(operands[1], rest)
+    if row.name == "WAIT" and operands:
         operands[0] = _channel_wait(operands[0])
-    return Instruction(row.keyword, tuple(operands), words, rest.at)
+    return Instruction(row.name, tuple(operands), words, rest.at)
 
 
-def _open_channel(row: InstructionForm, rest: OperandText) -> None:
+def _open_channel(row: Form, rest: OperandText) -> None:
     """`ALTER (1) 3` reads like `ALTER 1, 3`."""
     if found := _CHANNEL.match(rest.text):
-        inner = found[2] if found[2].strip() or row.keyword != "ACCEL" else "1"
+        inner = found[2] if found[2].strip() or row.name != "ACCEL" else "1"
         rest.text = f"{found[1]} {inner},{found[3]}{rest.text[found.end() :]}"
 
 
@@ -312,54 +303,33 @@ def timed(text: str) -> tuple[int, int, int] | None:
     return None if found is None else (found.end(1), found.start(2), found.end(2))
 
 
-def _at(keyword: str, rest: OperandText) -> Statement:
+def _at(row: Form, rest: OperandText) -> Statement:
     """`AT time`, or with a motion behind it."""
-    row, places = forms.INSTRUCTIONS[keyword], timed(rest.text)
+    places = timed(rest.text)
     if places is None:
         return _instruction(row, rest)
     end, begin, behind = places
     time = grammar.read(rest.text[:end], "expression", rest.line)
     motion = forms.INSTRUCTIONS[rest.text[begin:behind].upper()]
     made = _instruction(motion, OperandText(rest.text, behind, TextPosition(rest.line, begin + 1)))
-    assert isinstance(made, Instruction)
     return replace(made, begins=rest.expression(time))
 
 
-def _plain(keyword: str, rest: OperandText) -> Statement:
+def _plain(row: Form, rest: OperandText) -> Statement:
     if not rest.empty:
-        detail = f"unexpected '{rest.text.strip()}' behind {keyword}; allowed: the end of the line"
+        detail = f"unexpected '{rest.text.strip()}' behind {row.name}; allowed: the end of the line"
         raise ValError("Syntax error", detail, place=rest.start)
-    return PlainStatement(keyword)
+    return Instruction(row.name, (), (), rest.at)
 
 
-def _set(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    return Assign(*_assigned(rest), "SET")
-
-
-def _decompose(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    return Assign(*_assigned(rest), "DECOMPOSE")
-
-
-def _shift(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    first, *others = rest.tree("shift")
-    values = [None if n is None else rest.expression(n) for n in others if getattr(n, "type", "") != "BY"]
+def _shift(row: Form, rest: OperandText) -> Statement:
+    target, *values = rest.by_rule(row, "shift")
     if len(values) > 3:
-        raise ValError(TOO_MANY, f"allowed: {forms.INSTRUCTIONS[keyword].usage}", place=rest.end)
-    target = grammar.variable(first, rest.line)
-    return Assign(target, Apply("SHIFT", (target, *values), rest.at), "SET")
+        raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
+    return Instruction("SET", (target, Apply("SHIFT", (target, *values), rest.at)), (), rest.at)
 
 
-def _timer(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    index, _, value = rest.tree("timing")
-    return Instruction(keyword, (rest.expression(index), rest.expression(value)), (), rest.at)
-
-
-def _parameter(keyword: str, rest: OperandText) -> Statement:
-    row = forms.INSTRUCTIONS[keyword]
+def _parameter(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     found = _SETTING.match(rest.text)
     if found is None:
@@ -367,15 +337,14 @@ def _parameter(keyword: str, rest: OperandText) -> Statement:
     name = found[1].upper()
     if name not in forms.PARAMETERS:
         reject_misspelling("parameter", [name], forms.PARAMETERS, TextPosition(rest.line, found.start(1) + 1))
-        return Ignored(keyword, rest.text.strip(), rest.at)
+        return Ignored(row.name, rest.text.strip(), rest.at)
     if found[2] is None:
         raise ValError(MISSING, f"allowed: {row.usage}", place=TextPosition(rest.line, found.end() + 1))
     value = grammar.read(" " * found.end() + rest.text[found.end() :], "expression", rest.line)
-    return Instruction(keyword, (rest.expression(value),), (name,), rest.at)
+    return Instruction(row.name, (rest.expression(value),), (name,), rest.at)
 
 
-def _switches(keyword: str, rest: OperandText) -> Statement:
-    row = forms.INSTRUCTIONS[keyword]
+def _switches(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     names = []
     for operand, words in rest.operands():
@@ -386,20 +355,18 @@ def _switches(keyword: str, rest: OperandText) -> Statement:
         names.append(name)
     if any(name not in forms.SWITCHES for name in names):
         reject_misspelling("switch", names, forms.SWITCHES, rest.start)
-        return Ignored(keyword, rest.text.strip(), rest.at)
-    return Instruction(keyword, (), tuple(names), rest.at)
+        return Ignored(row.name, rest.text.strip(), rest.at)
+    return Instruction(row.name, (), tuple(names), rest.at)
 
 
-def _react(keyword: str, rest: OperandText) -> Statement:
-    row = forms.INSTRUCTIONS[keyword]
+def _react(row: Form, rest: OperandText) -> Statement:
     operands, words = operands_and_words(row, rest.operands())
     count(row, operands[:2], rest)
     if len(operands) > 3:
         raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
     signal, *others = operands
-    assert signal is not None
     program = _program_of(others[0]) if others and others[0] is not None else ""
-    return React(signal, program, keyword == "REACTI", bool(words), rest.at)
+    return Instruction(row.name, (signal,), words, rest.at, program=program)
 
 
 def _program_of(operand: Expression) -> str:
@@ -410,75 +377,38 @@ def _program_of(operand: Expression) -> str:
     raise ValError("Syntax error", "allowed: the name of a program", place=operand.at)
 
 
-def _if(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    condition, *others = rest.tree("branch")
-    built = rest.expression(condition)
-    if others and others[-1].type == "NUMBER":
-        return Goto(label(others[-1], rest), built, rest.at)
-    return Conditional("IF", built)
-
-
-def _goto(keyword: str, rest: OperandText) -> Statement:
+def _goto(row: Form, rest: OperandText) -> Statement:
     operands = rest.operands()
     if len(operands) != 1 or operands[0][1]:
-        detail = f"allowed: {forms.INSTRUCTIONS[keyword].usage}"
-        raise ValError(MISSING if rest.empty else "Syntax error", detail, place=rest.end)
-    return Goto(label_of(operands[0][0], rest), at=rest.at)
+        raise ValError(MISSING if rest.empty else "Syntax error", f"allowed: {row.usage}", place=rest.end)
+    return Instruction(row.name, (label_of(operands[0][0], rest),), (), rest.at)
 
 
-def _while(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    return Conditional("WHILE", rest.expression(rest.tree("while")[0]))
-
-
-def _until(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    return Conditional("UNTIL", rest.expression(rest.tree("until")[0]))
-
-
-def _case(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    return Case(rest.expression(rest.tree("case")[0]))
-
-
-def _value(keyword: str, rest: OperandText) -> Statement:
-    trimmed = rest.text.rstrip()
-    rest.text = trimmed.removesuffix(":")
-    row = forms.INSTRUCTIONS[keyword]
+def _value(row: Form, rest: OperandText) -> Statement:
+    rest.text = rest.text.rstrip().removesuffix(":")
     rest.require(row)
-    values = []
-    for operand, words in rest.operands():
+    operands = rest.operands()
+    for operand, words in operands:
         if operand is None or words:
             raise ValError("Syntax error", f"allowed: {row.usage}", place=words[0][1] if words else rest.start)
-        values.append(operand)
-    return Value(tuple(values))
+    return Instruction(row.name, tuple(operand for operand, _ in operands), (), rest.at)
 
 
-def _any(keyword: str, rest: OperandText) -> Statement:
+def _any(row: Form, rest: OperandText) -> Statement:
     rest.text = rest.text.rstrip().removesuffix(":")
-    return _plain(keyword, rest)
+    return _plain(row, rest)
 
 
-def _for(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
-    children = [n for n in rest.tree("loop") if getattr(n, "type", "") not in ("TO", "STEP", "EQUALS")]
-    step = rest.expression(children[3]) if len(children) > 3 and children[3] is not None else None
-    return For(
-        grammar.variable(children[0], rest.line), rest.expression(children[1]), rest.expression(children[2]), step
-    )
-
-
-def _loops(keyword: str, rest: OperandText) -> Statement:
+def _loops(row: Form, rest: OperandText) -> Statement:
     text, count = rest.text.strip(), 1
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
     if text and not (plain and 1 <= (count := int(text)) <= MOST_LOOPS):
         raise ValError("Syntax error", f"allowed: a number of loops, 1 to {MOST_LOOPS}", place=rest.start)
-    return LoopJump("EXIT" if keyword == "EXIT" else "NEXT", count, rest.at)
+    return Instruction(row.name, (Number(float(count)),) if count > 1 else (), (), rest.at)
 
 
-def _call(keyword: str, rest: OperandText) -> Statement:
-    rest.require(forms.INSTRUCTIONS[keyword])
+def _call(row: Form, rest: OperandText) -> Statement:
+    rest.require(row)
     name, arguments = rest.tree("call")
     if not _NAME.fullmatch(name):
         raise ValError("Syntax error", "allowed: the name of a program", place=TextPosition(rest.line, name.column))
@@ -489,76 +419,45 @@ def _call(keyword: str, rest: OperandText) -> Statement:
         given.append(None if node is None else rest.expression(node))
     if given == [None]:
         given = []
-    return Call(grammar.name_of(name), tuple(given), keyword, rest.at)
+    return Instruction(row.name, tuple(given), (), rest.at, program=grammar.name_of(name))
 
 
-def items(rest: OperandText) -> tuple[Expression | Format, ...]:
-    """What TYPE prints."""
-    if rest.empty:
-        return ()
-    listed: list[Expression | Format] = []
-    for node in rest.tree("items"):
-        is_format = getattr(node, "type", "") == "FORMAT"
-        listed.append(grammar.form_of(node, rest.line) if is_format else rest.expression(node))
-    return tuple(listed)
-
-
-def _prompt(keyword: str, rest: OperandText) -> Statement:
-    operands = rest.operands()
-    row = forms.INSTRUCTIONS[keyword]
-    targets = []
+def _prompt(row: Form, rest: OperandText) -> Statement:
+    operands, targets = rest.operands(), []
+    first = operands[0][0] if operands else None
     for operand, words in operands:
         if words:
             raise ValError("Syntax error", f"unexpected {words[0][0]}; allowed: {row.usage}", place=words[0][1])
-        if operand is not operands[0][0]:
+        if operand is not first:
             if not isinstance(operand, Variable) or operand.array:
                 at = operand.at if operand is not None else rest.start
                 raise ValError("Syntax error", "allowed: variables behind the text", place=at)
             targets.append(operand)
-    text = operands[0][0] if operands else None
-    return Prompt(Text("", rest.at) if text is None else text, tuple(targets))
+    text = Text("", rest.at) if first is None else first
+    return Instruction(row.name, (text, *targets), (), rest.at)
 
 
-def _local(keyword: str, rest: OperandText) -> Statement:
-    kind = ""
+def _local(row: Form, rest: OperandText) -> Statement:
+    words: tuple[str, ...] = ()
     if found := _KIND.match(rest.text):
-        kind = "LOC" if found[1].upper() == "LOC" else "REAL"
+        words = ("LOC" if found[1].upper() == "LOC" else "REAL",)
         rest.text = " " * found.end() + rest.text[found.end() :]
-    rest.require(forms.INSTRUCTIONS[keyword])
-    names = tuple(grammar.variable(node, rest.line) for node in rest.tree("names"))
-    return Local(keyword, names, kind)
+    return Instruction(row.name, tuple(rest.by_rule(row, "names")), words, rest.at)
 
 
-_OWN: Final[dict[str, Callable[[str, OperandText], Statement]]] = {
+_OWN: Final[dict[str, Callable[[Form, OperandText], Statement]]] = {
+    **dict.fromkeys(("ELSE", "END", "DO", "RETURN"), _plain),
+    **dict.fromkeys(("ENABLE", "DISABLE"), _switches),
+    **dict.fromkeys(("REACT", "REACTI"), _react),
+    **dict.fromkeys(("EXIT", "NEXT"), _loops),
+    **dict.fromkeys(("CALL", "GOSUB"), _call),
+    **dict.fromkeys(("AUTO", "LOCAL", "GLOBAL"), _local),
     "AT": _at,
-    "SET": _set,
-    "DECOMPOSE": _decompose,
     "SHIFT": _shift,
-    "TIMER": _timer,
     "PARAMETER": _parameter,
-    "ENABLE": _switches,
-    "DISABLE": _switches,
-    "REACT": _react,
-    "REACTI": _react,
-    "IF": _if,
-    "ELSE": _plain,
-    "END": _plain,
-    "WHILE": _while,
-    "DO": _plain,
-    "UNTIL": _until,
-    "FOR": _for,
-    "CASE": _case,
     "VALUE": _value,
     "ANY": _any,
-    "EXIT": _loops,
-    "NEXT": _loops,
     "GOTO": _goto,
-    "CALL": _call,
-    "GOSUB": _call,
-    "RETURN": _plain,
-    "TYPE": lambda _, rest: Type(items(rest)),
     "PROMPT": _prompt,
-    "AUTO": _local,
-    "LOCAL": _local,
-    "GLOBAL": _local,
 }
+"""Keywords whose operands aren't a list between commas, nor a rule of the grammar."""

@@ -8,23 +8,7 @@ from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.memory import where
-from interfaces.val2.syntax import (
-    Assign,
-    Case,
-    Conditional,
-    For,
-    Goto,
-    Instruction,
-    Local,
-    LoopJump,
-    Number,
-    PlainStatement,
-    Program,
-    Step,
-    Type,
-    Value,
-)  # fmt: skip
+from interfaces.val2.syntax import Instruction, Number, Program, Step
 
 BlockKind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
 _LOOPS: Final = ("WHILE", "DO", "FOR")
@@ -130,31 +114,21 @@ class _Surveyor:
 
     def _step(self, i: int, step: Step) -> None:
         match step.statement:
-            case Conditional("UNTIL"):
-                self._until(i)
-            case Conditional("IF" | "WHILE" as keyword):
-                self._begin(keyword, i)
-            case PlainStatement.DO:
-                self._begin("DO", i)
-            case For():
-                self._begin("FOR", i)
-            case Case():
-                self._begin("CASE", i)
-            case PlainStatement.ELSE:
-                self._else(i)
-            case Value():
-                self._value(i, last=False)
-            case PlainStatement.ANY:
-                self._value(i, last=True)
-            case PlainStatement.END:
-                self._end(i)
-            case LoopJump(keyword, count, at):
-                self._loop(i, keyword, count, at)
-            case Goto(label, _, at):
-                self._goto(i, label, at)
-            case Instruction("GRASP", (_, Number(label))):
+            case Instruction("IF" | "GRASP", (_, Number(label))):
                 self._goto(i, int(label), step.statement.at)
-            case PlainStatement.BLANK:
+            case Instruction("GOTO", (Number(label),), at=at):
+                self._goto(i, int(label), at)
+            case Instruction("IF" | "WHILE" | "DO" | "FOR" | "CASE" as keyword):
+                self._begin(keyword, i)
+            case Instruction("ELSE"):
+                self._else(i)
+            case Instruction("VALUE" | "ANY" as keyword):
+                self._value(i, keyword)
+            case Instruction("END" | "UNTIL" as keyword):
+                self._end(i, keyword)
+            case Instruction("EXIT" | "NEXT" as keyword, count):
+                self._loop(i, keyword, int(count[0].value) if count else 1, step.statement.at)
+            case Instruction(""):
                 pass
             case _ if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
                 self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
@@ -175,14 +149,13 @@ class _Surveyor:
             self._open[-1].closed = True
             self._open[-1].arms.append(i)
 
-    def _value(self, i: int, *, last: bool) -> None:
-        word = "ANY" if last else "VALUE"
+    def _value(self, i: int, word: str) -> None:
         if not self._open or self._open[-1].kind != "CASE":
             self._fail(i, f"{word} is allowed between CASE and END{self._within()}")
         elif self._open[-1].closed:
             self._fail(i, f"{word} behind ANY")
         else:
-            self._open[-1].closed = last
+            self._open[-1].closed = word == "ANY"
             self._open[-1].arms.append(i)
 
     def _within(self) -> str:
@@ -191,19 +164,11 @@ class _Surveyor:
         inner = self._open[-1]
         return f"; {inner.kind} of step {inner.start + 1} is still open"
 
-    def _end(self, i: int) -> None:
-        if not self._open or self._open[-1].kind == "DO":
-            self._fail(i, f"END without IF, WHILE, FOR or CASE{self._within()}")
+    def _end(self, i: int, word: str) -> None:
+        if not self._open or (self._open[-1].kind == "DO") != (word == "UNTIL"):
+            needed = "DO" if word == "UNTIL" else "IF, WHILE, FOR or CASE"
+            self._fail(i, f"{word} without {needed}{self._within()}")
             return
-        self._close(i)
-
-    def _until(self, i: int) -> None:
-        if not self._open or self._open[-1].kind != "DO":
-            self._fail(i, f"UNTIL without DO{self._within()}")
-            return
-        self._close(i)
-
-    def _close(self, i: int) -> None:
         inner = self._open.pop()
         block = StructureBlock(inner.kind, inner.start, i, tuple(inner.arms))
         for part in (block.start, *block.arms, i):
@@ -219,7 +184,7 @@ class _Surveyor:
                 self.jumps[i] = block.start + 1
             case "CASE":
                 for arm, following in zip((block.start, *block.arms), (*block.arms, i + 1), strict=True):
-                    if self._program.steps[arm].statement is not PlainStatement.ANY:
+                    if self._program.steps[arm].statement.keyword != "ANY":
                         self.jumps[arm] = following
         self.jumps.update(dict.fromkeys(inner.exits, i + 1))
         self.jumps.update(dict.fromkeys(inner.nexts, i))
@@ -244,28 +209,27 @@ class _Surveyor:
 
 
 _MEANWHILE: Final = {
-    "SIGNAL", "RESET", "ENABLE", "DISABLE", "PARAMETER", "TIMER", "SPEED", "HERE", "ALTOUT", "ALTER", "NOALTER",
+    "=", "SET", "DECOMPOSE", "TYPE", "SIGNAL", "RESET", "ENABLE", "DISABLE", "PARAMETER", "TIMER", "SPEED", "HERE",
+    "ALTOUT", "ALTER", "NOALTER",
 }  # fmt: skip
-"""What DO may do while a program runs, beside assignments and TYPE."""
+"""What DO may do while a program runs."""
+_OF_PROGRAMS: Final = {
+    "ELSE", "END", "DO", "ANY", "RETURN", "IF", "WHILE", "UNTIL", "FOR", "CASE", "VALUE", "EXIT", "NEXT", "GOTO",
+    "AUTO", "LOCAL", "GLOBAL",
+}  # fmt: skip
+"""What can't stand alone."""
 
 
-def standalone_error(step: Step, at: TextPosition) -> ValError | None:
+def standalone_error(step: Step) -> ValError | None:
     """Why a step can't stand alone, as DO wants it; None if it can."""
-    match step.statement:
-        case PlainStatement.BLANK:
-            return None
-        case PlainStatement() | Conditional() | For() | Case() | Value() | LoopJump() | Goto() | Local():
-            return ValError("Control structure error", "it's for programs", place=where(at))
-        case _:
-            return None
+    if isinstance(step.statement, Instruction) and step.statement.keyword in _OF_PROGRAMS:
+        return ValError("Control structure error", "it's for programs", place=step.at)
+    return None
 
 
 def runs_beside_program(step: Step) -> bool:
     """Whether a step takes no time and moves nothing."""
-    match step.statement:
-        case Assign() | Type():
-            return True
-        case Instruction(keyword, _, words):
-            return keyword in _MEANWHILE and (keyword != "SPEED" or "MONITOR" in words)
-        case _:
-            return False
+    i = step.statement
+    if not isinstance(i, Instruction) or (i.keyword == "SPEED" and "MONITOR" not in i.words):
+        return False
+    return i.keyword in _MEANWHILE

@@ -8,13 +8,9 @@ alone are equal.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import StrEnum
-from typing import Literal, TypeAlias
+from typing import Any, Final, TypeAlias
 
-from interfaces.val2.errors import TextPosition
-
-NOWHERE = TextPosition(0, 0)
-"""Of what was made, not read."""
+from interfaces.val2.errors import NOWHERE, TextPosition
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,121 +87,6 @@ class Compound:
 Expression: TypeAlias = Number | Text | Variable | Apply | Unary | Binary | Compound
 
 
-class PlainStatement(StrEnum):
-    """A statement that is its keyword alone."""
-
-    BLANK = ""
-    """Nothing, or a comment alone."""
-    ELSE = "ELSE"
-    END = "END"
-    """Of an `IF`, `WHILE`, `FOR` or `CASE`."""
-    DO = "DO"
-    """Until `UNTIL`."""
-    ANY = "ANY"
-    """Of a `CASE`."""
-    RETURN = "RETURN"
-    """From a program that was called."""
-
-
-@dataclass(frozen=True, slots=True)
-class Assign:
-    """`x = 3`, `SET p = a:b` or `DECOMPOSE a[1] = location`: variables get a value."""
-
-    target: Variable
-    value: Expression
-    keyword: Literal["", "SET", "DECOMPOSE"] = ""
-    """Nothing for a real or a string, `SET` for a location, `DECOMPOSE` for six numbers from an element on."""
-
-
-@dataclass(frozen=True, slots=True)
-class Instruction:
-    """A keyword with its operands, as `forms.py` describes it: `MOVE`, `SPEED`, `SIGNAL`, `OPENI`..."""
-
-    keyword: str
-    """Upper case."""
-    operands: tuple[Expression | None, ...] = ()
-    """None for one that was left out."""
-    words: tuple[str, ...] = ()
-    """Words after them, upper case, in the order of `forms.py`: `MMPS`, `ALWAYS`; a switch's name for `ENABLE`."""
-    at: TextPosition = field(default=NOWHERE, compare=False)
-    begins: Expression | None = None
-    """Time of `AT time` before a motion, on the same line."""
-
-
-@dataclass(frozen=True, slots=True)
-class Conditional:
-    """`IF condition THEN`, `WHILE condition DO` or `UNTIL condition`."""
-
-    keyword: Literal["IF", "WHILE", "UNTIL"]
-    condition: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class For:
-    """`FOR variable = start TO stop STEP step`."""
-
-    variable: Variable
-    start: Expression
-    stop: Expression
-    step: Expression | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """`CASE value OF`."""
-
-    value: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """`VALUE a, b:` of a `CASE`."""
-
-    values: tuple[Expression, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class LoopJump:
-    """`EXIT n` leaves the n innermost loops, `NEXT n` goes to the next turn of the n-th innermost one."""
-
-    keyword: Literal["EXIT", "NEXT"]
-    count: int = 1
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Goto:
-    """`GOTO label`, or `IF condition GOTO label`."""
-
-    label: int
-    condition: Expression | None = None
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Call:
-    """`CALL program(arguments)`, or `GOSUB program`."""
-
-    program: str
-    arguments: tuple[Expression | None, ...] = ()
-    keyword: str = "CALL"
-    """`CALL` or `GOSUB`."""
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class React:
-    """`REACT signal, program ALWAYS`: call a program when a signal turns on (off if it's negative)."""
-
-    signal: Expression
-    program: str = ""
-    """What is called; empty to return from the program that runs."""
-    immediate: bool = False
-    """`REACTI`: the present motion is stopped at once."""
-    always: bool = False
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
 @dataclass(frozen=True, slots=True)
 class Format:
     """A control item of `TYPE` and `$ENCODE`: `/S`, `/C2`, `/X3`, `/F8.2`, `/I4`, `/D`..."""
@@ -217,29 +98,25 @@ class Format:
 
 
 @dataclass(frozen=True, slots=True)
-class Type:
-    """`TYPE item, item`; also what `$ENCODE` takes."""
+class Instruction:
+    """A keyword with its operands, as `forms.py` describes it: `MOVE`, `IF`, `CALL`, `TYPE`..
 
-    items: tuple[Expression | Format, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Prompt:
-    """`PROMPT "text", variable, variable`."""
-
-    text: Expression
-    targets: tuple[Variable, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Local:
-    """`AUTO x, y[10]`, `LOCAL x`, `GLOBAL x`: names of the program's own."""
+    `=` is an assignment to a real or a string, `SET` to a location. The keyword of a blank line, or of a comment
+    alone, is empty. `IF .. GOTO` has its label as second operand.
+    """
 
     keyword: str
-    """`AUTO`, `LOCAL` or `GLOBAL`."""
-    names: tuple[Variable, ...]
-    kind: str = ""
-    """`REAL`, `LOC`, or nothing."""
+    """Upper case."""
+    operands: tuple[Any, ...] = ()
+    """Expressions, `Format` among them for `TYPE`; None for one that was left out."""
+    words: tuple[str, ...] = ()
+    """Words after them, upper case, in the order of `forms.py`: `MMPS`, `ALWAYS`; names of switches, or of a
+    parameter; `REAL` or `LOC` of `AUTO` and its like."""
+    at: TextPosition = field(default=NOWHERE, compare=False)
+    begins: Expression | None = None
+    """Time of `AT time` before a motion, on the same line."""
+    program: str = ""
+    """What `CALL`, `GOSUB` and `REACT` call; empty for `REACT` that returns from the program that runs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,10 +129,9 @@ class Ignored:
     at: TextPosition = field(default=NOWHERE, compare=False)
 
 
-Statement: TypeAlias = (
-    PlainStatement | Assign | Instruction | Conditional | For | Case | Value | LoopJump | Goto | Call | React | Type
-    | Prompt | Local | Ignored
-)  # fmt: skip
+Statement: TypeAlias = Instruction | Ignored
+BLANK: Final = Instruction("")
+"""Nothing, or a comment alone."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,14 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, TypeAlias
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout, locations, running, settings, storage
 from interfaces.val2.monitor.editor import edit
-from interfaces.val2.monitor.state import Dialogue, TerminalState, split_word, unique
+from interfaces.val2.monitor.state import Dialogue, TerminalState, nothing, split_word, unique
 
 Handler: TypeAlias = Callable[[TerminalState, str], Dialogue | None]
 """Carries a command out, with what follows its name; gives what takes the next line, or None for commands."""
@@ -50,11 +51,24 @@ class MonitorCommand:
     """An extension, not VAL's."""
     whole: bool = False
     """Its name can't be abbreviated."""
+    bare: bool = False
+    """Nothing may follow its name."""
 
     @property
     def usage(self) -> tuple[str, ...]:
         """Each form with the name."""
         return tuple(f"{self.name} {form.strip()}".rstrip() for form in self.forms.split("|"))
+
+    def carry_out(self, state: TerminalState, rest: str) -> Dialogue | None:
+        """Do it; gives what takes the next line, or None for commands.
+
+        Raises:
+            ValError: If it can't be done.
+        """
+        assert self.act is not None
+        if self.bare:
+            nothing(rest, self.name)
+        return self.act(state, rest)
 
     def only_shows(self, rest: str) -> bool:
         """Whether it changes nothing, with what follows its name."""
@@ -172,86 +186,93 @@ def _near(word: str) -> str:
 
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "",
-                   "Stop the program and the arm, within its limits; Ctrl-C does the same."),
+                   "Stop the program and the arm, within its limits; Ctrl-C does the same.", bare=True),
     MonitorCommand("AT", running.at, "t | +t [motion]",
                    "The next motion begins at a time, or so long from now [s].", idle=True, ours=True),
-    MonitorCommand("BASE", locations.base, "| dx,dy,dz,turn",
+    MonitorCommand("BASE", partial(locations.frame, word="BASE"), "| dx,dy,dz,turn",
                    "Show the base, or set it: mm, and deg about Z.", need=_ARGUMENT, idle=True),
-    MonitorCommand("CALIBRATE", settings.calibrate, "", "Make joint values valid; asks first.", idle=True),
-    MonitorCommand("COPY", storage.copy, "new=old", "Copy a program."),
+    MonitorCommand("CALIBRATE", settings.calibrate, "", "Make joint values valid; asks first.", idle=True,
+                   bare=True),
+    MonitorCommand("COPY", partial(storage.put, keep=True), "new=old", "Copy a program."),
     MonitorCommand("DELETE", storage.delete_programs, "program,..", "Delete programs; asks first.", idle=True),
-    MonitorCommand("DELETEL", storage.delete_values("location"), "location,..",
+    MonitorCommand("DELETEL", partial(storage.delete_values, kind="locations"), "location,..",
                    "Delete locations; asks first.", idle=True),
     MonitorCommand("DELETEP", storage.delete_programs, "program,..", "Delete programs; asks first.", idle=True),
-    MonitorCommand("DELETER", storage.delete_values("real"), "real,..", "Delete reals; asks first.", idle=True),
-    MonitorCommand("DELETES", storage.delete_values("string"), "$string,..",
+    MonitorCommand("DELETER", partial(storage.delete_values, kind="reals"), "real,..", "Delete reals; asks first.",
+                   idle=True),
+    MonitorCommand("DELETES", partial(storage.delete_values, kind="strings"), "$string,..",
                    "Delete strings; asks first.", idle=True),
     MonitorCommand("DIRECTORY", storage.directory, "", "List the programs in memory.", need=_LOOK),
-    MonitorCommand("DISABLE", settings.disable, "switch,..", "Turn switches off."),
-    MonitorCommand("DO", running.do, "instruction |",
-                   "Carry out one instruction; without one, the last again.", idle=True),
+    MonitorCommand("DISABLE", partial(settings.turn, on=False), "switch,..", "Turn switches off."),
+    MonitorCommand("DO", running.do, "instruction |", "Carry out one instruction; without one, the last again.",
+                   idle=True),
     MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.", idle=True),
-    MonitorCommand("ENABLE", settings.enable, "switch,..", "Turn switches on; ENABLE POWER after PANIC."),
+    MonitorCommand("ENABLE", partial(settings.turn, on=True), "switch,..",
+                   "Turn switches on; ENABLE POWER after PANIC."),
     MonitorCommand("EXECUTE", running.execute, "program[(arguments)][,cycles[,step]] |",
                    "Run a program, or the last; cycles -1 for ever.", idle=True),
     MonitorCommand("EXIT", None, "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
     MonitorCommand("FLIST", storage.flist, "", "List the files.", need=_LOOK),
-    MonitorCommand("FREE", storage.free, "", "Show what is in memory.", need=_LOOK),
+    MonitorCommand("FREE", storage.free, "", "Show what is in memory.", need=_LOOK, bare=True),
     MonitorCommand("HELP", help_, "| word", "List the commands, or explain a word of the language.", need=_LOOK),
     MonitorCommand("HERE", locations.here, "location | #location | a:b",
                    "Record where the arm is; then CR, or changes: ,,10"),
-    MonitorCommand("ID", storage.identity, "", "Show what this is, and its version.", need=_LOOK),
-    MonitorCommand("IO", settings.io, "", "Show inputs, outputs and internal signals.", need=_LOOK),
+    MonitorCommand("ID", lambda s, _: s.say(s.version), "", "Show what this is, and its version.", need=_LOOK,
+                   bare=True),
+    MonitorCommand("IO", settings.io, "", "Show inputs, outputs and internal signals.", need=_LOOK, bare=True),
     MonitorCommand("LISTF", storage.flist, "", "List the files.", need=_LOOK),
-    MonitorCommand("LISTL", storage.listl, "| location,..",
-                   "List locations; * stands for any characters.", need=_LOOK),
+    MonitorCommand("LISTL", storage.listl, "| location,..", "List locations; * stands for any characters.",
+                   need=_LOOK),
     MonitorCommand("LISTP", storage.listp, "| program,..", "List programs.", need=_LOOK),
     MonitorCommand("LISTR", storage.listr, "| real,.. | expression",
                    "List reals, or show what an expression comes to.", need=_LOOK),
     MonitorCommand("LISTS", storage.lists, "| $string,.. | expression",
                    "List strings, or show what an expression comes to.", need=_LOOK),
     MonitorCommand("LOAD", storage.load, "file", "Read programs and values from a file."),
-    MonitorCommand("NEXT", running.next_, "| n",
-                   "Carry out the next step of a program that stands, or the next n.", idle=True),
+    MonitorCommand("NEXT", running.next_, "| n", "Carry out the next step of a program that stands, or the next n.",
+                   idle=True),
     MonitorCommand("PANIC", running.panic, "", "Stop at once and turn the power off."),
-    MonitorCommand("PARAMETER", settings.parameter, "| name | name=value",
-                   "Show or set parameters.", need=_ARGUMENT),
+    MonitorCommand("PARAMETER", settings.parameter, "| name | name=value", "Show or set parameters.",
+                   need=_ARGUMENT),
     MonitorCommand("POINT", locations.point, "location[=expression]",
                    "Define or change a location; then CR, or changes: ,,10"),
-    MonitorCommand("PROCEED", running.proceed, "",
-                   "Go on with a program that stands, at its next step.", idle=True),
+    MonitorCommand("PROCEED", lambda s, _: s.controller.proceed(now=s.now), "",
+                   "Go on with a program that stands, at its next step.", idle=True, bare=True),
     MonitorCommand("QUIT", None, "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
-    MonitorCommand("RENAME", storage.rename, "new=old", "Rename a program.", idle=True),
-    MonitorCommand("RESET", settings.reset, "", "Turn all outputs off."),
-    MonitorCommand("RETRY", running.retry, "",
-                   "Go on with a program that stands, at the step that was interrupted.", idle=True),
-    MonitorCommand("REWIND", locations.rewind, "t | -t",
-                   "Show what WHERE showed at a time, or so long ago [s].", need=_LOOK, ours=True),
-    MonitorCommand("SIGNAL", settings.signal, "| n,-m,..",
-                   "Turn signals on, or off with a minus; show them.", need=_ARGUMENT),
-    MonitorCommand("SPEED", settings.speed, "| percent",
-                   "Show or set the monitor speed; it counts at once.", need=_ARGUMENT),
-    MonitorCommand("STATUS", running.status, "",
-                   "Show the program, its step and cycles, speeds, power.", need=_LOOK),
-    MonitorCommand("STORE", storage.store(""), "file[=program,..]",
+    MonitorCommand("RENAME", partial(storage.put, keep=False), "new=old", "Rename a program.", idle=True),
+    MonitorCommand("RESET", lambda s, _: s.controller.signals.reset(), "", "Turn all outputs off.", bare=True),
+    MonitorCommand("RETRY", lambda s, _: s.controller.retry(now=s.now), "",
+                   "Go on with a program that stands, at the step that was interrupted.", idle=True, bare=True),
+    MonitorCommand("REWIND", locations.rewind, "t | -t", "Show what WHERE showed at a time, or so long ago [s].",
+                   need=_LOOK, ours=True),
+    MonitorCommand("SIGNAL", settings.signal, "| n,-m,..", "Turn signals on, or off with a minus; show them.",
+                   need=_ARGUMENT),
+    MonitorCommand("SPEED", settings.speed, "| percent", "Show or set the monitor speed; it counts at once.",
+                   need=_ARGUMENT),
+    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.",
+                   need=_LOOK, bare=True),
+    MonitorCommand("STORE", partial(storage.store, parts=""), "file[=program,..]",
                    "Write programs, with all that they use, to a file."),
-    MonitorCommand("STOREL", storage.store("L"), "file[=location,..]", "Write locations to a file."),
-    MonitorCommand("STOREP", storage.store("P"), "file[=program,..]", "Write programs to a file."),
-    MonitorCommand("STORER", storage.store("R"), "file[=real,..]", "Write reals to a file."),
-    MonitorCommand("STORES", storage.store("S"), "file[=$string,..]", "Write strings to a file."),
+    MonitorCommand("STOREL", partial(storage.store, parts="locations"), "file[=location,..]",
+                   "Write locations to a file."),
+    MonitorCommand("STOREP", partial(storage.store, parts="programs"), "file[=program,..]",
+                   "Write programs to a file."),
+    MonitorCommand("STORER", partial(storage.store, parts="reals"), "file[=real,..]", "Write reals to a file."),
+    MonitorCommand("STORES", partial(storage.store, parts="strings"), "file[=$string,..]",
+                   "Write strings to a file."),
     MonitorCommand("SWITCH", settings.switch, "| switch,..", "Show switches.", need=_LOOK),
-    MonitorCommand("TEACH", locations.teach, "location",
-                   "Record one location after the other, each by CR; E ends.", idle=True),
-    MonitorCommand("TIMELINE", running.timeline, "", "Show what is scheduled.", need=_LOOK, ours=True),
-    MonitorCommand("TOOL", locations.tool, "| transformation",
-                   "Show the tool, or set it.", need=_ARGUMENT, idle=True),
-    MonitorCommand("UNDO", running.undo, "",
-                   "Take back the newest motion, as far as it's still to come.", ours=True),
+    MonitorCommand("TEACH", locations.teach, "location", "Record one location after the other, each by CR; E ends.",
+                   idle=True),
+    MonitorCommand("TIMELINE", running.timeline, "", "Show what is scheduled.", need=_LOOK, ours=True, bare=True),
+    MonitorCommand("TOOL", partial(locations.frame, word="TOOL"), "| transformation", "Show the tool, or set it.",
+                   need=_ARGUMENT, idle=True),
+    MonitorCommand("UNDO", lambda s, _: s.say(s.controller.arm.undo(now=s.now)), "",
+                   "Take back the newest motion, as far as it's still to come.", ours=True, bare=True),
     MonitorCommand("WHERE", locations.where, "| 1 | REAL",
                    "Show where the arm is; 1 repeats until CR, REAL: the other twin.", need=_LOOK),
     MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
                    "Begin a program step by step, or do its next step.", idle=True),
-    MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),
+    MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True, bare=True),
 )  # fmt: skip
 
 COMMANDS: Final = {command.name: command for command in _TABLE}

@@ -93,7 +93,7 @@ def _command(before: str, state: TerminalState) -> Iterable[Suggestion]:
 def _instruction(before: str, state: TerminalState) -> Iterator[Suggestion]:
     word, _ = split_word(_LABEL.sub("", before))
     if not word:
-        yield from (Suggestion(one.keyword, one.help) for one in forms.INSTRUCTIONS.values())
+        yield from (Suggestion(one.name, one.help) for one in forms.INSTRUCTIONS.values())
         yield from _names(state, "real", "string")
         return
     keyword = word.upper()

@@ -87,6 +87,7 @@ class Free(Control):
 
     held = True
     """It's there."""
+    fault_poll_interval = math.inf
 
     @override
     def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
@@ -107,11 +108,6 @@ class Free(Control):
     @override
     def fault(self, *, now: float) -> ValError | None:
         return None
-
-    @property
-    @override
-    def fault_poll_interval(self) -> float:
-        return math.inf
 
 
 class TerminalListener(Protocol):
@@ -236,6 +232,8 @@ _FAULT_POLL: Final = 0.1
 
 class LeaseControl(Control):
     """The lease of a connection, kept by the connection until it's released; or the share of a person's lease."""
+
+    fault_poll_interval = _FAULT_POLL
 
     def __init__(self, connection: Connection) -> None:
         """Ask for nothing yet.
@@ -374,8 +372,3 @@ class LeaseControl(Control):
             self._resumed = now
             connection.resume(wait=0.0)
         return robot_halted(state.halted, commanded=commanded)
-
-    @property
-    @override
-    def fault_poll_interval(self) -> float:
-        return _FAULT_POLL

@@ -16,13 +16,7 @@ from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, intege
 from interfaces.val2.parser import parse_line, parse_program
 from interfaces.val2.printer import print_program, print_step
 from interfaces.val2.structure import structure
-from interfaces.val2.syntax import (
-    Instruction,
-    PlainStatement,
-    Program,
-    Step,
-    Variable,
-)
+from interfaces.val2.syntax import BLANK, Instruction, Program, Step, Variable
 
 HELP: Final = (
     "an instruction   takes the place of this step, or comes after the last one",
@@ -193,7 +187,7 @@ class Editor:
         if self._at > len(self.program.steps) or self.done:
             return []
         step = self.program.steps[self._at - 1]
-        text = "" if step == Step(PlainStatement.BLANK) else print_step(step)
+        text = "" if step == Step(BLANK) else print_step(step)
         return layout.numbered([text], self._at)
 
 

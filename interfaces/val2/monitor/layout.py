@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from interfaces.val2.ports import Where
+from interfaces.val2.motion.places import Where
 from interfaces.val2.syntax import Number, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, to_oat
 

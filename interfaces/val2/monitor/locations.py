@@ -12,7 +12,7 @@ from typing_extensions import override
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, TerminalState, as_location, halves, nothing, pieces
-from interfaces.val2.ports import Where
+from interfaces.val2.motion.places import Where
 from interfaces.val2.syntax import Compound, Number, Variable
 from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation, from_oat
 
@@ -256,17 +256,10 @@ def following(variable: Variable) -> Variable:
     return replace(variable, name=f"{found[1]}{int(found[2]) + 1}")
 
 
-def tool(state: TerminalState, rest: str) -> None:
-    """TOOL, TOOL transformation."""
+def frame(state: TerminalState, rest: str, *, word: str) -> None:
+    """TOOL, TOOL transformation; BASE, BASE dx,dy,dz,turn."""
+    arm = state.controller.arm
     if rest in {"", "?"}:
-        state.say(layout.heading(), layout.row(state.controller.arm.tool()))
+        state.say(layout.heading(), layout.row(arm.tool() if word == "TOOL" else arm.base()))
     else:
-        state.controller.do(state.instruction("TOOL", rest), now=state.now)
-
-
-def base(state: TerminalState, rest: str) -> None:
-    """BASE, BASE dx,dy,dz,turn."""
-    if rest in {"", "?"}:
-        state.say(layout.heading(), layout.row(state.controller.arm.base()))
-    else:
-        state.controller.do(state.instruction("BASE", rest), now=state.now)
+        state.controller.do(state.instruction(word, rest), now=state.now)

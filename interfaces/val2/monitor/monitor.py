@@ -233,7 +233,7 @@ class TerminalMonitor:
         running = self.state.controller.running
         if command.idle and running and command.name != "DO":
             raise ValError("Program running", f"{command.name} must wait, or ABORT it")
-        self._dialogue = command.act(self.state, rest)
+        self._dialogue = command.carry_out(self.state, rest)
         if command.name == "ENABLE":
             self._shared.resume(now=self.state.now)
 

@@ -9,13 +9,9 @@ from typing import Final
 from interfaces.val2.controller import ControllerStatus
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.state import Style, TerminalState, integer, named, nothing, pieces
+from interfaces.val2.monitor.state import Style, TerminalState, integer, named, pieces
 from interfaces.val2.statements import timed
-from interfaces.val2.syntax import (
-    Call,
-    Expression,
-    PlainStatement,
-)
+from interfaces.val2.syntax import BLANK, Expression, Instruction
 
 FOREVER: Final = -1
 """Cycles that never end."""
@@ -27,7 +23,7 @@ _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 def do(state: TerminalState, rest: str) -> None:
     """DO instruction; DO alone does the last again."""
     step = state.step(rest) if rest else state.last_do
-    if step is None or step.statement is PlainStatement.BLANK:
+    if step is None or step.statement == BLANK:
         raise ValError("Missing argument", "DO what? An instruction follows, such as DO READY")
     state.last_do = step
     state.controller.do(step, now=state.now)
@@ -85,10 +81,10 @@ def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ..
     arguments: tuple[Expression, ...] = ()
     if "(" in called:
         statement = state.instruction("CALL", called).statement
-        assert isinstance(statement, Call)
+        assert isinstance(statement, Instruction)
         called = statement.program
-        arguments = tuple(argument for argument in statement.arguments if argument is not None)
-        if len(arguments) < len(statement.arguments):
+        arguments = tuple(argument for argument in statement.operands if argument is not None)
+        if len(arguments) < len(statement.operands):
             raise ValError("Missing argument", f"{text}: none may be left out")
     name = named(called, "program")
     cycles, step = integer("".join(numbers[:1]), 1, "cycles"), integer("".join(numbers[1:]), 1, "step")
@@ -100,9 +96,8 @@ def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ..
     return name, arguments, cycles, step
 
 
-def abort(state: TerminalState, rest: str) -> None:
+def abort(state: TerminalState, _rest: str) -> None:
     """ABORT."""
-    nothing(rest, "ABORT")
     controller = state.controller
     if not (controller.running or controller.doing) and _stands(state):
         raise ValError("No program running")
@@ -126,27 +121,8 @@ def panic(state: TerminalState, _rest: str) -> None:
     state.say("*Arm power off* ENABLE POWER turns it on again", style=Style.ERROR)
 
 
-def proceed(state: TerminalState, rest: str) -> None:
-    """PROCEED."""
-    nothing(rest, "PROCEED")
-    state.controller.proceed(now=state.now)
-
-
-def retry(state: TerminalState, rest: str) -> None:
-    """RETRY."""
-    nothing(rest, "RETRY")
-    state.controller.retry(now=state.now)
-
-
-def undo(state: TerminalState, rest: str) -> None:
-    """UNDO."""
-    nothing(rest, "UNDO")
-    state.say(state.controller.arm.undo(now=state.now))
-
-
-def timeline(state: TerminalState, rest: str) -> None:
+def timeline(state: TerminalState, _rest: str) -> None:
     """TIMELINE."""
-    nothing(rest, "TIMELINE")
     state.say(f"Now {layout.fixed(state.now, 3)} s")
     scheduled = state.controller.arm.timeline(now=state.now)
     if scheduled:
@@ -155,9 +131,8 @@ def timeline(state: TerminalState, rest: str) -> None:
     state.say_all(scheduled, "Nothing is scheduled")
 
 
-def status(state: TerminalState, rest: str) -> None:
+def status(state: TerminalState, _rest: str) -> None:
     """STATUS."""
-    nothing(rest, "STATUS")
     controller = state.controller
     current = controller.status()
     here, there = controller.arm.here(now=state.now), controller.arm.destination(now=state.now)

@@ -9,21 +9,12 @@ from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.running import POWER
-from interfaces.val2.monitor.state import Confirm, Dialogue, Style, TerminalState, halves, nothing, pieces, unique
+from interfaces.val2.monitor.state import Confirm, Dialogue, Style, TerminalState, halves, pieces, unique
 from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
 
 
-def enable(state: TerminalState, rest: str) -> None:
-    """ENABLE switch, .."""
-    _turn(state, rest, on=True)
-
-
-def disable(state: TerminalState, rest: str) -> None:
-    """DISABLE switch, .."""
-    _turn(state, rest, on=False)
-
-
-def _turn(state: TerminalState, rest: str, *, on: bool) -> None:
+def turn(state: TerminalState, rest: str, *, on: bool) -> None:
+    """ENABLE switch, ..; DISABLE switch, .."""
     switches = state.controller.switches
     if not rest:
         raise ValError("Missing argument", f"one of {', '.join(sorted(switches))}")
@@ -82,15 +73,8 @@ def signal(state: TerminalState, rest: str) -> None:
         signals.force(number)
 
 
-def reset(state: TerminalState, rest: str) -> None:
-    """RESET: all outputs off."""
-    nothing(rest, "RESET")
-    state.controller.signals.reset()
-
-
-def io(state: TerminalState, rest: str) -> None:
+def io(state: TerminalState, _rest: str) -> None:
     """IO: a table of all signals, 1 for on."""
-    nothing(rest, "IO")
     signals = state.controller.signals
     for title, numbers in (("Outputs", OUTPUTS), ("Inputs", INPUTS), ("Internal", INTERNAL)):
         states = ["1" if on else "0" for on in signals.states(numbers)]
@@ -98,9 +82,8 @@ def io(state: TerminalState, rest: str) -> None:
         state.say(f"{title:8}  {numbers[0]:4} {eights} {numbers[-1]}")
 
 
-def calibrate(state: TerminalState, rest: str) -> Dialogue:
+def calibrate(state: TerminalState, _rest: str) -> Dialogue:
     """CALIBRATE: the virtual arm knows where it is, so nothing moves."""
-    nothing(rest, "CALIBRATE")
     if not state.controller.switches[POWER]:
         raise ValError("Arm power off", "ENABLE POWER first")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import MOST_VALUES, Memory
@@ -26,10 +26,12 @@ from interfaces.val2.monitor.state import (
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
 from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file
-from interfaces.val2.syntax import Call, Program, React, Variable
+from interfaces.val2.syntax import Instruction, Program, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
 
 T = TypeVar("T")
+_TYPES: Final[dict[str, Any]] = {"locations": (Transformation, PrecisionPoint), "reals": float, "strings": str}
+"""Types of values, by the parts of files that hold them."""
 
 
 def listp(state: TerminalState, rest: str) -> None:
@@ -49,7 +51,7 @@ def listl(state: TerminalState, rest: str) -> None:
 
 def listr(state: TerminalState, rest: str) -> None:
     """LISTR: reals, or an expression."""
-    known = {name: value for name, value in state.controller.memory.listing("real") if isinstance(value, float)}
+    known: dict[str, Any] = dict(state.controller.memory.listing("real"))
     if _computed(rest) or _product(rest, known):
         state.say(layout.number(state.number(rest)))
         return
@@ -64,7 +66,7 @@ def lists(state: TerminalState, rest: str) -> None:
             raise ValError("Invalid argument", f"{rest}: a string is wanted")
         state.say(f'"{layout.visible(value)}"')
         return
-    known = {name: value for name, value in state.controller.memory.listing("string") if isinstance(value, str)}
+    known: dict[str, Any] = dict(state.controller.memory.listing("string"))
     state.say_all(layout.strings(chosen(known, rest, "value")), "No strings")
 
 
@@ -129,44 +131,30 @@ def directory(state: TerminalState, rest: str) -> None:
 def _directory(programs: Mapping[str, Program]) -> list[str]:
     rows = []
     for name, program in programs.items():
-        many = len(program.steps)
         comment = f";{program.comment}" if program.comment else ""
         parameters = ", ".join(variable.name for variable in program.parameters)
-        rows.append((f".PROGRAM {name}({parameters})", f"{many} step{'s' * (many != 1)}", comment))
+        rows.append((f".PROGRAM {name}({parameters})", _counted(len(program.steps), "step"), comment))
     return layout.table(rows) if rows else []
 
 
-def free(state: TerminalState, rest: str) -> None:
+def free(state: TerminalState, _rest: str) -> None:
     """FREE: what is in memory."""
-    nothing(rest, "FREE")
     memory = state.controller.memory
     steps = sum(len(program.steps) for program in memory.programs.values())
-    values: dict[str, list[tuple[str, Value]]] = {
-        kind: memory.listing(kind) for kind in ("location", "point", "real", "string")
-    }
-    used = sum(map(len, values.values()))
+    values = {kind: len(_entries(memory, kind)) for kind in _TYPES}
     state.say(
         *layout.table([
             ("Programs", f"{len(memory.programs)}, of {steps} steps"),
-            ("Locations", f"{len(values['location']) + len(values['point'])}"),
-            ("Reals", f"{len(values['real'])}"),
-            ("Strings", f"{len(values['string'])}"),
-            ("Free", f"{MOST_VALUES - used} of {MOST_VALUES} values"),
+            *((kind.capitalize(), f"{many}") for kind, many in values.items()),
+            ("Free", f"{MOST_VALUES - sum(values.values())} of {MOST_VALUES} values"),
         ])
     )  # fmt: skip
-
-
-def identity(state: TerminalState, rest: str) -> None:
-    """ID: what this is."""
-    nothing(rest, "ID")
-    state.say(state.version)
 
 
 MOST_MEANWHILE: Final = 200
 """Values that may be loaded while a program runs: they're set at once."""
 _VALUE_WORK: Final = 4
 """How much work setting a value is: as much as reading so many characters."""
-_PARTS = {"P": "programs", "L": "locations", "R": "reals", "S": "strings"}
 
 
 def flist(state: TerminalState, rest: str) -> None:
@@ -184,7 +172,7 @@ def load(state: TerminalState, rest: str) -> None:
 def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None, None]:
     """Read a file and take what it holds, in slices."""
     source = yield from read_file(text, name)
-    entries = [*source.locations, *source.reals, *source.strings]
+    entries = source.values
     if len(entries) > MOST_MEANWHILE and state.controller.running:
         raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
     running = state.in_use()
@@ -197,7 +185,7 @@ def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None,
     if source.signals:
         state.controller.cell = source.signals
     counts = [(len(source.programs), "program"), (len(entries), "value"), (len(source.signals), "signal rule")]
-    said = [f"{many} {what}{'s' * (many != 1)}" for many, what in counts if many]
+    said = [_counted(*count) for count in counts if count[0]]
     state.say(f"{name}: {', '.join(said) or 'nothing'}")
 
 
@@ -219,95 +207,80 @@ def _set_all(memory: Memory, entries: Sequence[NamedValue]) -> Generator[int, No
         raise
 
 
-def store(parts: str) -> Callable[..., Dialogue | None]:
+def store(state: TerminalState, rest: str, *, parts: str) -> Dialogue | None:
     """STORE, STOREP, STOREL, STORER, STORES.
 
     Args:
-        parts: Letters of what is written: programs, locations, reals, strings; empty for all, with what is used.
+        state: Whose memory and files.
+        rest: The file, and names behind `=`.
+        parts: What is written; empty for all, with what is used.
     """
+    name, names = halves(rest)
+    path = state.files.path(name)
+    source = _source(state, path.name, parts, names or "")
 
-    def act(state: TerminalState, rest: str) -> Dialogue | None:
-        name, names = halves(rest)
-        path = state.files.path(name)
-        source = _source(state, path.name, parts, names or "")
+    def write() -> None:
+        state.files.write(path, print_file(source))
+        counts = [(len(source.programs), "program"), (len(source.values), "value")]
+        state.say(f"{path.name}: {', '.join(_counted(*count) for count in counts)}")
 
-        def write() -> None:
-            state.files.write(path, print_file(source))
-            values = len(source.locations) + len(source.reals) + len(source.strings)
-            programs = len(source.programs)
-            state.say(
-                f"{path.name}: {programs} program{'s' * (programs != 1)}, {values} value{'s' * (values != 1)}"
-            )
+    if path.exists():
+        return Confirm(f"{path.name} exists. Write over it", write)
+    write()
+    return None
 
-        if path.exists():
-            return Confirm(f"{path.name} exists. Write over it", write)
-        write()
-        return None
 
-    return act
+def _counted(many: int, what: str) -> str:
+    return f"{many} {what}{'s' * (many != 1)}"
 
 
 def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFile:
-    memory = state.controller.memory
-    entries = [NamedValue(variable, value) for variable, value in memory.variables()]
-    kinds = {
-        "locations": [entry for entry in entries if isinstance(entry.value, Transformation | PrecisionPoint)],
-        "reals": [entry for entry in entries if isinstance(entry.value, float)],
-        "strings": [entry for entry in entries if isinstance(entry.value, str)],
-    }
-    programs = dict(memory.programs)
-    if parts in {"", "P"} and names:
-        programs = _called(programs, chosen(programs, names, "program"))
-    signals = state.controller.cell if parts == "" else ()
-    wanted = set(_PARTS.values()) if parts == "" else {_PARTS[parts]}
-    if parts == "" and names:
-        used = {variable.name for program in programs.values() for variable in _variables(program)}
-        kinds = {kind: [e for e in some if e.variable.name in used] for kind, some in kinds.items()}
-    elif names:
-        kinds = {kind: _named(some, names, kind) if kind in wanted else some for kind, some in kinds.items()}
-    return SourceFile(
-        name,
-        tuple(programs.values()) if "programs" in wanted else (),
-        tuple(kinds["locations"]) if "locations" in wanted else (),
-        tuple(kinds["reals"]) if "reals" in wanted else (),
-        tuple(kinds["strings"]) if "strings" in wanted else (),
-        signals,
-    )
+    """What a file is to hold."""
+    memory, programs, used = state.controller.memory, {}, set()
+    if parts in {"", "programs"}:
+        programs = dict(memory.programs)
+        if names:
+            programs = _called(programs, chosen(programs, names, "program"))
+            used = {variable.name for variable in _variables(tuple(programs.values()))}
+    values = {}
+    for kind in _TYPES:
+        entries = _entries(memory, kind) if parts in {"", kind} else {}
+        if parts == kind:
+            entries = chosen(entries, names, kind.removesuffix("s"))
+        elif names:
+            entries = {shown: entry for shown, entry in entries.items() if entry.variable.name in used}
+        values[kind] = tuple(entries.values())
+    return SourceFile(name, tuple(programs.values()), **values, signals=() if parts else state.controller.cell)
 
 
-def _named(entries: Iterable[NamedValue], names: str, kind: str) -> list[NamedValue]:
-    return list(
-        chosen(
-            {layout.variable(entry.variable): entry for entry in entries}, names, kind.removesuffix("s")
-        ).values()
-    )
+def _entries(memory: Memory, kind: str) -> dict[str, NamedValue]:
+    """Variables of a kind, by how they're written."""
+    entries = (NamedValue(*one) for one in memory.variables())
+    return {layout.variable(e.variable): e for e in entries if isinstance(e.value, _TYPES[kind])}
 
 
 def _called(programs: dict[str, Program], some: dict[str, Program]) -> dict[str, Program]:
     """Programs with all that they call."""
     found, waiting = dict(some), list(some.values())
     while waiting:
-        for node in _walk(waiting.pop()):
-            name = node.program if isinstance(node, Call | React) else ""
+        for step in waiting.pop().steps:
+            name = step.statement.program if isinstance(step.statement, Instruction) else ""
             if name in programs and name not in found:
                 found[name] = programs[name]
                 waiting.append(programs[name])
     return found
 
 
-def _variables(program: Program) -> Iterator[Variable]:
-    return (node for node in _walk(program) if isinstance(node, Variable))
-
-
-def _walk(node: object) -> Iterator[object]:
-    """A tree's nodes."""
+def _variables(node: object) -> Iterator[Variable]:
+    """The variables of a tree."""
+    if isinstance(node, Variable):
+        yield node
     if isinstance(node, tuple):
         for part in node:
-            yield from _walk(part)
+            yield from _variables(part)
     elif dataclasses.is_dataclass(node):
-        yield node
         for field in dataclasses.fields(node):
-            yield from _walk(getattr(node, field.name))
+            yield from _variables(getattr(node, field.name))
 
 
 def delete_programs(state: TerminalState, rest: str) -> Dialogue:
@@ -327,32 +300,18 @@ def delete_programs(state: TerminalState, rest: str) -> Dialogue:
     return Confirm(f"Delete {_listed(doomed)}", act)
 
 
-def delete_values(kind: str) -> Callable[..., Dialogue]:
-    """DELETEL, DELETER, DELETES.
+def delete_values(state: TerminalState, rest: str, *, kind: str) -> Dialogue:
+    """DELETEL, DELETER, DELETES, by the kind: `locations`, `reals` or `strings`."""
+    if not rest:
+        raise ValError("Missing argument", f"which {kind}?")
+    memory = state.controller.memory
+    doomed = chosen(_entries(memory, kind), rest, "location" if kind == "locations" else "value")
 
-    Args:
-        kind: `location`, `real` or `string`.
-    """
+    def act() -> None:
+        for entry in doomed.values():
+            memory.delete(entry.variable)
 
-    def command(state: TerminalState, rest: str) -> Dialogue:
-        if not rest:
-            raise ValError("Missing argument", f"which {kind}s?")
-        memory = state.controller.memory
-        kinds = {"location", "point"} if kind == "location" else {kind}
-        known = {name for some in kinds for name, _ in memory.listing(some)}
-        doomed = chosen(
-            {layout.variable(v): v for v, _ in memory.variables() if layout.variable(v) in known},
-            rest,
-            "location" if kind == "location" else "value",
-        )
-
-        def act() -> None:
-            for variable in doomed.values():
-                memory.delete(variable)
-
-        return Confirm(f"Delete {_listed(doomed)}", act)
-
-    return command
+    return Confirm(f"Delete {_listed(doomed)}", act)
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -360,20 +319,11 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(listed) if len(listed) <= 4 else f"{listed[0]} .. {listed[-1]}, {len(listed)} in all"
 
 
-def copy(state: TerminalState, rest: str) -> Dialogue | None:
-    """COPY new=old."""
-    return _put(state, rest, "COPY", keep=True)
-
-
-def rename(state: TerminalState, rest: str) -> Dialogue | None:
-    """RENAME new=old."""
-    return _put(state, rest, "RENAME", keep=False)
-
-
-def _put(state: TerminalState, rest: str, name: str, *, keep: bool) -> Dialogue | None:
+def put(state: TerminalState, rest: str, *, keep: bool) -> Dialogue | None:
+    """COPY new=old, RENAME new=old."""
     given, old = halves(rest)
     if old is None:
-        raise ValError("Missing argument", f"{name} new=old")
+        raise ValError("Missing argument", f"{'COPY' if keep else 'RENAME'} new=old")
     new, old = named(given, "program"), named(old, "program")
     programs = state.controller.memory.programs
     if old not in programs:
@@ -392,9 +342,8 @@ def _put(state: TerminalState, rest: str, name: str, *, keep: bool) -> Dialogue 
     return None
 
 
-def zero(state: TerminalState, rest: str) -> Dialogue:
+def zero(state: TerminalState, _rest: str) -> Dialogue:
     """ZERO: forget everything."""
-    nothing(rest, "ZERO")
 
     def act() -> None:
         state.controller.forget()

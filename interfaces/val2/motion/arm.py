@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.messages.control import OVERRULED
 from interfaces.teleop.operator import NOT_FOLLOWING
@@ -24,6 +23,7 @@ from interfaces.val2.motion.places import (
     READY,
     Alterations,
     Frames,
+    Where,
     aligned,
     behind,
     in_millimetres,
@@ -33,7 +33,6 @@ from interfaces.val2.motion.places import (
 )
 from interfaces.val2.motion.robot import CommandOutcome, RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded
-from interfaces.val2.ports import ArmPort, Where
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
@@ -54,8 +53,12 @@ _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
 
 
-class Arm(ArmPort):
-    """An `ArmPort` over a robot.
+class Arm(SettingsInForce):
+    """The arm of a robot, as programs and the monitor see it.
+
+    Every method that asks for something raises ValError where that can't be, and then has changed nothing. Times
+    are session time [s]. Whoever asks for a motion asks `ready` first; where the robot is elsewhere, the answer to
+    what was asked comes later, and `answered` says when.
 
     With CP on, a motion begins while the one before it brakes. One motion is asked for ahead of the one under way.
     """
@@ -74,12 +77,12 @@ class Arm(ArmPort):
             parameters: Shared with the interpreter; of them HAND.TIME [s] is read.
             gripped: Is told when the hand takes hold of something or lets go [s].
         """
+        super().__init__()
         self.robot = robot
         self.parameters: MutableMapping[str, float] = {} if parameters is None else parameters
         self._frames = Frames(robot.model)
         self._frames_since = deque([(-math.inf, self._frames)], maxlen=REMEMBERED)
         """Since when TOOL and BASE have been which [s]."""
-        self._settings = SettingsInForce()
         self._hand = Hand(self.parameters, gripped)
         self._alterations = Alterations()
         self._pace = MonitorSpeed(robot)
@@ -109,22 +112,22 @@ class Arm(ArmPort):
 
     # Where it is.
 
-    @override
     def here(self, *, now: float) -> Where:
+        """Where the operator's arm is, the virtual one."""
         return self.past(now, now=now)
 
-    @override
     def destination(self, *, now: float) -> Where:
+        """Where it goes: where it is, if it goes nowhere."""
         self._update(now)
         return self._frames.where(self._goal(), self._hand.goal)
 
-    @override
     def real(self, *, now: float) -> Where | None:
+        """Where the other twin was measured last; None where there's none."""
         q = self.robot.real(now=now)
         return None if q is None else self._frames.where(q, self._hand.opening(now))
 
-    @override
     def past(self, t: float, *, now: float) -> Where:
+        """REWIND, ours: where the arm was at a time [s]."""
         self._update(now)
         frames = self._frames_since[max(bisect_right(self._frames_since, t, key=lambda since: since[0]) - 1, 0)][1]
         return frames.where(self.robot.timeline.sample(t), self._hand.opening(t, self._begins))
@@ -138,8 +141,8 @@ class Arm(ArmPort):
         """Joints at the destination [rad], (6,)."""
         return self.robot.timeline.final() if self._dry is None else self._dry
 
-    @override
     def reaches(self, location: Location, *, now: float) -> bool:
+        """Whether a motion could go there: INRANGE."""
         self._update(now)
         try:
             self._frames.solve(location, self._goal(), ())
@@ -172,8 +175,12 @@ class Arm(ArmPort):
         begin = max(earliest, self.robot.timeline.end)
         return begin, begin + seconds
 
-    @override
     def answered(self, *, now: float) -> bool:
+        """Whether all that was asked has been answered.
+
+        Raises:
+            ValError: If it was refused; once, and then it counts as answered.
+        """
         self._update(now)
         while self._unanswered:
             number, straight = self._unanswered[0]
@@ -226,21 +233,21 @@ class Arm(ArmPort):
             if begins is not None and begins <= now < over
         )
         if self._moves(-math.inf) and (motions[-1][1] is None or motions[-1][1] > now):
-            self._settings.next, self._words = self._last_settings, self._last_words
+            self.next, self._words = self._last_settings, self._last_words
             self._hand.give_back()
         self._recent.clear()
         self._delay = self._at = self._awaited = None
 
-    @override
     def ready(self, *, now: float) -> bool:
+        """Whether the next motion may be asked for: the last has begun, and all has been answered."""
         return self.answered(now=now) and self._begun(now)
 
     def _begun(self, now: float) -> bool:
         last = self._begins(self._recent[-1][0]) if self._recent else -math.inf
         return last is not None and last <= now and self._delay_span()[0] <= now
 
-    @override
     def settled(self, *, now: float) -> bool:
+        """Whether the arm stands at its destination, and the hand has done what it was told."""
         if not self.answered(now=now) or self._hand.waits:
             return False
         return now >= max(self._end(), self._hand.end) and self._nulled(now)
@@ -256,8 +263,8 @@ class Arm(ArmPort):
         allowed = (_FINE if self._last_settings.fine else _COARSE) * self._last_settings.tolerance / 100.0
         return bool(np.abs(q - self.robot.timeline.final()).max() <= allowed)
 
-    @override
     def next_deadline(self) -> float:
+        """When any of these may change by itself [s]; infinity for never."""
         now, (delayed, ends) = self._now, self._delay_span()
         times = [self.robot.timeline.end, self._hand.end, self._pace.next_deadline(), delayed, ends]
         if self._awaited is not None:
@@ -286,20 +293,20 @@ class Arm(ArmPort):
 
     # Motions.
 
-    @override
     def move(self, target: Location, *, straight: bool, hand: float | bool | None = None, now: float) -> None:
+        """MOVE, MOVES; with a hand MOVET, MOVEST: an opening [mm], or open or closed."""
         self._move(target, straight, now, hand=hand)
 
-    @override
     def approach(self, target: Location, distance: float, *, straight: bool, now: float) -> None:
+        """APPRO, APPROS: to a distance [mm] behind a location along its tool axis."""
         self._move(behind(self._frames.place(target), distance), straight, now)
 
-    @override
     def depart(self, distance: float, *, straight: bool, now: float) -> None:
+        """DEPART, DEPARTS: back from the destination along its tool axis [mm]."""
         self._move(behind(self.destination(now=now).tool, distance), straight, now)
 
-    @override
     def drive(self, joint: int, change: float, speed: float, *, now: float) -> None:
+        """DRIVE: turn a joint, 1 to 6, by a change [deg] at a speed [%]."""
         if joint not in range(1, 7):
             raise ValError("Illegal joint number", f"{joint}: 1 to 6")
         if not 0 < speed < math.inf:
@@ -308,37 +315,36 @@ class Arm(ArmPort):
         joints[joint - 1] += change
         self._move(PrecisionPoint(tuple(joints)), False, now, speed=Speed(speed))
 
-    @override
     def draw(self, dx: float, dy: float, dz: float, *, now: float) -> None:
+        """DRAW: straight by a way in world axes [mm] from the destination."""
         self._move(shifted(self.destination(now=now).tool, dx, dy, dz), True, now)
 
-    @override
     def go_ready(self, *, now: float) -> None:
+        """READY."""
         self._move(READY, False, now)
 
-    @override
     def nest(self, *, now: float) -> None:
+        """NEST."""
         self._move(NEST, False, now)
 
-    @override
     def align(self, *, now: float) -> None:
+        """ALIGN: turn the tool's axis to the nearest world axis."""
         self._move(aligned(self.destination(now=now).tool), False, now)
 
-    @override
     def delay(self, seconds: float, *, now: float) -> None:
+        """DELAY: stand still for a time [s], as a motion."""
         if not 0 <= seconds < math.inf:
             raise ValError("Illegal value", f"{seconds:g}: a delay is 0 or above")
         self._update(now)
         if self._dry is None:
             self._delay = max(now, self._delay_span()[1]), seconds
 
-    @override
     def actuate(self, hand: bool | None, *, now: float) -> None:
+        """OPENI (True), CLOSEI (False), RELAXI (None): now, where the arm stands; `settled` waits for it."""
         self._update(now)
         if self._dry is None:
             self._hand.actuate(hand, now)
 
-    @override
     def alter(self, values: tuple[float, ...], *, now: float) -> None:
         """ALTOUT; the arm must not be on another motion.
 
@@ -380,7 +386,7 @@ class Arm(ArmPort):
     ) -> None:
         """Ask for a motion; nothing is changed where it can't be."""
         self._update(now)
-        near, manner = self._goal(), self._settings.next
+        near, manner = self._goal(), self.next
         turns = not straight and isinstance(target, Transformation)
         words = self._words if turns else ()
         if self._dry is not None:
@@ -407,7 +413,7 @@ class Arm(ArmPort):
             self._hand.ask(number, hand)
             self._hand.begin(self._begins, now)
         self._last_settings, self._last_words, self._delay, self._at = manner, words, None, None
-        self._settings.taken()
+        self.taken()
         if turns:
             self._words = ()
 
@@ -440,7 +446,6 @@ class Arm(ArmPort):
         share = min(1.0, taken / duration) if taken > 0 else 1.0
         return replace(command, pace=bounded(command.pace * share))
 
-    @override
     def brake(self, *, now: float) -> None:
         """BRAKE, REACTI, ABORT; what was asked for a motion that hasn't begun is for the next one again."""
         self._update(now)
@@ -448,7 +453,6 @@ class Arm(ArmPort):
         if now < self.robot.timeline.end or self._unanswered:
             self._send(Stop(), False, now)
 
-    @override
     def give_up(self, *, now: float) -> None:
         """Somebody else commands the arm: what isn't over is for RETRY, and no answer is waited for any more."""
         self._update(now)
@@ -458,7 +462,6 @@ class Arm(ArmPort):
         self._give_up(now, math.inf if end is None else end)
         self._unanswered.clear()
 
-    @override
     def withdraw(self, *, now: float) -> None:
         """Take out of the plan what `give_up` found asked for ahead, as far as it has been accepted."""
         ahead, self._asked_ahead = self._asked_ahead, ()
@@ -468,8 +471,8 @@ class Arm(ArmPort):
             if receipt is not None and receipt.stands:
                 self._cancels.append(self.robot.ask(Cancel(receipt.command_id), now=now))
 
-    @override
     def retry(self, *, now: float) -> bool:
+        """Ask again for the motion that `brake` interrupted; False if there was none."""
         self._update(now)
         interrupted, self._interrupted = self._interrupted, ()
         for command in interrupted:
@@ -481,8 +484,8 @@ class Arm(ArmPort):
 
     # The timeline.
 
-    @override
     def undo(self, *, now: float) -> str:
+        """UNDO, ours: take back the newest command; what became of it, one line."""
         self._update(now)
         self._interrupted, self._delay, self._awaited = (), None, None
         self._hand.forget()
@@ -495,7 +498,6 @@ class Arm(ArmPort):
             return "Nothing was taken back" + (f": {outcome.reason}" if outcome.reason else "")
         return f"Command {outcome.receipt.command_id} was taken back"
 
-    @override
     def timeline(self, *, now: float) -> list[str]:
         """TIMELINE: number, begin, end and destination of what is scheduled."""
         self._update(now)
@@ -513,61 +515,40 @@ class Arm(ArmPort):
 
     # For the next motion, or those after it.
 
-    @override
     def set_hand(self, hand: bool | None) -> None:
+        """OPEN, CLOSE, RELAX: with the next motion."""
         self._hand.wanted, self._hand.relax = hand, hand is None
 
-    @override
-    def set_speed(self, speed: float, *, turn: float | None, unit: str, always: bool) -> None:
-        self._settings.set_speed(speed, turn, unit, always)
-
-    @override
     def fastest(self, unit: str) -> float:
+        """The greatest program speed that counts, in a unit of `%`, `MMPS` or `IPS`."""
         return 1.0 / Speed(1.0, unit).linear_share(self.robot.model)
 
-    @override
-    def set_acceleration(self, up: float, down: float) -> None:
-        self._settings.set_acceleration(up, down)
-
-    @override
-    def set_duration(self, seconds: float, *, always: bool) -> None:
-        self._settings.set_duration(seconds, always)
-
-    @override
-    def set_tolerance(self, percent: float | None, *, fine: bool, always: bool) -> None:
-        self._settings.set_tolerance(percent, fine, always)
-
-    @override
     def tolerance(self) -> tuple[bool, float]:
-        return self._settings.next.fine, self._settings.next.tolerance
+        """Whether FINE is in force, and its percentage."""
+        return self.next.fine, self.next.tolerance
 
-    @override
-    def set_nulling(self, on: bool, *, always: bool) -> None:
-        self._settings.set_nulling(on, always)
-
-    @override
     def set_configuration(self, word: str) -> None:
+        """RIGHTY, LEFTY, ABOVE, BELOW, FLIP, NOFLIP: at the next joint-interpolated motion."""
         self._words = with_word(self._words, word)
 
     # At once.
 
-    @override
     def set_tool(self, tool: Transformation) -> None:
-        self._set_frames(self._frames.with_tool(tool))
+        """TOOL."""
+        self._set_frames(replace(self._frames, tool=tool))
 
-    @override
     def tool(self) -> Transformation:
+        """The tool transformation."""
         return self._frames.tool
 
-    @override
     def set_base(self, base: Transformation) -> None:
-        self._set_frames(self._frames.with_base(base))
+        """BASE: where the robot stands in the world in which locations are."""
+        self._set_frames(replace(self._frames, base=base))
 
-    @override
     def base(self) -> Transformation:
+        """The base transformation."""
         return self._frames.base
 
-    @override
     def set_monitor_speed(self, percent: float, *, now: float) -> None:
         """Monitor speed, at most 100: time alone is stretched."""
         if not 0 < percent < math.inf:
@@ -575,35 +556,35 @@ class Arm(ArmPort):
         self._update(now)
         self._pace.set(percent, now=now)
 
-    @override
     def monitor_speed(self) -> float:
+        """The monitor speed [%]."""
         return self._pace.wanted
 
-    @override
     def set_continuous_path(self, on: bool) -> None:
+        """ENABLE CP, DISABLE CP."""
         self._continuous = on
 
-    @override
     def set_dry_run(self, on: bool) -> None:
+        """ENABLE DRY.RUN: motions take no time and move nothing."""
         if on and self._dry is None:
             self._dry = self.robot.timeline.final()
         elif not on:
             self._dry = None
 
-    @override
     def at(self, t: float | None) -> None:
+        """AT, ours: execution time of the next motion [s]; None for as soon as it can."""
         if t is not None and not math.isfinite(t):
             raise ValError("Illegal value", "a time is finite")
         self._at = t
 
-    @override
     def set_alter(self, mode: int | None, *, now: float) -> None:
+        """ALTER with a mode's bits (1: cumulative, 2: world axes, those of BASE), NOALTER with None."""
         self._update(now)
         self._alterations.set(mode)
 
-    @override
     def begin_program(self) -> None:
-        self._settings.reset()
+        """EXECUTE: speeds, tolerances and requests are as at the beginning."""
+        self.reset()
         self._hand.wanted, self._hand.relax = None, False
         self._words, self._at, self._interrupted = (), None, ()
         self._alterations.set(None)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.ports import Where
 from interfaces.val2.values import (
     FLANGE,
     NULL,
@@ -24,6 +23,18 @@ from interfaces.val2.values import (
 from vrs.errors import InvalidValueError, OutOfLimitsError, UnreachablePoseError
 from vrs.model import Array, RobotModel
 from vrs.planning.path import rotations
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """Where an arm is."""
+
+    tool: Transformation
+    """The tool's tip in the world, in which BASE says where the robot stands."""
+    joints: PrecisionPoint
+    hand: float
+    """Opening of the hand [mm]."""
+
 
 READY: Final = PrecisionPoint((0.0, -90.0, 90.0, 0.0, 0.0, 0.0))
 NEST: Final = PrecisionPoint((0.0, -135.0, 180.0, 0.0, 45.0, 0.0))
@@ -60,14 +71,6 @@ class Frames:
     tool: Transformation = NULL
     base: Transformation = NULL
     """Where the robot stands in the world in which locations are."""
-
-    def with_tool(self, tool: Transformation) -> Frames:
-        """The same with another tool."""
-        return replace(self, tool=tool)
-
-    def with_base(self, base: Transformation) -> Frames:
-        """The same with another base."""
-        return replace(self, base=base)
 
     def tip(self) -> Array:
         """The tool's tip in the frame of the last link, (4, 4) [m]."""
@@ -186,6 +189,8 @@ def shifted(place: Transformation, dx: float, dy: float, dz: float) -> Transform
     return Transformation(X)
 
 
+ALTER_PERIOD: Final = 0.028
+"""How long a program takes for a correction by ALTOUT at least [s], as in VAL-II."""
 CUMULATIVE: Final = 1
 """Bit of the mode: each correction adds to those before."""
 WORLD: Final = 2

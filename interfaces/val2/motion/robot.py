@@ -85,6 +85,9 @@ _LOOKED: Final = 256
 class EngineRobot(RobotPort):
     """An engine in this process; a manual clock of it is set to the time of each call."""
 
+    lost = False
+    fault_poll_interval = math.inf
+
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
         self._number = 0
@@ -140,16 +143,6 @@ class EngineRobot(RobotPort):
     @override
     def halt_reason(self) -> str:
         return ""
-
-    @property
-    @override
-    def lost(self) -> bool:
-        return False
-
-    @property
-    @override
-    def fault_poll_interval(self) -> float:
-        return math.inf
 
     @override
     def scheduled(self, *, now: float) -> tuple[Receipt, ...]:

@@ -12,8 +12,8 @@ import pytest
 from interfaces.val2.context import Event, ProgramFailed, Typed
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
+from interfaces.val2.motion.places import Where
 from interfaces.val2.parser import parse_expression, parse_line
-from interfaces.val2.ports import Where
 from interfaces.val2.source import parse_file
 from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation, Value
 
@@ -38,7 +38,7 @@ class _Motion:
 
 
 class FakeArm:
-    """An `ArmPort` without a robot: it stands where it was until a motion ends, and then at its destination."""
+    """An `Arm` without a robot: it stands where it was until a motion ends, and then at its destination."""
 
     def __init__(self, *, duration: float = 1.0, latency: float = 0.0) -> None:
         """Stand at NULL.

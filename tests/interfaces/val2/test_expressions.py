@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.val2.dialogue import general, number
 from interfaces.val2.errors import ValError
+from interfaces.val2.formats import general, number
 from interfaces.val2.memory import MOST_VALUES, Memory
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.syntax import Format, Number, Variable

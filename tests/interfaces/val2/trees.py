@@ -10,30 +10,18 @@ from interfaces.val2 import forms
 from interfaces.val2.parser import LONGEST_LINE
 from interfaces.val2.printer import print_step
 from interfaces.val2.syntax import (
+    BLANK,
     Apply,
-    Assign,
     Binary,
-    Call,
-    Case,
     Compound,
-    Conditional,
-    For,
     Format,
-    Goto,
     Ignored,
     Instruction,
-    Local,
-    LoopJump,
     Number,
-    PlainStatement,
     Program,
-    Prompt,
-    React,
     Step,
     Text,
-    Type,
     Unary,
-    Value,
     Variable,
 )
 
@@ -119,11 +107,19 @@ TIMED = (
 """What AT may stand before."""
 
 
+OTHERS = (
+    "SET", "DECOMPOSE", "SHIFT", "REACT", "REACTI", "IF", "ELSE", "END", "WHILE", "DO", "UNTIL", "FOR", "CASE",
+    "VALUE", "ANY", "EXIT", "NEXT", "GOTO", "CALL", "GOSUB", "RETURN", "TYPE", "PROMPT", "REMARK", "AUTO", "LOCAL",
+    "GLOBAL",
+)  # fmt: skip
+"""What is made by `statements` below."""
+
+
 @st.composite
 def instructions(draw):
-    """An instruction that has no node of its own."""
-    row = draw(st.sampled_from([row for row in forms.INSTRUCTIONS.values() if not row.own]))
-    match row.keyword:
+    """An instruction whose operands stand between commas, and some others."""
+    row = draw(st.sampled_from([row for row in forms.INSTRUCTIONS.values() if row.name not in OTHERS]))
+    match row.name:
         case "TIMER":
             return Instruction("TIMER", (draw(numbers | st.builds(Variable, plain)), draw(expressions)))
         case "PARAMETER":
@@ -132,7 +128,7 @@ def instructions(draw):
             )
         case "ENABLE" | "DISABLE":
             switches = st.lists(st.sampled_from(sorted(forms.SWITCHES)), min_size=1, max_size=3)
-            return Instruction(row.keyword, (), tuple(draw(switches)))
+            return Instruction(row.name, (), tuple(draw(switches)))
         case "GRASP":
             label = draw(labels.map(lambda n: (Number(float(n)),)) | st.just(()))
             return Instruction("GRASP", (draw(expressions), *label))
@@ -149,40 +145,59 @@ def instructions(draw):
         operands.pop()
     chosen = [draw(st.sampled_from(["", *group])) for group in row.words]
     times = numbers | st.builds(Variable, plain)
-    begins = draw(st.none() | times) if row.keyword in TIMED else None
-    return Instruction(row.keyword, tuple(operands), tuple(filter(None, chosen)), begins=begins)
+    begins = draw(st.none() | times) if row.name in TIMED else None
+    return Instruction(row.name, tuple(operands), tuple(filter(None, chosen)), begins=begins)
 
 
 programs_called = plain
 ignored = st.sampled_from(sorted(forms.IGNORED))
 rests = st.text(LETTERS + "0123456789 ,+()", max_size=12).map(lambda s: f"unknown{s}".strip())
+label_numbers = labels.map(lambda n: Number(float(n)))
+
+
+def made(keywords, *operands, **others):
+    """Instructions of some keywords, each with these operands."""
+    return st.builds(Instruction, st.sampled_from(keywords), st.tuples(*operands), **others)
+
+
+def many(keywords, operands, **others):
+    """Instructions of some keywords, with a run of operands."""
+    return st.builds(Instruction, st.sampled_from(keywords), operands.map(tuple), **others)
+
+
 statements = st.one_of(
-    st.builds(Assign, targets(expressions, ("", "$")), expressions.filter(lambda e: not _located(e))),
-    st.builds(Assign, targets(expressions), expressions, st.sampled_from(["SET", "DECOMPOSE"])),
+    made(["="], targets(expressions, ("", "$")), expressions.filter(lambda e: not _located(e))),
+    made(["SET", "DECOMPOSE"], targets(expressions), expressions),
     instructions(),
-    st.builds(Conditional, st.sampled_from(["IF", "WHILE", "UNTIL"]), expressions),
-    st.sampled_from(PlainStatement),
-    st.builds(For, targets(expressions), expressions, expressions, optional),
-    st.builds(Case, expressions),
-    st.builds(Value, st.lists(expressions, min_size=1, max_size=3).map(tuple)),
-    st.builds(LoopJump, st.sampled_from(["EXIT", "NEXT"]), counts),
-    st.builds(Goto, labels, optional),
-    st.builds(
-        Call,
-        programs_called,
-        st.lists(optional, max_size=3).filter(lambda given: given != [None]).map(tuple),
-        st.sampled_from(["CALL", "GOSUB"]),
+    made(["IF", "WHILE", "UNTIL"], expressions),
+    st.just(BLANK) | made(["ELSE", "END", "DO", "ANY", "RETURN"]),
+    made(["FOR"], targets(expressions), expressions, expressions),
+    made(["FOR"], targets(expressions), expressions, expressions, expressions),
+    made(["CASE"], expressions),
+    many(["VALUE"], st.lists(expressions, min_size=1, max_size=3)),
+    many(["EXIT", "NEXT"], counts.map(lambda n: [Number(float(n))] if n > 1 else [])),
+    made(["GOTO"], label_numbers) | made(["IF"], expressions, label_numbers),
+    many(
+        ["CALL", "GOSUB"],
+        st.lists(optional, max_size=3).filter(lambda given: given != [None]),
+        program=programs_called,
     ),
-    st.builds(React, expressions, st.just("") | programs_called, st.booleans(), st.booleans()),
-    st.builds(Type, st.lists(expressions | formats, max_size=4).map(tuple)),
-    st.builds(
-        Prompt, expressions, st.lists(targets(expressions).filter(lambda v: not v.array), max_size=3).map(tuple)
+    made(
+        ["REACT", "REACTI"],
+        expressions,
+        program=st.just("") | programs_called,
+        words=st.sampled_from([(), ("ALWAYS",)]),
     ),
+    many(["TYPE"], st.lists(expressions | formats, max_size=4)),
     st.builds(
-        Local,
-        st.sampled_from(["AUTO", "LOCAL", "GLOBAL"]),
-        st.lists(variables(numbers), min_size=1, max_size=3).map(tuple),
-        st.sampled_from(["", "REAL", "LOC"]),
+        lambda text, names: Instruction("PROMPT", (text, *names)),
+        expressions,
+        st.lists(targets(expressions).filter(lambda v: not v.array), max_size=3),
+    ),
+    many(
+        ["AUTO", "LOCAL", "GLOBAL"],
+        st.lists(variables(numbers), min_size=1, max_size=3),
+        words=st.sampled_from([(), ("REAL",), ("LOC",)]),
     ),
     st.builds(Ignored, ignored, rests),
     st.just(Ignored("DISABLE", "color.speed, scale")),

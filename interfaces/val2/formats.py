@@ -1,4 +1,4 @@
-"""TYPE and PROMPT: the text of values in formats, and the steps that write and ask.
+"""The text of values in the formats of TYPE and $ENCODE, and numbers in texts.
 
 Without a format a number has one leading blank and as many digits as it needs, seven at most unless it's whole;
 `/F8.2` is a width and decimals, `/I5` a whole number, `/E12.3` with an exponent, `/G12.5` either, `/H4` and `/O6`
@@ -11,15 +11,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from typing import Final
 
-from interfaces.val2.arithmetic import Slots, checked
-from interfaces.val2.context import SPECIAL, Asked, StepFunction, Typed, Waiting
 from interfaces.val2.errors import ValError
-from interfaces.val2.expressions import Expressions
-from interfaces.val2.memory import VariableSlot, mismatch
-from interfaces.val2.syntax import Expression, Format, Prompt, Variable
+from interfaces.val2.syntax import Format
 from interfaces.val2.values import PrecisionPoint, Transformation, Value, to_oat
 
 NUMBERS: Final = "DFGEIHO"
@@ -28,6 +24,17 @@ WIDEST: Final = 80
 _DEFAULT: Final = Format("D")
 _WHOLE: Final = 1e15
 """Numbers below it are exact where they're whole."""
+
+
+def checked(value: float) -> float:
+    """The value.
+
+    Raises:
+        ValError: If it's infinite or not a number.
+    """
+    if value - value == 0.0:
+        return value
+    raise ValError("Arithmetic overflow")
 
 
 def number(value: float, form: Format = _DEFAULT) -> str:
@@ -127,74 +134,3 @@ def whole_number(text: str) -> float | None:
     found = _NUMBER.fullmatch(text.rstrip())
     value = float(found[0]) if found else math.inf
     return value if math.isfinite(value) else None
-
-
-def type_step(x: Expressions, items: tuple[Expression | Format, ...], following: int) -> StepFunction:
-    """TYPE."""
-    context = x.context
-    parts = [i if isinstance(i, Format) else x.value(i) for i in items]
-
-    def type_(s: Slots) -> int:
-        text, ends = spelled([p if isinstance(p, Format) else p(s) for p in parts])
-        if context.switches["MESSAGES"]:
-            context.events.append(Typed(text + "\n" if ends else text))
-        return context.go_on(following)
-
-    return type_
-
-
-def prompt_step(x: Expressions, prompt: Prompt, following: int) -> StepFunction:
-    """PROMPT: ask, and ask again until the answer is what is wanted."""
-    context, text, names = x.context, x.string(prompt.text), prompt.targets
-    slots = [x.reference(v) for v in names]
-    if any(v.prefix == "#" for v in names):
-        raise mismatch(next(v for v in names if v.prefix == "#"))
-
-    def asking(question: str, targets: list[VariableSlot]) -> Generator[float, None, int]:
-        context.answers.clear()
-        context.asking = True
-        try:
-            while True:
-                context.events.append(Asked(question))
-                while not context.answers:
-                    yield float("inf")
-                values = _answers(context.answers.pop(), names)
-                if values is not None:
-                    break
-                context.events.append(Typed(f"*Illegal value* {_wanted(names)}\n"))
-        finally:
-            context.asking = False
-        for slot, value, name in zip(targets, values, names, strict=True):
-            context.memory.store(slot, value, name)
-        return following
-
-    def ask(s: Slots) -> int:
-        context.pending = Waiting(asking(text(s), [slot(s) for slot in slots]))
-        return SPECIAL
-
-    return ask
-
-
-def _answers(line: str, names: tuple[Variable, ...]) -> list[float | str] | None:
-    """The values in an answer: parted by commas or blanks; a string at the end takes what is left.
-
-    Returns:
-        None if it isn't what is wanted.
-    """
-    rest = line.strip("\r\n")
-    values: list[float | str] = []
-    for n, name in enumerate(names, 1):
-        if n == len(names) and name.prefix:
-            return [*values, rest if n == 1 else rest.strip()]
-        rest = rest.strip()
-        end = next((k for k, c in enumerate(rest) if c == "," or (c.isspace() and not name.prefix)), len(rest))
-        field, rest = rest[:end].strip(), rest[end:].lstrip().removeprefix(",")
-        value = field if name.prefix else whole_number(field)
-        if value is None:
-            return None
-        values.append(value)
-    return None if rest.strip() and names else values
-
-
-def _wanted(names: tuple[Variable, ...]) -> str:
-    return ", ".join(f"{v.name}: {'a string' if v.prefix else 'a number'}" for v in names)
