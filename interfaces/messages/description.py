@@ -20,7 +20,6 @@ from msgspec import inspect as kinds
 from interfaces.messages.fields import CROSSING, plain
 from vrs.errors import InvalidValueError
 
-
 _BASE64 = r"\A(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?\Z"
 
 
