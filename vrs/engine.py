@@ -39,6 +39,7 @@ from vrs.errors import InvalidValueError
 from vrs.ledger import Ledger, Receipt
 from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.moves import check
+from vrs.notes import Notes
 from vrs.scheduler import Scheduler
 from vrs.timeline import Timeline
 
@@ -174,6 +175,10 @@ class Engine:
             UnknownCommandError: If this engine gave no receipt of that id.
         """
         return self.scheduler.ledger.receipt(command_id)
+
+    def notes(self, command_id: int) -> Notes:
+        """What the reason of a command's receipt is the text of; empty where it was rejected or isn't known."""
+        return self.scheduler.ledger.notes(command_id)
 
     def now(self) -> float:
         """Present time [s]; offline, the end of the plan."""

@@ -13,14 +13,15 @@ import numpy as np
 
 from vrs.commands import Insertion
 from vrs.model import Array
+from vrs.notes import Notes
 from vrs.planning import Plan, empty
 from vrs.planning.plan import end_state, stacked
 from vrs.segment import HOLD, Packed, Piece, State
 from vrs.timeline import BaseTimeline, Timeline
 
-MovePlanner = Callable[[State], tuple[Plan, Array, str]]
+MovePlanner = Callable[[State], tuple[Plan, Array, Notes]]
 """Plans the new move from the state at its start: the plan, the joints where it ends, what the user must know."""
-JoinPlanner = Callable[[Array, State], tuple[Plan, str]]
+JoinPlanner = Callable[[Array, State], tuple[Plan, Notes]]
 """Plans from rest at the new target to the state in which the tail begins."""
 
 _Row = TypeVar("_Row")
@@ -52,7 +53,7 @@ class Gap(NamedTuple):
     """Index of the first segment that follows; None where no move follows."""
     lead: tuple[Piece, ...] = ()
     """What comes between the cut and the start."""
-    note: str = ""
+    notes: Notes = ()
     """What the user must know of that."""
 
 
@@ -72,7 +73,8 @@ class Edit(NamedTuple, Generic[_TimelineT]):
     """Index, in the timeline before, of the first segment that follows; None for none."""
     dropped: tuple[int, ...] | None = ()
     """Commands of which segments were dropped or shortened; None for all that arrive later."""
-    notes: str = ""
+    notes: Notes = ()
+    """What the user must know of it."""
 
 
 def next_move(timeline: BaseTimeline[Any], index: int) -> int | None:
@@ -209,20 +211,20 @@ def fill(
     Raises:
         PlanningError: If a planner has no plan.
     """
-    plan, target, note = plan_move(gap.state)
+    plan, target, notes = plan_move(gap.state)
     arrival = gap.start + plan.duration
     pieces: list[Piece | Packed] = [*gap.lead, packed(plan, command_id)]
     tail = gap.tail
     if tail is None:
         after = timeline.edited(gap.cut, pieces)
-        return Edit(after, gap.start, arrival, target, dropped=dropped, notes=joined(gap.note, note))
+        return Edit(after, gap.start, arrival, target, dropped=dropped, notes=gap.notes + notes)
     scheduled = timeline.start_of(tail)
     goal = timeline.state_after(tail)
     moving = any(goal.qd.tolist())
     if not moving and timeline.owner_of(tail) != command_id:
         # Moves of different commands meet at rest with whatever acceleration; within one it mustn't jump.
         goal = goal._replace(qdd=goal.qd)
-    join, join_note = plan_join(target, goal)
+    join, more = plan_join(target, goal)
     joining = packed(join, command_id)
     ready = arrival + join.duration
     slack = scheduled - ready
@@ -233,8 +235,7 @@ def fill(
     else:
         pieces.append(joining)
     after = timeline.edited(gap.cut, pieces, tail, scheduled if slack >= 0 else ready)
-    notes = joined(gap.note, note, join_note)
-    return Edit(after, gap.start, arrival, target, max(-slack, 0.0), tail, dropped, notes)
+    return Edit(after, gap.start, arrival, target, max(-slack, 0.0), tail, dropped, gap.notes + notes + more)
 
 
 def _pushes_off(join: Plan, goal: State) -> bool:
@@ -244,9 +245,9 @@ def _pushes_off(join: Plan, goal: State) -> bool:
     return bool(np.abs(end_state(join).qdd - goal.qdd).max() <= _MET)
 
 
-def stay(note: str) -> MovePlanner:
+def stay(notes: Notes) -> MovePlanner:
     """Plan to stay where the arm is."""
-    return lambda state: (empty(len(state.q)), state.q, note)
+    return lambda state: (empty(len(state.q)), state.q, notes)
 
 
 def piece(plan: Plan, command_id: int) -> Piece:
@@ -303,12 +304,7 @@ def hold(duration: float, q: Array) -> Piece:
     return Piece([duration], [rest], HOLD)
 
 
-def joined(*texts: str) -> str:
-    """Texts that aren't empty, as one."""
-    return "; ".join(filter(None, texts))
-
-
-Stopper: TypeAlias = Callable[[float], tuple[Plan, str]]
+Stopper: TypeAlias = Callable[[float], tuple[Plan, Notes]]
 """Plans a stop at a time of the plan: the stop, and what the user must know of it."""
 
 _ROUNDING = 1e-9
@@ -401,10 +397,10 @@ def _waiting(timeline: Timeline, cut: float, start: float, tail: int | None, sto
     if cut == start or not state.qd.any():
         lead: tuple[Piece, ...] = (hold(start - cut, state.q),) if start > cut else ()
         return Gap(cut, max(start, cut), state, tail, lead)
-    stop, note = stopper(cut)
+    stop, notes = stopper(cut)
     stopped = end_state(stop).q
     braking = piece(stop, owner_before(timeline, cut))
     ready = cut + stop.duration
     lead = (braking, hold(start - ready, stopped)) if start > ready else (braking,)
     rest = np.zeros_like(stopped)
-    return Gap(cut, max(start, ready), State(stopped, rest, rest), tail, lead, note)
+    return Gap(cut, max(start, ready), State(stopped, rest, rest), tail, lead, notes)

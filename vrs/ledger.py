@@ -25,6 +25,7 @@ from msgspec.structs import replace
 from vrs.commands import Lateness, MotionCommand, Profile
 from vrs.errors import UnknownCommandError
 from vrs.model import Array, Limits
+from vrs.notes import Note, NoteCode, Notes, text_of
 from vrs.record import Count, Number, Record, Text, Time, Value
 from vrs.timeline import BaseTimeline
 
@@ -114,8 +115,16 @@ _TimelineT = TypeVar("_TimelineT", bound=BaseTimeline[Any])
 
 TimeMap: TypeAlias = Callable[[float], float]
 """New time of what was scheduled at a time."""
-Entry: TypeAlias = tuple[Receipt, MotionCommand | None]
-"""A receipt, and the motion command that it answers."""
+
+
+class LedgerEntry(NamedTuple):
+    """What a ledger knows of a command."""
+
+    receipt: Receipt
+    command: MotionCommand | None = None
+    """The motion command that it answers; None where it was something else."""
+    notes: Notes = ()
+    """What its reason is the text of; empty where it was rejected."""
 
 
 class Change(NamedTuple):
@@ -146,7 +155,7 @@ class Undo(NamedTuple, Generic[_TimelineT]):
     before: _TimelineT
     changes: tuple[int, tuple[Change, ...]]
     """Where in the log it wrote, and what stood there."""
-    overwritten: dict[int, Entry | None]
+    overwritten: dict[int, LedgerEntry | None]
     """Entries as they were; None for what wasn't there."""
     stills: tuple[tuple[int, tuple[tuple[float, int], ...]], ...]
     """Where in the list of stills it changed something, and what stood there; put back one after the other."""
@@ -158,7 +167,7 @@ class Ledger(Generic[_TimelineT]):
     def __init__(self, newest: int) -> None:
         self.newest = newest
         """Highest id given out."""
-        self.entries: dict[int, Entry] = {}
+        self.entries: dict[int, LedgerEntry] = {}
         """By command id, in the order of the commands."""
         self._restore: list[Callable[[], object]] | None = None
         """Puts back, last first, what was written over since `atomic` began; None outside."""
@@ -191,9 +200,9 @@ class Ledger(Generic[_TimelineT]):
         finally:
             self._restore = None
 
-    def _set(self, entry: Entry) -> Entry | None:
+    def _set(self, entry: LedgerEntry) -> LedgerEntry | None:
         """Write an entry down; what it writes over."""
-        command_id = entry[0].command_id
+        command_id = entry.receipt.command_id
         old = self.entries.get(command_id)
         if self._restore is not None:
             absent = partial(self.entries.pop, command_id, None)
@@ -211,7 +220,7 @@ class Ledger(Generic[_TimelineT]):
             UnknownCommandError: If there's no receipt of that id.
         """
         try:
-            receipt = self.entries[command_id][0]
+            receipt = self.entries[command_id].receipt
         except (KeyError, TypeError):
             raise UnknownCommandError(command_id, self.newest) from None
         for change in self.changes[bisect_left(self.versions, receipt.version + 1) :]:
@@ -231,12 +240,13 @@ class Ledger(Generic[_TimelineT]):
         entry = self.entries.get(command_id)
         if entry is None:
             return False
-        start, end = entry[0].execute_at, entry[0].end
+        receipt = entry.receipt
+        start, end = receipt.execute_at, receipt.end
         if start is None or end is None:
             return True
-        if not self.versions or self.versions[-1] <= entry[0].version:
+        if not self.versions or self.versions[-1] <= receipt.version:
             return end <= t + ARRIVED
-        for change in self.changes[bisect_left(self.versions, entry[0].version + 1) :]:
+        for change in self.changes[bisect_left(self.versions, receipt.version + 1) :]:
             if change.version >= version:
                 break
             if end <= change.at + ARRIVED:
@@ -252,7 +262,7 @@ class Ledger(Generic[_TimelineT]):
         """A receipt as it was before a version of the timeline; None where there's none."""
         if command_id not in self.entries:
             return None
-        receipt = self.entries[command_id][0]
+        receipt = self.entries[command_id].receipt
         for change in self.changes:
             if receipt.version < change.version < version and receipt.stands:
                 receipt = _after(receipt, change)
@@ -261,11 +271,16 @@ class Ledger(Generic[_TimelineT]):
     def command(self, command_id: int) -> MotionCommand | None:
         """The motion command of an id; None where it was something else or isn't known."""
         entry = self.entries.get(command_id)
-        return None if entry is None else entry[1]
+        return None if entry is None else entry.command
+
+    def notes(self, command_id: int) -> Notes:
+        """What a user must know of a command; empty where there's nothing, or no receipt of that id."""
+        entry = self.entries.get(command_id)
+        return () if entry is None else entry.notes
 
     def all(self) -> tuple[Receipt, ...]:
         """Every receipt, in the order of the ids."""
-        receipts = [receipt for receipt, _ in self.entries.values()]
+        receipts = [entry.receipt for entry in self.entries.values()]
         if not self.changes:
             return tuple(receipts)
         # One pass over the changes with all receipts at once: plans and logs may both be long.
@@ -282,49 +297,49 @@ class Ledger(Generic[_TimelineT]):
         """Commands from a time [s] on to where the arm stands anyway: no segment is theirs."""
         return tuple(command_id for _, command_id in self.stills[bisect_left(self.stills, (t, 0)) :])
 
-    def note(self, receipt: Receipt, command: MotionCommand | None) -> None:
+    def note(self, entry: LedgerEntry) -> None:
         """Write down a command of another ledger, which can't be taken back here."""
-        self._write(((receipt, command),))
+        self._write((entry,))
 
     def reject(self, issued: float | None, asked: float | None, reason: str, version: int) -> Receipt:
         """Give out a receipt for a command that can't be."""
         self.newest += 1
         receipt = Receipt(self.newest, Status.REJECTED, issued, asked, reason=reason, version=version)
-        self._set((receipt, None))
+        self._set(LedgerEntry(receipt))
         return receipt
 
     def accept(
         self,
-        receipt: Receipt,
-        command: MotionCommand | None,
+        entry: LedgerEntry,
         before: _TimelineT,
         change: Change | None,
-        others: Collection[Entry] = (),
+        others: Collection[LedgerEntry] = (),
     ) -> Receipt:
         """Write down an accepted edit.
 
         Args:
-            receipt: Its receipt, of a new id or of one that's written over.
-            command: The motion command, where it's one.
+            entry: Its receipt is of a new id or of one that's written over.
             before: The timeline before it.
             change: What it did to other commands; None for nothing.
-            others: Receipts of other commands that were planned anew.
+            others: Other commands that were planned anew.
 
         Returns:
             The receipt; commands to where the arm stood anyway are added to what it superseded.
         """
+        receipt = entry.receipt
         at = change.at if change is not None else receipt.execute_at or before.end
         first = bisect_left(self.stills, (at, 0))
         later = tuple(self.stills[first:])
         if change is not None and later:
             if change.stills:
-                again = {other.command_id for other, _ in others}
+                again = {other.receipt.command_id for other in others}
                 dropped = (*receipt.superseded, *(i for _, i in later if i not in again))
                 receipt = replace(receipt, superseded_names=dropped)
+                entry = entry._replace(receipt=receipt)
                 del self.stills[first:]
             elif change.moved is not None:
                 self.stills[first:] = [(change.moved(t), i) for t, i in later]
-        overwritten = self._write((*others, (receipt, command)))
+        overwritten = self._write((*others, entry))
         log, stills = (len(self.changes), ()), ((first, later),)
         self.undo_steps.append(Undo(receipt.command_id, at, before, log, overwritten, stills))
         if change is not None:
@@ -333,27 +348,30 @@ class Ledger(Generic[_TimelineT]):
         return receipt
 
     def reinstate(
-        self, receipt: Receipt, before: _TimelineT, change: Change, others: Iterable[Entry] = ()
+        self, entry: LedgerEntry, before: _TimelineT, change: Change, others: Iterable[LedgerEntry] = ()
     ) -> Receipt:
         """Write down an edit that brings back what the newest one dropped.
 
         Args:
-            receipt: Its receipt.
+            entry: What is known of it.
             before: The timeline before it.
             change: Where the commands that come back are now; it takes the place of the change that dropped them.
                 Commands to where the arm stood anyway don't come back.
-            others: Receipts of commands that were planned anew.
+            others: Commands that were planned anew.
         """
         stop = self.undo_steps[-1]
         index, _ = stop.changes
         log = tuple(self.changes[index:])
         self._write_log(index, (change,))
         stills = tuple(i for _, there in stop.stills for _, i in there)
+        receipt = entry.receipt
         if stills:
             receipt = replace(receipt, superseded_names=(*receipt.superseded, *stills))
+            entry = entry._replace(receipt=receipt)
         # The stop itself isn't moved.
-        stopped = replace(self.entries[stop.command_id][0], version=change.version), None
-        overwritten = self._write((*others, stopped, (receipt, None)))
+        stopped = self.entries[stop.command_id]
+        stopped = stopped._replace(receipt=replace(stopped.receipt, version=change.version))
+        overwritten = self._write((*others, stopped, entry))
         at = receipt.execute_at or change.at
         self.undo_steps.append(Undo(receipt.command_id, at, before, (index, log), overwritten, ()))
         self.newest = max(self.newest, receipt.command_id)
@@ -363,12 +381,12 @@ class Ledger(Generic[_TimelineT]):
         if receipt.is_still and receipt.stands and receipt.end is not None:
             insort(self.stills, (receipt.end, receipt.command_id))
 
-    def _write(self, entries: Iterable[Entry]) -> dict[int, Entry | None]:
+    def _write(self, entries: Iterable[LedgerEntry]) -> dict[int, LedgerEntry | None]:
         """Write entries down, and return what they write over."""
         overwritten = {}
         for entry in entries:
-            overwritten[entry[0].command_id] = self._set(entry)
-            self._note_still(entry[0])
+            overwritten[entry.receipt.command_id] = self._set(entry)
+            self._note_still(entry.receipt)
         return overwritten
 
     def _write_log(self, index: int, changes: tuple[Change, ...]) -> None:
@@ -379,12 +397,12 @@ class Ledger(Generic[_TimelineT]):
         self.changes[index:] = changes
         self.versions[index:] = [change.version for change in changes]
 
-    def rewrite(self, receipt: Receipt) -> None:
-        """Write over a receipt of a command that goes on, without a way back."""
-        old, command = self.entries[receipt.command_id]
+    def rewrite(self, receipt: Receipt, notes: Notes | None = None) -> None:
+        """Write over a receipt of a command that goes on, and its notes unless they're None, without a way back."""
+        old, command, known = self.entries[receipt.command_id]
         if old.is_still and old.end is not None and (old.end, old.command_id) in self.stills:
             self.stills.remove((old.end, old.command_id))
-        self._set((receipt, command))
+        self._set(LedgerEntry(receipt, command, known if notes is None else notes))
         self._note_still(receipt)
 
     @property
@@ -408,8 +426,9 @@ class Ledger(Generic[_TimelineT]):
                 self._set(entry)
         if undo.overwritten[undo.command_id] is not None:
             return self.receipt(undo.command_id)
-        mine = replace(mine, reason="undone", version=version, undone=True)
-        self._set((mine, command))
+        notes = (Note(NoteCode.UNDONE),)
+        mine = replace(mine, reason=text_of(notes), version=version, undone=True)
+        self._set(LedgerEntry(mine, command, notes))
         return mine
 
     def fuse(self) -> None:
@@ -432,9 +451,9 @@ class Ledger(Generic[_TimelineT]):
         """
         for command_id, (start, end) in times.items():
             if command_id in self:
-                receipt, command = self.receipt(command_id), self.command(command_id)
+                receipt, entry = self.receipt(command_id), self.entries[command_id]
                 now = replace(receipt, execute_at=start, end=end, version=change.version)
-                self._set((replace(now, superseded_by=None, undone=False), command))
+                self._set(entry._replace(receipt=replace(now, superseded_by=None, undone=False)))
         self._write_log(len(self.changes), (change,))
         self.undo_steps.clear()
         self.settled = (
@@ -443,12 +462,12 @@ class Ledger(Generic[_TimelineT]):
         )
         del self.stills[bisect_left(self.stills, (change.at, 0)) :]
 
-    def break_off(self, change: Change, note: str) -> Receipt:
+    def break_off(self, change: Change, notes: Notes) -> Receipt:
         """Write down that the newest edit is taken back from `change.at` on, and all that was scheduled with it.
 
         Args:
             change: What that does to other commands.
-            note: What the user must know of it besides.
+            notes: What the user must know of it besides.
         """
         undo = self.undo_steps.pop()
         # What came before it can't be taken back any more: its timeline has another past.
@@ -459,13 +478,9 @@ class Ledger(Generic[_TimelineT]):
         )
         self._write_log(len(self.changes), (change,))
         del self.stills[bisect_left(self.stills, (change.at, 0)) :]
-        mine = replace(
-            self.receipt(undo.command_id),
-            reason=f"undone from {change.at:.6g} s on" + (f"; {note}" if note else ""),
-            version=change.version,
-            undone=True,
-        )
-        self._set((mine, self.entries[undo.command_id][1]))
+        notes = (Note(NoteCode.UNDONE_FROM, (change.at,)), *notes)
+        mine = replace(self.receipt(undo.command_id), reason=text_of(notes), version=change.version, undone=True)
+        self._set(LedgerEntry(mine, self.command(undo.command_id), notes))
         return mine
 
 
@@ -501,6 +516,8 @@ class Known:
     """What it answers; None where it's no motion command."""
     profile: Profile
     """By which profile it moves the arm."""
+    notes: Notes = ()
+    """What its receipt says for people, as far as that's known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

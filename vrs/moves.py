@@ -30,8 +30,9 @@ from vrs.commands import (
     Target,
 )
 from vrs.errors import InvalidValueError, PlanningError
-from vrs.insertion import Gap, MovePlanner, joined
+from vrs.insertion import Gap, MovePlanner
 from vrs.model import Array, Limits, RobotModel
+from vrs.notes import Note, NoteCode, Notes
 from vrs.planning import Plan, rounding
 from vrs.planning.path import Tooled, tooled
 from vrs.planning.plan import end_position, slowed
@@ -80,8 +81,6 @@ def solve(target: Target, model: RobotModel, q: Array) -> Array:
     return solution
 
 
-FULL_LIMITS_NOTE = "planned with all of the limits: the arm is too fast for the command's pace or acceleration"
-
 _CONTINUOUS = 0.5
 """Share of the acceleration that moves of a continuous path take: two of them overlap."""
 
@@ -91,7 +90,7 @@ _SLACK = 1.0 + 1e-9
 _Rest = TypeVar("_Rest")
 
 
-def move(command: MotionCommand, model: RobotModel, limits: Limits, state: State) -> tuple[Plan, Array, str]:
+def move(command: MotionCommand, model: RobotModel, limits: Limits, state: State) -> tuple[Plan, Array, Notes]:
     """Plan a command's move from any state, at a pace as at pace 1 and then slowed.
 
     Args:
@@ -101,7 +100,7 @@ def move(command: MotionCommand, model: RobotModel, limits: Limits, state: State
         state: Start.
 
     Returns:
-        The plan, the joints where it ends, and what the user must know of it (empty if nothing).
+        The plan, the joints where it ends, and what the user must know of it.
 
     Raises:
         PlanningError: If no plan keeps the limits.
@@ -110,15 +109,15 @@ def move(command: MotionCommand, model: RobotModel, limits: Limits, state: State
     if is_plain(command):
         return _planned(command, command.speed, model, limits, state)
 
-    def plan(speed: float, allowed: Limits, start: State) -> tuple[Plan, tuple[Array, str]]:
-        made, q, note = _planned(command, speed, model, allowed, start)
-        return made, (q, note)
+    def plan(speed: float, allowed: Limits, start: State) -> tuple[Plan, tuple[Array, Notes]]:
+        made, q, notes = _planned(command, speed, model, allowed, start)
+        return made, (q, notes)
 
-    made, (q, note), hasty = _within_scaled_limits(command, limits, state, plan)
-    return made, q, joined(note, hasty)
+    made, (q, notes), hasty = _within_scaled_limits(command, limits, state, plan)
+    return made, q, notes + hasty
 
 
-def join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tuple[Plan, str]:
+def join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tuple[Plan, Notes]:
     """Plan, as a command moves, from rest at q to the state in which a scheduled move begins; see `move`.
 
     Raises:
@@ -127,11 +126,11 @@ def join(command: MotionCommand, limits: Limits, q: Array, goal: State) -> tuple
     if is_plain(command):
         return planning.run_up(q, goal, command.speed, command.profile, limits)
 
-    def plan(speed: float, allowed: Limits, state: State) -> tuple[Plan, str]:
+    def plan(speed: float, allowed: Limits, state: State) -> tuple[Plan, Notes]:
         return planning.run_up(q, state, speed, command.profile, allowed)
 
-    made, note, hasty = _within_scaled_limits(command, limits, goal, plan)
-    return made, joined(note, hasty)
+    made, notes, hasty = _within_scaled_limits(command, limits, goal, plan)
+    return made, notes + hasty
 
 
 def is_plain(command: MotionCommand) -> bool:
@@ -144,7 +143,7 @@ def _within_scaled_limits(
     limits: Limits,
     state: State,
     plan: Callable[[float, Limits, State], tuple[Plan, _Rest]],
-) -> tuple[Plan, _Rest, str]:
+) -> tuple[Plan, _Rest, Notes]:
     """Plan within a command's share of the limits, at its pace; else, from a moving arm, within all of them."""
     pace = command.pace
     allowed = scale_limits(limits, command.acceleration * (_CONTINUOUS if command.deviation == inf else 1.0))
@@ -157,9 +156,9 @@ def _within_scaled_limits(
             if not moving:
                 raise
         else:
-            return (made if pace == 1.0 or not len(made) else slowed(made, 1.0 / pace)), rest, ""
+            return (made if pace == 1.0 or not len(made) else slowed(made, 1.0 / pace)), rest, ()
     made, rest = plan(command.speed * pace, limits, state)
-    return made, rest, FULL_LIMITS_NOTE
+    return made, rest, (Note(NoteCode.FULL_LIMITS),)
 
 
 def _keeps(state: State, limits: Limits, profile: Profile) -> bool:
@@ -184,7 +183,7 @@ def _time_scaled(state: State, pace: float) -> State:
 
 def _planned(
     command: MotionCommand, speed: float, model: RobotModel, limits: Limits, state: State
-) -> tuple[Plan, Array, str]:
+) -> tuple[Plan, Array, Notes]:
     profile, target = command.profile, command.target
     if command.motion is Motion.LINE:
         from vrs.planning.line import line
@@ -193,20 +192,19 @@ def _planned(
         if isinstance(target, JointTarget):
             model.limits.check(target.q)
             X = seen.forward(target.q)
-            plan, note = line(state, X, speed, profile, seen, limits, q_goal=target.q)
-            return plan, target.q, note
+            plan, notes = line(state, X, speed, profile, seen, limits, q_goal=target.q)
+            return plan, target.q, notes
         X = target.X @ seen.tool if isinstance(seen, Tooled) else target.X
-        plan, note = line(state, X, speed, profile, seen, limits, configuration=target.configuration)
-        return plan, end_position(plan) if len(plan) else state.q, note
+        plan, notes = line(state, X, speed, profile, seen, limits, configuration=target.configuration)
+        return plan, end_position(plan) if len(plan) else state.q, notes
     # The arm solution is chosen from where the arm will be at the final execution time.
     q = solve(target, model, state.q)
-    plan, note = planning.move(state, q, speed, profile, limits)
-    return plan, q, note
+    plan, notes = planning.move(state, q, speed, profile, limits)
+    return plan, q, notes
 
 
 _SAME = 1e-15
 """Times that differ by less, as a share of them or of a second, are one."""
-STOPS = "stops at the via: no overlap keeps the limits"
 
 
 class _Way(NamedTuple):
@@ -215,7 +213,7 @@ class _Way(NamedTuple):
     start: float
     """When it begins [s]."""
     plan: Plan
-    note: str
+    notes: Notes
 
 
 class Passer:
@@ -250,7 +248,7 @@ class Passer:
         self.command, self.gap, self.t, self.now = command, gap, t, now
         self.passed_by, self.before, smooth = passed
         self.jerky = command.profile is Profile.JERK_LIMITED
-        self.mixed = "rounded with a move of parabolas" if self.jerky and not smooth else ""
+        self.mixed: Notes = (Note(NoteCode.ROUNDED_WITH_PARABOLAS),) if self.jerky and not smooth else ()
 
     def at_full_pace(self, plan: Plan) -> Plan:
         """A plan as it is where time runs 1/pace times as fast."""
@@ -260,39 +258,39 @@ class Passer:
         """The other way round."""
         return plan if self.command.pace == 1.0 or not len(plan) else slowed(plan, 1.0 / self.command.pace)
 
-    def slower_first(self, limits: Limits, begin: float) -> tuple[Plan, str] | None:
+    def slower_first(self, limits: Limits, begin: float) -> tuple[Plan, Notes] | None:
         """The move before, planned anew within other limits; None where it isn't known."""
         if self.before is None:
             return None
         again = replace(self.before, target=JointTarget(self.gap.state.q))
-        slow, _, note = self.planner(again, limits)(self.timeline.state_before(begin))
-        return self.at_full_pace(slow), note
+        slow, _, notes = self.planner(again, limits)(self.timeline.state_before(begin))
+        return self.at_full_pace(slow), notes
 
     def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> _Way:
         """Overlap as far as the deviation and the limits allow."""
         command = self.command
         quick = self.at_full_pace(first)
 
-        def plans(limits: Limits) -> tuple[Plan, Plan, str]:
-            second, _, note = self.planner(onward, limits)(self.gap.state)
+        def plans(limits: Limits) -> tuple[Plan, Plan, Notes]:
+            second, _, notes = self.planner(onward, limits)(self.gap.state)
             second = self.at_full_pace(second)
             again = None if limits is self.limits else self.slower_first(limits, begin)
-            slow, more = (quick, "") if again is None else again
-            return slow, second, joined(more, note, self.mixed)
+            slow, more = (quick, ()) if again is None else again
+            return slow, second, more + notes + self.mixed
 
         model = tooled(self.model, command.tool)
         way = rounding.rounded(plans, command.deviation, model, self.limits, command.profile)
         if way.first is not quick:
-            return _Way(begin, self.at_pace(way.whole), way.note)
+            return _Way(begin, self.at_pace(way.whole), way.notes)
         start = max(self._before(way.delta), begin)
         rest = rounding.later(way.whole, way.first.duration - way.delta)
-        return _Way(start, self.at_pace(rest), way.note)
+        return _Way(start, self.at_pace(rest), way.notes)
 
-    def continuous(self, first: Plan, second: Plan, begin: float, note: str) -> _Way:
+    def continuous(self, first: Plan, second: Plan, begin: float, notes: Notes) -> _Way:
         """Begin where the move before begins to brake; where both can't have their acceleration, it gets half."""
         t, command, pace, limits = self.t, self.command, self.command.pace, self.limits
         quick, onward = self.at_full_pace(first), self.at_full_pace(second)
-        notes = joined(note, self.mixed)
+        notes += self.mixed
         if not len(second):
             return _Way(t, second, notes)
         ready = starting(onward, limits, _straight(command, self.model))
@@ -312,8 +310,8 @@ class Passer:
             delta, plan = continuous(slow, onward, inf, ramps, limits, jerk=self.jerky)
             if delta > 0.0:
                 lead = _until(slow, slow.duration - delta)
-                return self._at(begin, lead.then(plan), delta, joined(more, notes))
-        return _Way(t, second, joined(notes, STOPS))
+                return self._at(begin, lead.then(plan), delta, more + notes)
+        return _Way(t, second, (*notes, Note(NoteCode.STOPS_AT_VIA)))
 
     def _before(self, delta: float) -> float:
         """The time from which an overlap [s] is left; a knot where one is as near as rounding leaves it."""
@@ -324,9 +322,9 @@ class Passer:
                 return knot
         return start
 
-    def _at(self, start: float, plan: Plan, delta: float, notes: str) -> _Way:
-        passed = f"begins {delta / self.command.pace:.3g} s before command {self.passed_by} is over"
-        return _Way(start, self.at_pace(plan), joined(notes, passed))
+    def _at(self, start: float, plan: Plan, delta: float, notes: Notes) -> _Way:
+        passed = Note(NoteCode.BEGINS_BEFORE, (delta / self.command.pace, self.passed_by))
+        return _Way(start, self.at_pace(plan), (*notes, passed))
 
 
 def _straight(command: MotionCommand | None, model: RobotModel) -> RobotModel | None:

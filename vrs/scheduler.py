@@ -49,7 +49,6 @@ from vrs.insertion import (
     gap_at,
     hold,
     insert,
-    joined,
     lengthened,
     move_before,
     moved,
@@ -61,9 +60,10 @@ from vrs.insertion import (
     span,
     stay,
 )
-from vrs.ledger import ARRIVED, MOST_KNOWN, Change, Entry, Known, Ledger, Names, Receipt, Standing, Status
+from vrs.ledger import ARRIVED, MOST_KNOWN, Change, Known, Ledger, LedgerEntry, Names, Receipt, Standing, Status
 from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.moves import Passer, join, move
+from vrs.notes import Note, NoteCode, Notes, is_rough, text_of
 from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
 from vrs.planning import Plan, rounding, steering
 from vrs.planning.certificate import violation
@@ -85,7 +85,7 @@ class EditTiming(NamedTuple):
     issued: float | None
     asked: float | None
     status: Status
-    reason: str
+    notes: Notes
 
 
 class BaseScheduler(Generic[TimelineT]):
@@ -107,7 +107,7 @@ class BaseScheduler(Generic[TimelineT]):
             vars(self).update(saved)
             raise
 
-    def brake(self, t: float, command_id: int) -> tuple[TimelineT, str]:
+    def brake(self, t: float, command_id: int) -> tuple[TimelineT, Notes]:
         """What is scheduled, with the robot braking from t [s] on for a command; and what must be said of it."""
         raise NotImplementedError
 
@@ -128,7 +128,7 @@ class BaseScheduler(Generic[TimelineT]):
         late = _passed(asked.t, now)
         if self.lateness is Lateness.REJECT and not isinstance(command, Stop):
             raise PlanningError(late)
-        return asked._replace(t=now, status=Status.POSTPONED, reason=f"{late}: at once")
+        return asked._replace(t=now, status=Status.POSTPONED, notes=(Note(NoteCode.LATE_AT_ONCE, (late,)),))
 
     def beginning(self, command: MotionCommand | DriveCommand, now: float | None, soonest: float) -> EditTiming:
         """When a motion begins: as asked, else as soon as it can; a late one after the segment that is under way.
@@ -150,7 +150,7 @@ class BaseScheduler(Generic[TimelineT]):
         if self.lateness is Lateness.REJECT:
             raise PlanningError(late)
         t = self.end_of_active(now)
-        return asked._replace(t=t, status=Status.POSTPONED, reason=f"{late}: postponed to {t:.9g} s")
+        return asked._replace(t=t, status=Status.POSTPONED, notes=(Note(NoteCode.LATE_POSTPONED, (late, t)),))
 
     def touched(self, edit: Edit[TimelineT], t: float) -> tuple[Names, Names]:
         """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
@@ -164,31 +164,29 @@ class BaseScheduler(Generic[TimelineT]):
 
     def accept(
         self,
-        receipt: Receipt,
-        command: MotionCommand | None,
+        entry: LedgerEntry,
         edit: Edit[TimelineT],
         at: float,
         *,
         appended: bool = False,
-        others: tuple[Entry, ...] = (),
+        others: tuple[LedgerEntry, ...] = (),
     ) -> Receipt:
         """Put an edit in force, and write its receipt down.
 
         Args:
-            receipt: Of the command that made the edit.
-            command: That command, where it's a motion.
+            entry: Of the command that made the edit.
             edit: What it did.
             at: Earliest time that the edit changed [s].
             appended: Whether all that was scheduled stays.
-            others: Receipts and commands of other moves that were planned anew.
+            others: Other moves that were planned anew.
         """
         before, self.timeline = self.timeline, edit.timeline
         change = None
         if not appended:
             dropped = None if edit.dropped is None else frozenset(edit.dropped)
             moved = partial(add, edit.shift) if edit.shift > 0 else None
-            change = Change(edit.timeline.version, receipt.command_id, at, dropped, moved)
-        return self.ledger.accept(receipt, command, before, change, others)
+            change = Change(edit.timeline.version, entry.receipt.command_id, at, dropped, moved)
+        return self.ledger.accept(entry, before, change, others)
 
     def named(self, timeline: TimelineT, index: int, t: float) -> Names:
         """Commands that arrive after t and have segments from an index on."""
@@ -220,8 +218,8 @@ class BaseScheduler(Generic[TimelineT]):
             return self.ledger.take_back(version)
         if now >= self.timeline.end:
             return None
-        self.timeline, note = self.brake(now, last.command_id)
-        return self.ledger.break_off(Change(version, last.command_id, now, None), note)
+        self.timeline, notes = self.brake(now, last.command_id)
+        return self.ledger.break_off(Change(version, last.command_id, now, None), notes)
 
     def undo_refusal(self, now: float | None) -> str:
         """Why there's nothing to take back; see `vrs.engine.Engine.undo_refusal`."""
@@ -253,12 +251,12 @@ def _as_asked(
     """
     issued, asked = command.issued_at, command.execute_at
     if now is None:
-        return EditTiming(soonest if asked is None else asked, issued, asked, Status.ACCEPTED, "")
+        return EditTiming(soonest if asked is None else asked, issued, asked, Status.ACCEPTED, ())
     issued = now if issued is None else issued
     t = max(soonest, now, issued) if asked is None else asked
     if t < issued:
         raise PlanningError(f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s")
-    return EditTiming(t, issued, asked, Status.ACCEPTED, "")
+    return EditTiming(t, issued, asked, Status.ACCEPTED, ())
 
 
 def _passed(t: float, now: float) -> str:
@@ -319,14 +317,14 @@ class Scheduler(BaseScheduler[Timeline]):
         issued = command.issued_at if command.issued_at is not None else now
         asked, end = command.execute_at, self.timeline.end
         try:
-            t, _, _, status, reason = self.beginning(command, now, end if now is None else now)
+            t, _, _, status, notes = self.beginning(command, now, end if now is None else now)
         except PlanningError as error:
             return self.reject(issued, asked, str(error))
         if command.insertion is Insertion.APPEND and t < end:
             t = end
             if asked is not None:
                 status = Status.POSTPONED
-                reason = joined(reason, f"appended at the end of the plan, {t:.9g} s")
+                notes = (*notes, Note(NoteCode.APPENDED, (t,)))
         command_id = self.ledger.newest + 1
         planner, joiner = self.planner(command), self.joiner(command)
         try:
@@ -340,12 +338,12 @@ class Scheduler(BaseScheduler[Timeline]):
         appended, t = appended and edit.start == t, edit.start
         shifted, dropped = ((), ()) if appended else self.touched(edit, t)
         target = frozen_array(edit.target) if edit.target.flags.writeable else edit.target
+        notes += edit.notes
         receipt = Receipt(
-            command_id, status, issued, asked, t, edit.arrival, target,
-            joined(reason, edit.notes), edit.timeline.version, edit.shift,
-            shifted_names=shifted, superseded_names=dropped,
+            command_id, status, issued, asked, t, edit.arrival, target, text_of(notes), edit.timeline.version,
+            edit.shift, shifted_names=shifted, superseded_names=dropped,
         )  # fmt: skip
-        return self.accept(receipt, command, edit, t, appended=appended)
+        return self.accept(LedgerEntry(receipt, command, notes), edit, t, appended=appended)
 
     def _passing(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit[Timeline]:
         """Insert a move that begins before the one that ends at t is over, and passes its target at a distance.
@@ -368,24 +366,24 @@ class Scheduler(BaseScheduler[Timeline]):
             made = fill(self.timeline, gap, command_id, planner, joiner, dropped)
             if command.deviation == inf:
                 return made
-            return made._replace(notes=joined(made.notes, "no move ends where this one begins: nothing to round"))
+            return made._replace(notes=(*made.notes, Note(NoteCode.NOTHING_TO_ROUND)))
         first, begin, passed_by = found
         rest = np.zeros_like(gap.state.q)
         gap = gap._replace(state=State(gap.state.q, rest, rest))
-        second, target, note = planner(gap.state)
+        second, target, notes = planner(gap.state)
         before = self.ledger.command(passed_by)
         smooth = command.profile is not Profile.JERK_LIMITED or self.smooth(passed_by)
         passer = Passer(
             self.model, self.limits, self.timeline, self.planner, command, gap, t, (passed_by, before, smooth), now
         )
         if command.deviation == inf:
-            way = passer.continuous(first, second, begin, note)
+            way = passer.continuous(first, second, begin, notes)
         else:
             way = passer.rounded(first, begin, replace(command, target=JointTarget(target)))
         if way.start < t and dropped is not None:
             dropped = (passed_by, *dropped)
         gap = gap._replace(cut=way.start, start=way.start)
-        return fill(self.timeline, gap, command_id, lambda _: (way.plan, target, way.note), joiner, dropped)
+        return fill(self.timeline, gap, command_id, lambda _: (way.plan, target, way.notes), joiner, dropped)
 
     def planner(self, command: MotionCommand, limits: Limits | None = None) -> MovePlanner:
         """Plan a command's move, under the limits in force now or others."""
@@ -395,7 +393,7 @@ class Scheduler(BaseScheduler[Timeline]):
         """Plan a joining move at a command's speed and by its profile."""
         return partial(join, command, self.limits)
 
-    def stop_at(self, t: float) -> tuple[Plan, str]:
+    def stop_at(self, t: float) -> tuple[Plan, Notes]:
         """Plan a stop of each joint at t [s], jerk-limited where the motion is; and what must be said of it."""
         profile = self.profile(owner_before(self.timeline, t))
         return stop(self.timeline.state_before(t), profile, self.limits)
@@ -416,9 +414,7 @@ class Scheduler(BaseScheduler[Timeline]):
 
     def smooth(self, command_id: int) -> bool:
         """Whether a command moves the arm with bounded jerk throughout."""
-        reason = self.ledger.receipt(command_id).reason if command_id in self.ledger else ""
-        rough = "parabolas" in reason or "accelerations dropped" in reason
-        return self.profile(command_id) is Profile.JERK_LIMITED and not rough
+        return self.profile(command_id) is Profile.JERK_LIMITED and not is_rough(self.ledger.notes(command_id))
 
     def steer(self, command: SteerCommand, now: float | None) -> Receipt:
         """Go on, from now, as a hand asks; inputs in a row with nothing else between are one command."""
@@ -431,7 +427,7 @@ class Scheduler(BaseScheduler[Timeline]):
             if hold <= 0:
                 raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
             state = self.timeline.state_before(t)
-            plan, note, hindrance = steering.steer(
+            plan, notes, hindrance = steering.steer(
                 state, command.rates, command.twist, command.frame, hold, self.model, self.limits
             )
         except REFUSALS as error:
@@ -455,23 +451,24 @@ class Scheduler(BaseScheduler[Timeline]):
         target = end_position(plan) if len(plan) else state.q
         self.note_profile(command_id, Profile.JERK_LIMITED)
         self.session = _Session(command_id, after.version, start)
+        notes = moment.notes + notes
         receipt = Receipt(
             command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
-            joined(moment.reason, note), after.version, hindrance=hindrance,
+            text_of(notes), after.version, hindrance=hindrance,
         )  # fmt: skip
         if session is not None:
             self.timeline = after
-            self.ledger.rewrite(receipt)
+            self.ledger.rewrite(receipt, notes)
             return receipt
         edit = Edit(after, t, t + plan.duration, target, dropped=None)
         receipt = replace(receipt, superseded_names=self.touched(edit, t)[1])
-        return self.accept(receipt, None, edit, t)
+        return self.accept(LedgerEntry(receipt, notes=notes), edit, t)
 
-    def brake(self, t: float, command_id: int) -> tuple[Timeline, str]:
+    def brake(self, t: float, command_id: int) -> tuple[Timeline, Notes]:
         """What is scheduled, with each joint braking from t on; and what must be said of it."""
-        stop, note = self.stop_at(t)
+        stop, notes = self.stop_at(t)
         self.note_profile(command_id, self.profile(owner_before(self.timeline, t)))
-        return self.timeline.edited(t, [piece(stop, command_id)]), note
+        return self.timeline.edited(t, [piece(stop, command_id)]), notes
 
     @property
     def steered(self) -> tuple[int, float] | None:
@@ -544,51 +541,60 @@ class Scheduler(BaseScheduler[Timeline]):
             raise PlanningError(f"command {receipt.command_id} began at {start:.6g} s")
         motion = self._motion(receipt)
         planner, joiner = self.planner(motion), self.joiner(motion)
-        reason = joined(moment.reason, f"retimed from {start:.6g} s")
+        notes = (*moment.notes, Note(NoteCode.RETIMED, (start,)))
         if segments is not None:
             earliest, latest = room(self.timeline, *segments)
             if earliest <= t < latest:
                 made = moved(self.timeline, *segments, t, receipt.command_id, planner, joiner, self.stop_at)
                 at = min(start, t, self.timeline.start_of(segments[0]))
-                return self.accept(self._as_planned(receipt, made, moment, reason, at), motion, made, at)
+                return self.accept(self._as_planned(receipt, motion, made, moment, notes, at), made, at)
         # It goes past another move: it's taken out, and commanded again at its new time.
         before = self.timeline
-        taken, notes = self._take_out(receipt, start, now)
+        taken, more = self._take_out(receipt, start, now)
         try:
             made = insert(self.timeline, t, Insertion.SPLICE, receipt.command_id, planner, joiner)
         except REFUSALS:
             self.ledger.take_back(before.version)
             self.timeline = before
             raise
-        answer = self._as_planned(receipt, made, moment, reason, t)
+        planned = self._as_planned(receipt, motion, made, moment, notes, t)
+        answer, notes = planned.receipt, planned.notes + more
         answer = replace(
             answer,
             shift=taken.shift + made.shift,
             shifted_names=partial(_united, taken, answer, "shifted"),
             superseded_names=partial(_united, taken, answer, "superseded"),
-            reason=joined(answer.reason, notes),
+            reason=text_of(notes),
         )
-        accepted = self.accept(answer, motion, made, t)
+        accepted = self.accept(LedgerEntry(answer, motion, notes), made, t)
         self.ledger.fuse()
         return accepted
 
     def _as_planned(
-        self, receipt: Receipt, made: Edit[Timeline], moment: EditTiming, reason: str, at: float
-    ) -> Receipt:
-        """A command's receipt after it was planned anew, by an edit that changes nothing before a time."""
+        self,
+        receipt: Receipt,
+        motion: MotionCommand,
+        made: Edit[Timeline],
+        moment: EditTiming,
+        notes: Notes,
+        at: float,
+    ) -> LedgerEntry:
+        """A command after it was planned anew, by an edit that changes nothing before a time."""
         shifted, dropped = self.touched(made, at)
-        return replace(
+        notes += made.notes
+        receipt = replace(
             receipt,
             status=moment.status,
             execute_at=made.start,
             end=made.arrival,
             q=frozen_array(made.target),
-            reason=joined(reason, made.notes),
+            reason=text_of(notes),
             version=made.timeline.version,
             shift=made.shift,
             shifted_names=shifted,
             superseded_names=dropped,
         )
+        return LedgerEntry(receipt, motion, notes)
 
     def _cancel(self, command: Cancel, receipt: Receipt, now: float | None) -> Receipt:
         moment = self.moment(command, now, -np.inf)
@@ -599,7 +605,7 @@ class Scheduler(BaseScheduler[Timeline]):
         """The knot at which a move begins [s]: its receipt's time may lie a rounding later."""
         return np.inf if segments is None else self.timeline.start_of(segments[0])
 
-    def _take_out(self, receipt: Receipt, t: float, now: float | None) -> tuple[Receipt, str]:
+    def _take_out(self, receipt: Receipt, t: float, now: float | None) -> tuple[Receipt, Notes]:
         """Take a move out of the plan from t on; the one after it goes from where the arm then stands.
 
         Returns:
@@ -609,30 +615,34 @@ class Scheduler(BaseScheduler[Timeline]):
         segments = span(timeline, receipt.command_id, receipt.execute_at if receipt.execute_at is not None else t)
         started = receipt.execute_at is not None and receipt.execute_at < t
         started = started or (now is not None and self._first(segments) < now)
-        reason = f"cancelled from {t:.6g} s on" if started else "cancelled"
-        others: tuple[Entry, ...] = ()
+        note = Note(NoteCode.CANCELLED_FROM, (t,)) if started else Note(NoteCode.CANCELLED)
+        others: tuple[LedgerEntry, ...] = ()
         if segments is None:
             made = Edit(timeline.with_version(timeline.version + 1), t, t, timeline.state_before(t).q)
         else:
             # Receipts' times are rounded: what hasn't begun is taken out from its first segment on.
             gap, following = removed(timeline, *segments, t if started else -np.inf, self.stop_at)
             if following is None:
-                made = Edit(timeline.edited(gap.cut, gap.lead), gap.start, gap.start, gap.state.q, notes=gap.note)
+                made = Edit(timeline.edited(gap.cut, gap.lead), gap.start, gap.start, gap.state.q, notes=gap.notes)
             else:
                 made, others = self._replanned(gap, following, receipt.command_id)
         shifted, dropped = self.touched(made, t)
+        notes = (note, *made.notes)
         answer = replace(
             receipt,
-            reason=joined(reason, made.notes),
+            reason=text_of(notes),
             version=made.timeline.version,
             undone=True,
             shift=made.shift,
             shifted_names=shifted,
             superseded_names=dropped,
         )
-        return self.accept(answer, self.ledger.command(receipt.command_id), made, t, others=others), made.notes
+        entry = LedgerEntry(answer, self.ledger.command(receipt.command_id), notes)
+        return self.accept(entry, made, t, others=others), made.notes
 
-    def _replanned(self, gap: Gap, following: int, cancelled: int) -> tuple[Edit[Timeline], tuple[Entry, ...]]:
+    def _replanned(
+        self, gap: Gap, following: int, cancelled: int
+    ) -> tuple[Edit[Timeline], tuple[LedgerEntry, ...]]:
         """Plan the move that begins with a segment anew, from where a gap leaves the arm."""
         timeline = self.timeline
         other = timeline.owner_of(following)
@@ -643,19 +653,19 @@ class Scheduler(BaseScheduler[Timeline]):
             made = fill(timeline, gap, other, self.planner(motion), self.joiner(motion))
         except (*REFUSALS, LookupError):
             # It can't be planned from there: the arm goes to where it begins.
-            note = f"the arm still goes to where command {other} begins"
+            note = Note(NoteCode.LEADS_ON, (other,))
             gap = braked(timeline, gap, following, self.stop_at)
             join = self.joiner(MotionCommand(JointTarget(gap.state.q), profile=self.profile(cancelled)))
-            return fill(timeline, gap, cancelled, stay(note), join), ()
-        text = f"goes from elsewhere, as command {cancelled} was cancelled"
+            return fill(timeline, gap, cancelled, stay((note,)), join), ()
+        notes = (Note(NoteCode.REPLANNED, (cancelled,)), *made.notes)
         shifted = replace(
             receipt,
             execute_at=made.start,
             end=made.arrival,
-            reason=joined(text, made.notes),
+            reason=text_of(notes),
             version=made.timeline.version,
         )
-        return made, ((shifted, self.ledger.command(other)),)
+        return made, (LedgerEntry(shifted, self.ledger.command(other), notes),)
 
     def _insert_via(self, command: InsertVia, receipt: Receipt, now: float | None) -> Receipt:
         moment = self.moment(command, now, -np.inf)
@@ -667,24 +677,24 @@ class Scheduler(BaseScheduler[Timeline]):
             raise PlanningError(f"command {receipt.command_id} has no move left that could go by a via")
         to_via = replace(motion, target=command.target)
 
-        def by_way(state: State) -> tuple[Plan, Array, str]:
+        def by_way(state: State) -> tuple[Plan, Array, Notes]:
             _, via, _ = self.planner(to_via)(state)
             rest = State(via, np.zeros_like(via), np.zeros_like(via))
             there = replace(motion, target=JointTarget(via))
 
-            def plans(limits: Limits) -> tuple[Plan, Plan, str]:
-                first, _, first_note = self.planner(there, limits)(state)
-                second, _, second_note = self.planner(motion, limits)(rest)
-                return first, second, joined(first_note, second_note)
+            def plans(limits: Limits) -> tuple[Plan, Plan, Notes]:
+                first, _, first_notes = self.planner(there, limits)(state)
+                second, _, second_notes = self.planner(motion, limits)(rest)
+                return first, second, first_notes + second_notes
 
             way = rounding.rounded(plans, command.deviation, self.model, self.limits, motion.profile)
-            return way.whole, frozen_array(receipt.q if receipt.q is not None else via), way.note
+            return way.whole, frozen_array(receipt.q if receipt.q is not None else via), way.notes
 
         gap = Gap(t, t, timeline.state_before(t), next_move(timeline, segments[1]))
         made = fill(timeline, gap, receipt.command_id, by_way, self.joiner(motion))
         made = made._replace(start=start)
-        reason = joined(moment.reason, "goes by a via")
-        return self.accept(self._as_planned(receipt, made, moment, reason, t), motion, made, t)
+        notes = (*moment.notes, Note(NoteCode.BY_A_VIA))
+        return self.accept(self._as_planned(receipt, motion, made, moment, notes, t), made, t)
 
     def scale(self, command: ScaleTime, now: float | None) -> Receipt:
         """Let what is scheduled run at another pace.
@@ -714,12 +724,13 @@ class Scheduler(BaseScheduler[Timeline]):
             return t + (law.when(old) if old < s else law.duration + (old - s) / factor)
 
         change = Change(after.version, self.ledger.newest + 1, t, frozenset(), moved, stills=False)
-        receipt = self._edit_receipt(moment, after, t + law.duration, f"{factor:g} times as fast")
+        entry = self._edit_entry(moment, after, t + law.duration, (Note(NoteCode.AT_A_PACE, (factor,)),))
         begin = t + law.waits
         if factor != 1 and begin < timeline.end:
-            receipt = replace(receipt, shifted_names=self.named(timeline, max(timeline.index_at(begin), 0), begin))
+            shifted = self.named(timeline, max(timeline.index_at(begin), 0), begin)
+            entry = entry._replace(receipt=replace(entry.receipt, shifted_names=shifted))
         self.timeline = after
-        return self.ledger.accept(receipt, None, timeline, change)
+        return self.ledger.accept(entry, timeline, change)
 
     def stop(self, command: Stop, now: float | None) -> Receipt:
         """Stop along the present motion, from the commanded state, and drop what is scheduled."""
@@ -729,8 +740,8 @@ class Scheduler(BaseScheduler[Timeline]):
         profile = self.profile(owner_before(timeline, t))
         jerky = profile is Profile.JERK_LIMITED
         state = timeline.state_before(t)
-        braking, note = self.stop_at(t)
-        reason = "stood"
+        braking, more = self.stop_at(t)
+        notes: Notes = (Note(NoteCode.STOOD),)
         pieces: list[Piece] = []
         if len(braking):
             straight = self._straight_stop(state, t) if jerky else None
@@ -743,21 +754,21 @@ class Scheduler(BaseScheduler[Timeline]):
             keeps = violation(as_plan(way, timeline.dof), self.limits, jerk=jerky) is None
             on_way = sum(sum(part.durations) for part in way)
             if smooth and keeps and is_prompt_stop(on_way, braking.duration):
-                reason = "stopped on its way"
+                notes = (Note(NoteCode.STOPPED_ON_WAY),)
                 pieces = [part._replace(command_id=number) for part in way]
             else:
-                reason = joined("each joint braked: the limits don't let it keep to its way", note)
+                notes = (Note(NoteCode.EACH_JOINT_BRAKED), *more)
                 pieces = [piece(braking, number)]
         after = timeline.edited(t, pieces)
         end = t + sum(sum(part.durations) for part in pieces)
         names = self.named(timeline, max(timeline.index_at(t), 0), t)
-        receipt = self._edit_receipt(moment, after, end, reason)
-        receipt = replace(receipt, q=frozen_array(after.sample(end)), superseded_names=names)
+        entry = self._edit_entry(moment, after, end, notes)
+        receipt = replace(entry.receipt, q=frozen_array(after.sample(end)), superseded_names=names)
         change = Change(after.version, number, t, None)
         self.timeline = after
         self.note_profile(number, profile)
         self.paused = Paused(after.version, timeline, t)
-        return self.ledger.accept(receipt, None, timeline, change)
+        return self.ledger.accept(entry._replace(receipt=receipt), timeline, change)
 
     def resume(self, command: Resume, now: float | None) -> Receipt:
         """Go on with what the newest stop interrupted and dropped.
@@ -792,7 +803,7 @@ class Scheduler(BaseScheduler[Timeline]):
         if unfinished and not goes_on and tail is None:
             raise PlanningError(f"there's nothing to resume: command {owner} steered, and its inputs are old")
         joiner = self.joiner(motion or MotionCommand(JointTarget(old.initial), profile=self.profile(owner)))
-        planner = stay("")
+        planner = stay(())
         if motion is not None and interrupted is not None and interrupted.q is not None and goes_on:
             planner = self.planner(replace(motion, target=JointTarget(interrupted.q)))
         rest = np.zeros(timeline.dof)
@@ -818,17 +829,19 @@ class Scheduler(BaseScheduler[Timeline]):
         lost = [
             i for i in old.owners(max(index, 0), len(old) if tail is None else tail) if not (goes_on and i == owner)
         ]
-        others: tuple[Entry, ...] = ()
+        others: tuple[LedgerEntry, ...] = ()
         if interrupted is not None and goes_on:
-            reason = joined("goes on after a stop", made.notes)
-            again = replace(interrupted, execute_at=t, end=made.arrival, version=after.version, reason=reason)
-            others = ((again, motion),)
+            notes = (Note(NoteCode.GOES_ON), *made.notes)
+            again = replace(
+                interrupted, execute_at=t, end=made.arrival, version=after.version, reason=text_of(notes)
+            )
+            others = (LedgerEntry(again, motion, notes),)
         moment = moment._replace(t=t)
-        receipt = self._edit_receipt(moment, after, made.arrival, joined("resumed", made.notes))
+        entry = self._edit_entry(moment, after, made.arrival, (Note(NoteCode.RESUMED), *made.notes))
         names = tuple(i for i in lost if not self.ledger.arrived(i, paused.at))
-        receipt = replace(receipt, shift=shift, superseded_names=names)
+        receipt = replace(entry.receipt, shift=shift, superseded_names=names)
         self.timeline = after
-        return self.ledger.reinstate(receipt, timeline, change, others)
+        return self.ledger.reinstate(entry._replace(receipt=receipt), timeline, change, others)
 
     def _straight_stop(self, state: State, t: float) -> Plan | None:
         """A stop at t along a way that's straight in joint space, and long enough; None where it isn't."""
@@ -839,11 +852,12 @@ class Scheduler(BaseScheduler[Timeline]):
         ahead, needed = self.timeline.sample(until) - state.q, end_state(found).q - state.q
         return found if ahead @ state.qd >= needed @ state.qd else None
 
-    def _edit_receipt(self, moment: EditTiming, after: Timeline, end: float, reason: str) -> Receipt:
-        reason = joined(moment.reason, reason)
+    def _edit_entry(self, moment: EditTiming, after: Timeline, end: float, notes: Notes) -> LedgerEntry:
+        notes = moment.notes + notes
         number = self.ledger.newest + 1
         stamps = moment.issued, moment.asked, moment.t
-        return Receipt(number, moment.status, *stamps, end, None, reason, after.version)
+        receipt = Receipt(number, moment.status, *stamps, end, None, text_of(notes), after.version)
+        return LedgerEntry(receipt, notes=notes)
 
     def _check_faster(self, t: float, factor: float) -> None:
         """Refuse a pace that passes a limit, and say how fast it could be.
@@ -899,7 +913,12 @@ class Scheduler(BaseScheduler[Timeline]):
         for command_id in ledger.stills_from(now):
             names.setdefault(command_id)
         known = tuple(
-            Known(ledger.receipt(command_id), ledger.command(command_id), self.profile(command_id))
+            Known(
+                ledger.receipt(command_id),
+                ledger.command(command_id),
+                self.profile(command_id),
+                ledger.notes(command_id),
+            )
             for command_id in sorted(names)[-MOST_KNOWN:]
             if command_id != HOLD and command_id in ledger
         )
@@ -910,7 +929,7 @@ class Scheduler(BaseScheduler[Timeline]):
         self.ledger.newest = stand.newest
         self.lateness, self.limits = stand.lateness, stand.limits
         for one in stand.known:
-            self.ledger.note(one.receipt, one.command)
+            self.ledger.note(LedgerEntry(one.receipt, one.command, one.notes))
             if one.command is None:
                 self.note_profile(one.receipt.command_id, one.profile)
         if stand.steered is not None and stand.steered[0] in self.ledger:

@@ -43,7 +43,7 @@ from robots.onboard.navigator import Navigator, NavigatorConfig
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.path import Arc, MovingPath, PathGenerator, PathGeneratorConfig, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
-from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
+from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap, RouteProblem
 from robots.onboard.servo import FeedForward, Servo, ServoGains, StopMotion, from_commanded, from_measured
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
 from robots.onboard.trajectory_tracking import KnownTrajectory, Reference, TrackingConfig, TrajectoryTracker
@@ -147,6 +147,7 @@ __all__ = [
     "Route",
     "RouteConfig",
     "RouteMap",
+    "RouteProblem",
     "SearchConfig",
     "SensorFault",
     "SensorMonitor",

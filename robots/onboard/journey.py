@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.path import Arc, MovingPath
 from robots.onboard.path_following import PathFollowingConfig, PathFollowingController
-from robots.onboard.routes import NoRoute, Point, Route, RouteMap
+from robots.onboard.routes import NoRoute, Point, Route, RouteMap, RouteProblem
 from vrs.checks import check_fields, finite, validated, within
 from vrs.mobile import advanced, wrapped
 
@@ -210,6 +210,8 @@ class Journey:
         self.state = JourneyState.IDLE
         self.reason = ""
         """Why it waits or has failed."""
+        self.problem: RouteProblem | None = None
+        """What a route to the goal fails for while it waits or has failed so; None where it's something else."""
         self.goal: Goal | None = None
         self.route: Route | None = None
         """The way that's being driven."""
@@ -234,7 +236,8 @@ class Journey:
         """
         self._begun = finite("now", now, "finite seconds")
         self.goal, self._tried, self.routes = goal, 0, 0
-        self.state, self.reason, self._waiting_since = JourneyState.IDLE, "", math.inf
+        self.state, self.reason, self.problem = JourneyState.IDLE, "", None
+        self._waiting_since = math.inf
         return self._set_out(posture, now)
 
     def end(self) -> None:
@@ -277,8 +280,8 @@ class Journey:
             return 0.0
         return place.left
 
-    def _become(self, state: JourneyState, reason: str = "") -> JourneyState:
-        self.state, self.reason = state, reason
+    def _become(self, state: JourneyState, reason: str = "", problem: RouteProblem | None = None) -> JourneyState:
+        self.state, self.reason, self.problem = state, reason, problem
         if state is not JourneyState.DRIVING:
             self.route = self._controller = None
         return state
@@ -304,11 +307,11 @@ class Journey:
         if isinstance(found, NoRoute):
             known = self._roads.route(start, (goal.x, goal.y))
             if isinstance(known, NoRoute) and (not len(seen) or self._roads.turns_at([start])[0]):
-                return self._become(JourneyState.FAILED, known.reason)
+                return self._become(JourneyState.FAILED, known.reason, known.problem)
             self.reason = f"{found.reason}, with what stands there now"
             nearer = approach(self._roads, (*start, path.end.theta), (goal.x, goal.y), seen)
             if nearer is None:
-                return self._wait(self.reason, start, now)
+                return self._wait(self.reason, start, now, found.problem)
             found, heading, self._approaches = *nearer, True
         self.route, self.routes = found, self.routes + 1
         for piece in found.pieces(path.end.theta, heading):
@@ -323,12 +326,12 @@ class Journey:
         self._tried += 1
         return self._tried > self._config.tries
 
-    def _wait(self, why: str, here: Point, now: float) -> JourneyState:
+    def _wait(self, why: str, here: Point, now: float, problem: RouteProblem | None = None) -> JourneyState:
         if not math.isfinite(self._waiting_since):
             self._waiting_since = now
         self._waited_at = here
         gives_up = now - self._waiting_since > self._config.patience
-        return self._become(JourneyState.FAILED if gives_up else JourneyState.WAITING, why)
+        return self._become(JourneyState.FAILED if gives_up else JourneyState.WAITING, why, problem)
 
     def _look(self, posture: Posture, now: float, v_before: float) -> None:
         """See whether the way ahead is still free, and whether the robot gets on."""

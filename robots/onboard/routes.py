@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -105,11 +106,24 @@ class Route:
         return found
 
 
+class RouteProblem(Enum):
+    """What a route fails for."""
+
+    GOAL = "goal"
+    """The robot can't turn there."""
+    START = "start"
+    """It can't turn where it is."""
+    NO_WAY = "no-way"
+    """Nothing between the two is wide enough."""
+
+
 @dataclass(frozen=True, slots=True)
 class NoRoute:
     """Why there's none."""
 
+    problem: RouteProblem
     reason: str
+    """The same for people, with the places."""
 
 
 class RouteMap:
@@ -246,9 +260,11 @@ class _Graph:
         import shapely
 
         if not shapely.intersects_xy(self.standing, *goal):
-            return NoRoute(f"the robot can't turn at ({goal[0]:.2f}, {goal[1]:.2f}): too near to something")
+            reason = f"the robot can't turn at ({goal[0]:.2f}, {goal[1]:.2f}): too near to something"
+            return NoRoute(RouteProblem.GOAL, reason)
         if not shapely.intersects_xy(self.standing, *start):
-            return NoRoute(f"the robot can't turn where it is, at ({start[0]:.2f}, {start[1]:.2f})")
+            reason = f"the robot can't turn where it is, at ({start[0]:.2f}, {start[1]:.2f})"
+            return NoRoute(RouteProblem.START, reason)
         if self._ways is None:
             self._ways = self._between()
         ways, n = self._ways.copy(), len(self._points)
@@ -261,8 +277,9 @@ class _Graph:
             nodes = nx.dijkstra_path(ways, n, n + 1, weight="length")
         except (nx.NetworkXNoPath, nx.NodeNotFound):
             return NoRoute(
+                RouteProblem.NO_WAY,
                 f"there's no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})"
-                " that is wide enough"
+                " that is wide enough",
             )
         middle = [(float(x), float(y)) for x, y in self._points[nodes[1:-1]]]
         return Route((start, *middle, goal))

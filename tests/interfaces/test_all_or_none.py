@@ -120,7 +120,7 @@ class Sites:
     def state(self) -> Any:
         """All that a command may change, as values; without the answers to what was refused."""
         operator, plan = self.operator, self.operator.engine.scheduler
-        rejected = {i for i, (receipt, _) in plan.ledger.entries.items() if receipt.status == "rejected"}
+        rejected = {i for i, entry in plan.ledger.entries.items() if entry.receipt.status == "rejected"}
         self.site.journal.look()
         return values((
             plan.timeline, plan.limits, plan.lateness, plan.paused, plan.profiles, plan.session,

@@ -21,7 +21,7 @@ from vrs import (
     Status,
 )
 from vrs.errors import InvalidValueError, NonFiniteTimeError, UnknownCommandError, VrsError
-from vrs.planning.jerk_limited import BRAKED_FIRST
+from vrs.notes import NoteCode
 
 MODEL = puma560.model()
 A = np.array([0.0, 0.8, -2.4, 0.0, 0.6, 0.0])
@@ -169,7 +169,7 @@ class TestInsertion:
         # At the end of the line the speed is highest and the acceleration zero.
         r = engine.execute(to(low, engine.timeline.segments[-1].start - 1e-3, profile=Profile.JERK_LIMITED))
         assert r.status is Status.ACCEPTED
-        assert BRAKED_FIRST in r.reason
+        assert NoteCode.BRAKED_FIRST.value in r.reason
         assert engine.timeline.sample(np.linspace(0, r.end, 20001))[:, 0].max() <= limits.q_max[0] + 1e-12
 
 

@@ -22,7 +22,7 @@ from vrs import (
     Status,
     Timeline,
 )
-from vrs.planning.jerk_limited import BRAKED_FIRST
+from vrs.notes import NoteCode
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits
@@ -118,7 +118,7 @@ def check_edit(old: Timeline, new: Timeline, r: Receipt, command: MotionCommand,
         gaps = [abs(x.end - y.start) for x, y in pairwise(segments)]
         worst.see("gap", max(gaps, default=0))
         mine = np.array([s.command_id == r.command_id for s in segments])
-        smooth = command.profile is Profile.JERK_LIMITED and BRAKED_FIRST not in r.reason
+        smooth = command.profile is Profile.JERK_LIMITED and NoteCode.BRAKED_FIRST.value not in r.reason
         smooth = smooth and "parabolas" not in r.reason
         if smooth:
             # From the second of our segments to the last of them, and where the past left off smoothly.

@@ -12,6 +12,7 @@ from robots import puma560
 from robots.puma560.parameters import A3, D4
 from vrs import Profile
 from vrs.errors import PlanningError
+from vrs.notes import text_of
 from vrs.planning import move
 from vrs.planning.certificate import violation
 from vrs.planning.line import line
@@ -153,8 +154,8 @@ def test_lines_begin_to_the_bit_and_rest_at_both_ends(profile: Profile):
 @pytest.mark.parametrize("profile", PROFILES)
 def test_what_rounding_leaves_of_rest_is_rest(profile: Profile):
     state = State(NOMINAL, np.full(6, 1e-16), np.full(6, 1e-14))
-    plan, note = line(state, moved(NOMINAL, (0.0, 0.2, 0.0)), 1.0, profile, MODEL, LIMITS)
-    assert note == ""
+    plan, notes = line(state, moved(NOMINAL, (0.0, 0.2, 0.0)), 1.0, profile, MODEL, LIMITS)
+    assert notes == ()
     assert np.array_equal(plan.coefficients[0, 0], NOMINAL)
 
 
@@ -220,8 +221,8 @@ def test_a_rotation_that_is_rough_is_made_smooth():
 def test_lines_leave_ready_though_it_is_singular(profile: Profile, way, q4: float):
     start = MODEL.poses["ready"] + [0, 0, 0, q4, 0, 0]
     X = moved(start, way, (0.2, -0.1, 0.3))
-    plan, note = line(rest(start), X, 1.0, profile, MODEL, LIMITS)
-    assert "joints 4 and 6 turn on the spot first" in note
+    plan, notes = line(rest(start), X, 1.0, profile, MODEL, LIMITS)
+    assert "joints 4 and 6 turn on the spot first" in text_of(notes)
     way_off, turn_off, _ = off_the_line(sampled(plan, 40), MODEL.forward(start), X)
     assert way_off < 1e-9
     assert turn_off < 1e-9
@@ -279,7 +280,7 @@ def test_a_moving_arm_is_blended_onto_the_line_at_a_named_place(way, profile: Pr
     bounds = (LIMITS.qd_max, LIMITS.qdd_max, LIMITS.qddd_max)[: 3 if jerky else 2]
     for state in moving_states(profile):
         X = moved(state.q, way, (0.0, 0.2, 0.1))
-        plan, note = line(state, X, 1.0, profile, MODEL, LIMITS)
+        plan, notes = line(state, X, 1.0, profile, MODEL, LIMITS)
         first = plan.coefficients[0]
         assert np.array_equal(first[0], state.q)
         assert np.abs(first[1] - state.qd).max() < 1e-12
@@ -288,9 +289,9 @@ def test_a_moving_arm_is_blended_onto_the_line_at_a_named_place(way, profile: Pr
         assert violation(plan, LIMITS, jerk=jerky) is None
         assert max(excesses(plan, bounds)) < 1e-9
         assert np.abs(MODEL.forward(end_state(plan).q) - X).max() < 1e-9
-        assert note.startswith("on the line from ")
-        assert note.endswith(" m on")
-        place = float(note.split()[4])
+        assert text_of(notes).startswith("on the line from ")
+        assert text_of(notes).endswith(" m on")
+        place = float(text_of(notes).split()[4])
         # The line as what the last part of the plan travels: the place is where the tool comes onto it.
         q = sampled(plan, 200)
         p = MODEL.forward(q)[:, :3, 3]
@@ -331,10 +332,10 @@ def _quartic_corner(state: State, goal, direction, b: float):
 @pytest.mark.parametrize("profile", PROFILES)
 def test_a_blend_may_begin_faster_than_the_new_speed(profile: Profile):
     state = next(moving_states(profile))
-    plan, note = line(state, moved(state.q, (0.1, 0.1, 0.2)), 0.1, profile, MODEL, LIMITS)
+    plan, notes = line(state, moved(state.q, (0.1, 0.1, 0.2)), 0.1, profile, MODEL, LIMITS)
     assert violation(plan, LIMITS, jerk=profile is Profile.JERK_LIMITED) is None
     assert np.array_equal(plan.coefficients[0, 0], state.q)
-    assert note.startswith("on the line")
+    assert text_of(notes).startswith("on the line")
     q, qd = sampled(plan, 50), sampled(plan, 50, 1)
     on = len(plan) * 50 - int(np.flatnonzero(off_the_end(q) > 1e-9)[-1]) - 1
     assert on > 100
@@ -352,8 +353,8 @@ def off_the_end(q):
 def test_where_no_blend_fits_the_arm_brakes_and_the_line_starts_there():
     state = State(NOMINAL, 0.95 * LIMITS.qd_max * [1, 1, -1, 1, 1, 1], STILL)
     X = moved(NOMINAL, (0.05, 0.0, 0.0))
-    plan, note = line(state, X, 0.3, Profile.PARABOLIC, MODEL, LIMITS)
-    assert note.startswith("braked first")
+    plan, notes = line(state, X, 0.3, Profile.PARABOLIC, MODEL, LIMITS)
+    assert text_of(notes).startswith("braked first")
     assert np.array_equal(plan.coefficients[0, 0], state.q)
     assert jumps(plan)[:2].max() < 1e-9
     assert violation(plan, LIMITS, jerk=False) is None
@@ -365,9 +366,9 @@ def test_a_jerk_limited_stop_before_a_line_keeps_the_jerk(monkeypatch: pytest.Mo
     for share in (0.05, 0.2, 0.5, 0.8, 0.95):
         state = cut(first, share)
         X = moved(NOMINAL, (0.05, 0.0, 0.0))
-        plan, note = line(state, X, 0.3, Profile.JERK_LIMITED, MODEL, LIMITS)
-        assert note.startswith("braked first")
-        assert "parabolas" not in note
+        plan, notes = line(state, X, 0.3, Profile.JERK_LIMITED, MODEL, LIMITS)
+        assert text_of(notes).startswith("braked first")
+        assert "parabolas" not in text_of(notes)
         assert violation(plan, LIMITS, jerk=True) is None
         assert jumps(plan).max() < 1e-9
         assert np.abs(2.0 * plan.coefficients[0, 2] - state.qdd).max() < 1e-9

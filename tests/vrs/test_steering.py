@@ -10,12 +10,12 @@ import pytest
 from robots import puma560
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError
+from vrs.notes import Note, NoteCode
 from vrs.planning import Profile, move
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, end_state
 from vrs.planning.steering import (
-    BRAKED_ONLY,
     change,
     damped_rates,
     one_joint,
@@ -31,6 +31,7 @@ MODEL = puma560.model()
 LIMITS = MODEL.limits
 ZERO = np.zeros(6)
 HOLD = 0.2
+NO_SMOOTH_STEERING = (Note(NoteCode.NO_SMOOTH_STEERING),)
 MINUTES = float(os.environ.get("VRS_STEERING_MINUTES", "1"))
 
 
@@ -133,7 +134,7 @@ def test_it_takes_over_from_any_state_of_a_move(profile: Profile):
         assert max(np.abs(end.qd).max(), np.abs(end.qdd).max() if not note else 0.0) < 1e-9
         assert np.allclose(made.coefficients[0, :2], [state.q, state.qd], atol=1e-12)
         assert note or np.abs(2.0 * made.coefficients[0, 2] - state.qdd).max() < 1e-9
-        braked += note == BRAKED_ONLY
+        braked += note == NO_SMOOTH_STEERING
     if profile is Profile.JERK_LIMITED:
         assert braked == 0
 
@@ -145,7 +146,7 @@ def test_where_no_bounded_jerk_can_stop_it_brakes_with_parabolas_and_says_so():
     qd = np.array([V, 0, 0, 0, 0, 0])
     state = State(q, qd, ZERO)
     plan, note, _ = steer(state, qd, None, Frame.BASE, HOLD, MODEL, LIMITS)
-    assert note == BRAKED_ONLY
+    assert note == NO_SMOOTH_STEERING
     assert np.array_equal(plan.durations, brake(state, LIMITS).durations)
     assert violation(plan, LIMITS, jerk=False) is None
 

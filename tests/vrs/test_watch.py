@@ -27,7 +27,7 @@ from vrs import (
     Timeline,
     scheduler,
 )
-from vrs.ledger import Receipt
+from vrs.ledger import LedgerEntry, Receipt
 from vrs.scheduler import Scheduler
 from vrs.segment import Piece
 from vrs.testing import BOUNDS, LawBrokenError, Watch, check_run, columns, extremes
@@ -81,10 +81,9 @@ def last(segments: list[PolynomialSegment]) -> int:
 def spoil_timelines(monkeypatch: pytest.MonkeyPatch, chosen: Any, bump: Any) -> None:
     accept = Scheduler.accept
 
-    def spoiling(plan: Scheduler, receipt: Receipt, command: Any, edit: Any, *args: Any, **kwargs: Any) -> Receipt:
-        return accept(
-            plan, receipt, command, edit._replace(timeline=spoiled(edit.timeline, chosen, bump)), *args, **kwargs
-        )
+    def spoiling(plan: Scheduler, entry: LedgerEntry, edit: Any, *args: Any, **kwargs: Any) -> Receipt:
+        made = edit._replace(timeline=spoiled(edit.timeline, chosen, bump))
+        return accept(plan, entry, made, *args, **kwargs)
 
     monkeypatch.setattr(Scheduler, "accept", spoiling)
 
@@ -92,9 +91,9 @@ def spoil_timelines(monkeypatch: pytest.MonkeyPatch, chosen: Any, bump: Any) -> 
 def spoil_receipts(monkeypatch: pytest.MonkeyPatch, **changes: Callable[[Receipt], Any]) -> None:
     accept = Scheduler.accept
 
-    def spoiling(plan: Scheduler, receipt: Receipt, *args: Any, **kwargs: Any) -> Receipt:
-        wrong = {name: change(receipt) for name, change in changes.items()}
-        return accept(plan, replace(receipt, **wrong), *args, **kwargs)
+    def spoiling(plan: Scheduler, entry: LedgerEntry, *args: Any, **kwargs: Any) -> Receipt:
+        wrong = {name: change(entry.receipt) for name, change in changes.items()}
+        return accept(plan, entry._replace(receipt=replace(entry.receipt, **wrong)), *args, **kwargs)
 
     monkeypatch.setattr(Scheduler, "accept", spoiling)
 

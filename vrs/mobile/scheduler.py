@@ -7,9 +7,10 @@ import numpy as np
 from vrs.commands import DriveCommand, Insertion, Lateness, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Edit, tail_at
-from vrs.ledger import Ledger, Receipt
+from vrs.ledger import Ledger, LedgerEntry, Receipt
 from vrs.mobile.model import DriveLimits, MobileModel, braking
 from vrs.mobile.timeline import ArcPiece, ArcTimeline
+from vrs.notes import Note, NoteCode, Notes, text_of
 from vrs.scheduler import BaseScheduler
 from vrs.segment import HOLD
 
@@ -40,7 +41,7 @@ class DriveScheduler(BaseScheduler[ArcTimeline]):
         if refusal:
             return self.reject(issued, asked, refusal)
         try:
-            t, _, _, status, reason = self.beginning(command, now, end)
+            t, _, _, status, notes = self.beginning(command, now, end)
         except PlanningError as error:
             return self.reject(issued, asked, str(error))
         command_id = self.ledger.newest + 1
@@ -48,10 +49,10 @@ class DriveScheduler(BaseScheduler[ArcTimeline]):
         appended = t >= end
         shifted, dropped = ((), ()) if appended else self.touched(edit, t)
         receipt = Receipt(
-            command_id, status, issued, asked, t, edit.arrival, None, reason, edit.timeline.version, edit.shift,
-            shifted_names=shifted, superseded_names=dropped,
+            command_id, status, issued, asked, t, edit.arrival, None, text_of(notes), edit.timeline.version,
+            edit.shift, shifted_names=shifted, superseded_names=dropped,
         )  # fmt: skip
-        return self.accept(receipt, None, edit, t, appended=appended)
+        return self.accept(LedgerEntry(receipt, notes=notes), edit, t, appended=appended)
 
     def _spliced(self, t: float, piece: ArcPiece) -> Edit[ArcTimeline]:
         """The past, the new arc, standing while there's slack, and the tail from where the robot then is."""
@@ -75,18 +76,19 @@ class DriveScheduler(BaseScheduler[ArcTimeline]):
             return self.reject(issued, command.execute_at, str(error))
         command_id = self.ledger.newest + 1
         t = moment.t
-        after, reason = self.brake(t, command_id)
+        after, notes = self.brake(t, command_id)
+        notes = moment.notes + notes
         edit = Edit(after, t, max(after.end, t), _NOWHERE, dropped=None)
-        if moment.reason:
-            reason = f"{moment.reason}; {reason}"
         receipt = Receipt(
-            command_id, moment.status, moment.issued, moment.asked, t, edit.arrival, None, reason, after.version,
+            command_id, moment.status, moment.issued, moment.asked, t, edit.arrival, None, text_of(notes),
+            after.version,
             superseded_names=self.touched(edit, t)[1],
         )  # fmt: skip
-        return self.accept(receipt, None, edit, t)
+        return self.accept(LedgerEntry(receipt, notes=notes), edit, t)
 
-    def brake(self, t: float, command_id: int) -> tuple[ArcTimeline, str]:
+    def brake(self, t: float, command_id: int) -> tuple[ArcTimeline, Notes]:
         """What is scheduled, with the robot braking along its arc from t [s] on, a command every period."""
         steps = braking(self.timeline.speeds_before(t), self._period, self.limits)
         pieces = [ArcPiece(self._period, v, w, command_id) for v, w in steps]
-        return self.timeline.edited(t, pieces), "stopped on its arc" if pieces else "stood"
+        note = Note(NoteCode.STOPPED_ON_ARC if pieces else NoteCode.STOOD)
+        return self.timeline.edited(t, pieces), (note,)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vrs.commands import Profile
 from vrs.model import Array, Limits
+from vrs.notes import Notes
 from vrs.planning import jerk_limited, parabolic
 from vrs.planning.certificate import violation
 from vrs.planning.plan import Plan, empty
@@ -13,7 +14,7 @@ from vrs.segment import State
 __all__ = ["Plan", "empty", "move", "overlapped", "run_up", "violation"]
 
 
-def move(state: State, q: Array, speed: float, profile: Profile, limits: Limits) -> tuple[Plan, str]:
+def move(state: State, q: Array, speed: float, profile: Profile, limits: Limits) -> tuple[Plan, Notes]:
     """Plan from any state to rest at q.
 
     Args:
@@ -24,17 +25,17 @@ def move(state: State, q: Array, speed: float, profile: Profile, limits: Limits)
         limits: Limits that hold at every instant.
 
     Returns:
-        The plan, and what the user must know of it (empty if nothing).
+        The plan, and what the user must know of it.
 
     Raises:
         PlanningError: If no plan keeps the limits.
     """
     if profile is Profile.PARABOLIC:
-        return parabolic.to_rest(state, q, speed, limits), ""
+        return parabolic.to_rest(state, q, speed, limits), ()
     return jerk_limited.to_rest(state, q, speed, limits)
 
 
-def run_up(q: Array, goal: State, speed: float, profile: Profile, limits: Limits) -> tuple[Plan, str]:
+def run_up(q: Array, goal: State, speed: float, profile: Profile, limits: Limits) -> tuple[Plan, Notes]:
     """Plan from rest at q to the state in which a scheduled move begins.
 
     Args:
@@ -45,11 +46,11 @@ def run_up(q: Array, goal: State, speed: float, profile: Profile, limits: Limits
         limits: Limits that hold at every instant.
 
     Returns:
-        The plan, and what the user must know of it (empty if nothing).
+        The plan, and what the user must know of it.
 
     Raises:
         PlanningError: If no plan keeps the limits.
     """
     if profile is Profile.PARABOLIC:
-        return parabolic.from_rest(q, goal, speed, limits), ""
+        return parabolic.from_rest(q, goal, speed, limits), ()
     return jerk_limited.from_rest(q, goal, speed, limits)

@@ -10,6 +10,7 @@ import numpy as np
 from vrs.commands import Profile
 from vrs.errors import PlanningError
 from vrs.model import Array, Limits
+from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.online import online
 from vrs.planning.parabolic import brake, follow, rates
@@ -18,11 +19,8 @@ from vrs.planning.plan import Plan, empty, end_state, integrate
 from vrs.planning.steering import change, rates_plan
 from vrs.segment import State
 
-BRAKED_FIRST = "braked with parabolas first: no jerk-limited plan from this state keeps the limits"
-JOINED_BY_PARABOLAS = "the joining move accelerates with parabolas"
 
-
-def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan, str]:
+def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan, Notes]:
     """Plan from any state to rest at q, all joints arriving together.
 
     Args:
@@ -32,27 +30,27 @@ def to_rest(state: State, q: Array, speed: float, limits: Limits) -> tuple[Plan,
         limits: Limits that hold at every instant.
 
     Returns:
-        The plan, and what the user must know of it (empty if nothing).
+        The plan, and what the user must know of it.
 
     Raises:
         PlanningError: If no plan keeps the limits.
     """
     if not any(state.qd.tolist()) and not any(state.qdd.tolist()):
-        return rest_to_rest(state.q, q, speed, limits), ""
+        return rest_to_rest(state.q, q, speed, limits), ()
     still = np.zeros(len(q))
     plan = online(state, State(q, still, still), speed, limits, order=3)
     if plan is not None:
-        return plan, ""
+        return plan, ()
     stop = brake(state, limits)
     stopped = end_state(stop).q if len(stop) else state.q
     plan = stop.then(rest_to_rest(stopped, q, speed, limits))
     problem = violation(plan, limits, jerk=True)
     if problem is not None:
         raise PlanningError(f"no jerk-limited plan from this state: {problem}")
-    return plan, BRAKED_FIRST
+    return plan, (Note(NoteCode.BRAKED_FIRST),)
 
 
-def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[Plan, str]:
+def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[Plan, Notes]:
     """Plan from rest to a state that moves or accelerates.
 
     Args:
@@ -62,18 +60,18 @@ def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> tuple[
         limits: Limits that hold at every instant.
 
     Returns:
-        The plan, and what the user must know of it (empty if nothing).
+        The plan, and what the user must know of it.
 
     Raises:
         PlanningError: If no plan keeps the limits.
     """
     if not any(goal.qd.tolist()) and not any(goal.qdd.tolist()):
-        return rest_to_rest(start, goal.q, speed, limits), ""
+        return rest_to_rest(start, goal.q, speed, limits), ()
     still = np.zeros(len(start))
     plan = online(State(start, still, still), goal, speed, limits, order=3)
     if plan is not None:
-        return plan, ""
-    return parabolic_from_rest(start, goal, speed, limits), JOINED_BY_PARABOLAS
+        return plan, ()
+    return parabolic_from_rest(start, goal, speed, limits), (Note(NoteCode.JOINED_BY_PARABOLAS),)
 
 
 def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
@@ -121,8 +119,6 @@ def rest_to_rest(start: Array, q: Array, speed: float, limits: Limits) -> Plan:
     return follow(start, q, durations, [value / s for value in share])
 
 
-BRAKED = "braked with parabolas: no jerk-limited stop from this state keeps the limits"
-
 _PARALLEL = 1e-9
 """Share of an acceleration that may point aside from the motion on a straight line: rounding."""
 _PATIENCE = 2.0
@@ -136,7 +132,7 @@ def is_prompt_stop(on_way: float, braking: float) -> bool:
     return on_way <= _PATIENCE * braking + _GRACE
 
 
-def stop(state: State, profile: Profile, limits: Limits) -> tuple[Plan, str]:
+def stop(state: State, profile: Profile, limits: Limits) -> tuple[Plan, Notes]:
     """Plan a stop.
 
     Args:
@@ -145,14 +141,14 @@ def stop(state: State, profile: Profile, limits: Limits) -> tuple[Plan, str]:
         limits: Limits that hold at every instant.
 
     Returns:
-        The plan, empty at rest, and what the user must know of it (empty if nothing).
+        The plan, empty at rest, and what the user must know of it.
     """
     if profile is Profile.JERK_LIMITED and (state.qd.any() or state.qdd.any()):
         made = rates_plan(state, np.zeros_like(state.q), 0.0, limits)
         if made is not None and not made[1] and violation(made[0], limits, jerk=True) is None:
-            return made[0], ""
-        return brake(state, limits), BRAKED
-    return brake(state, limits), ""
+            return made[0], ()
+        return brake(state, limits), (Note(NoteCode.NO_SMOOTH_STOP),)
+    return brake(state, limits), ()
 
 
 def straight_stop(state: State, limits: Limits) -> Plan | None:

@@ -22,6 +22,7 @@ import numpy as np
 from vrs.commands import Profile
 from vrs.errors import PlanningError, UnresolvedError
 from vrs.model import Array, Limits, RobotModel
+from vrs.notes import Note, NoteCode, Notes
 from vrs.planning import parabolic
 from vrs.planning.along import Samples, Traversal, sampled
 from vrs.planning.certificate import violation
@@ -333,7 +334,6 @@ NEGLIGIBLE: Final = 1e-12
 """A way [m] and a turn [rad] below which there's nothing to move."""
 STANDING: Final = 7e-7
 """How far the tool may stir [m, rad] while joints turn on the spot."""
-BRAKED: Final = "braked first, then the line from rest at the place where the arm stopped"
 
 _HARD: Final = 1e5
 """Condition number from which on a pose may count as one that leaves joints free."""
@@ -370,7 +370,7 @@ def line(
     *,
     q_goal: Array | None = None,
     configuration: str | None = None,
-) -> tuple[Plan, str]:
+) -> tuple[Plan, Notes]:
     """Plan from any state to rest at a pose, the tool on a straight line.
 
     The tool turns evenly about one axis, the shorter way. From a moving state a blend leads onto the line; where
@@ -387,8 +387,7 @@ def line(
         configuration: Words of the configuration that the line must be in; None keeps the arm's own.
 
     Returns:
-        The plan, whose last position is the joint solution that was reached, and what the user must know of it
-        (empty if nothing).
+        The plan, whose last position is the joint solution that was reached, and what the user must know of it.
 
     Raises:
         PlanningError: If the line leaves the workspace, crosses a limit, passes or ends too near a singularity,
@@ -402,9 +401,9 @@ def line(
     blended = _blended(state, task)
     if blended is not None:
         return blended
-    stop, note = _stopped(state, task)
+    stop, notes = _stopped(state, task)
     plan, more = _from_rest(end_state(stop).q if len(stop) else state.q, task)
-    return stop.then(plan), "; ".join(words for words in (note, more) if words)
+    return stop.then(plan), (*notes, *more)
 
 
 def _proper(X: Array) -> Array:
@@ -420,7 +419,7 @@ def _vector(X: Array, goal: Array) -> Array:
     return np.concatenate([X[:3, 3], rotation_vector(X[:3, :3] @ goal[:3, :3].T)])
 
 
-def _from_rest(q: Array, task: _Task) -> tuple[Plan, str]:
+def _from_rest(q: Array, task: _Task) -> tuple[Plan, Notes]:
     model = task.model
     hardness = float(condition(model, q[None])[0])
     start = _snapped(q, model) if hardness > _HARD else q
@@ -435,24 +434,25 @@ def _from_rest(q: Array, task: _Task) -> tuple[Plan, str]:
             other = model.inverse_near(task.goal, q, task.configuration)
             if np.abs(other - q).max() > _SAME:
                 raise PlanningError(_other(q, other, task))
-        return empty(len(q)), ""
+        return empty(len(q)), ()
     path = _traced(course, start, task, hardness, free=free)
     samples = sampled(path)
     begin, end = samples.joints[[0, -1], 0]
     if np.abs(begin - q).max() > _SAME and not free:
         raise PlanningError(_other(q, begin, task))
     _check(path, samples, task)
-    turn, note = empty(len(q)), ""
+    turn = empty(len(q))
+    notes: Notes = ()
     if free and np.abs(begin - q).max() > NEGLIGIBLE:
         turn = _turned(q, begin, task)
         if np.abs(begin - q).max() > _SAME:
-            note = _turn_note(q, begin)
+            notes = (_turn_note(q, begin),)
     else:
         begin = q
     end = _check_arrival(end, task)
     traversal = Traversal(path, samples, begin, end, task.speed, model, task.limits)
     plan = traversal.jerk_limited() if task.profile is Profile.JERK_LIMITED else traversal.parabolic()
-    return turn.then(plan), note
+    return turn.then(plan), notes
 
 
 def _other(q: Array, begin: Array, task: _Task) -> str:
@@ -538,12 +538,12 @@ def _turned(q: Array, begin: Array, task: _Task) -> Plan:
     return rest_to_rest(q, begin, task.speed, task.limits)
 
 
-def _turn_note(q: Array, begin: Array) -> str:
+def _turn_note(q: Array, begin: Array) -> Note:
     joints = [str(j + 1) for j in np.flatnonzero(np.abs(begin - q) > _SAME)]
-    return f"joints {' and '.join(joints)} turn on the spot first: the line leaves a singular pose"
+    return Note(NoteCode.TURNS_ON_THE_SPOT, (" and ".join(joints),))
 
 
-def _blended(state: State, task: _Task) -> tuple[Plan, str] | None:
+def _blended(state: State, task: _Task) -> tuple[Plan, Notes] | None:
     """A blend onto the line and the line; None where none is found that keeps the limits."""
     model, limits = task.model, task.limits
     if not float(condition(model, state.q[None])[0]) < SINGULAR:
@@ -569,7 +569,7 @@ def _blended(state: State, task: _Task) -> tuple[Plan, str] | None:
             plan = traversal.joined_smoothly() if smooth else traversal.parabolic()
         except PlanningError:
             continue
-        return plan, f"on the line from {_met(course)} on"
+        return plan, (Note(NoteCode.JOINS_LINE, (_met(course),)),)
     return None
 
 
@@ -580,17 +580,17 @@ def _met(course: Course) -> str:
     return f"{np.degrees(course.meet * course.angle):.4g} deg"
 
 
-def _stopped(state: State, task: _Task) -> tuple[Plan, str]:
+def _stopped(state: State, task: _Task) -> tuple[Plan, Notes]:
     """Brake, with bounded jerk where that's asked for and goes."""
     limits = task.limits
-    note = BRAKED
+    notes: Notes = (Note(NoteCode.BRAKED_BEFORE_LINE),)
     if task.profile is Profile.JERK_LIMITED:
         smooth = smooth_stop(state, limits)
         if smooth is not None:
-            return smooth, note
-        note = f"{note}; braked with parabolas, as no jerk-limited stop keeps the limits"
+            return smooth, notes
+        notes = (*notes, Note(NoteCode.NO_SMOOTH_STOP_BEFORE_LINE))
     stop = parabolic.brake(state, limits)
     problem = violation(stop, limits, jerk=False)
     if problem is not None:
         raise PlanningError(f"no stop before the line: {problem}")
-    return stop, note
+    return stop, notes

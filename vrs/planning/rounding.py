@@ -16,6 +16,7 @@ import numpy as np
 from vrs.commands import Profile
 from vrs.errors import InvalidValueError
 from vrs.model import Array, Limits, RobotModel
+from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.plan import Plan, end_state
 from vrs.segment import evaluate
@@ -106,7 +107,7 @@ def _shift(order: int, u: float) -> Array:
     )
 
 
-Pair: TypeAlias = Callable[[Limits], tuple[Plan, Plan, str]]
+Pair: TypeAlias = Callable[[Limits], tuple[Plan, Plan, Notes]]
 """Plans, within limits, that end and begin at rest at the via, and what the user must know of them."""
 
 _KNOT = 2e-12
@@ -127,7 +128,7 @@ class Rounded:
     delta: float
     """How long they overlap [s]; 0 where they don't."""
     whole: Plan
-    note: str
+    notes: Notes
     """What the user must know of it."""
 
 
@@ -144,19 +145,18 @@ def rounded(plans: Pair, deviation: float, model: RobotModel, limits: Limits, pr
         limits: Limits that hold at every instant.
         profile: Whether jerk limits bind.
     """
-    first, second, note = plans(limits)
-    stopping = Rounded(first, second, 0.0, first.then(second), note)
+    first, second, notes = plans(limits)
+    stopping = Rounded(first, second, 0.0, first.then(second), notes)
     if deviation <= 0 or min(len(first), len(second)) == 0:
         return stopping
     best = _overlapped(first, second, deviation, model, limits, profile)
     if best is None:
         half = replace(limits, qdd_max=0.5 * limits.qdd_max, qddd_max=0.5 * limits.qddd_max)
-        slow, onward, note = plans(half)
+        slow, onward, notes = plans(half)
         best = _overlapped(slow, onward, deviation, model, limits, profile)
         if best is None or best.whole.duration > _SLOWER_MOST * stopping.whole.duration:
-            text = "stops at the via: no overlap keeps the limits"
-            return replace(stopping, note=f"{stopping.note}; {text}" if stopping.note else text)
-    return replace(best, note=f"{note}; {best.note}" if note else best.note)
+            return replace(stopping, notes=(*stopping.notes, Note(NoteCode.STOPS_AT_VIA)))
+    return replace(best, notes=(*notes, *best.notes))
 
 
 def _overlapped(
@@ -172,8 +172,8 @@ def _overlapped(
         if violation(whole, limits, jerk=profile is Profile.JERK_LIMITED) is not None:
             return None
         away = _distance(whole, first.duration - delta, first.duration, via, model)
-        note = f"passes the via within {away:.3g} m"
-        return Rounded(first, second, delta, whole, note) if away <= deviation else None
+        notes = (Note(NoteCode.PASSES_VIA, (away,)),)
+        return Rounded(first, second, delta, whole, notes) if away <= deviation else None
 
     longest = min(first.duration, second.duration)
     high = longest

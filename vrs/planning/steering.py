@@ -26,6 +26,7 @@ from vrs.checks import finite, finite_array
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.model import Array, Limits, RobotModel
+from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, empty, packed
@@ -765,8 +766,6 @@ _SLOWED = 0.5
 """A hand is told what is in its way where less than this share is left of what it asks for."""
 _TRIED = 0.1
 """How far each joint is moved to see whether that leads away from a singularity [rad]."""
-BRAKED_ONLY = "braked with parabolas: no jerk-limited plan from this state keeps the limits"
-DROPPED = "accelerations dropped at the start: bounded jerk would pass a speed limit from this state"
 
 
 class Steered(NamedTuple):
@@ -774,8 +773,8 @@ class Steered(NamedTuple):
 
     plan: Plan
     """Certified, ends at rest; empty where the arm stands and stays."""
-    note: str
-    """What the user must know of it; empty if nothing."""
+    notes: Notes
+    """What the user must know of it."""
     hindrance: str
     """What keeps the arm from going as asked, and what leads away from it; empty if nothing does."""
 
@@ -820,16 +819,16 @@ def steer(
 
 def _by_rates(
     state: State, u: Array, hold: float, limits: Limits, shares: Sequence[float] | None = None
-) -> tuple[Plan, str]:
+) -> tuple[Plan, Notes]:
     u = u / max(1.0, *(abs(rate) / V for rate, V in zip(u.tolist(), limits.qd_max.tolist(), strict=True)))
     made = rates_plan(state, u, hold, limits, shares)
     if made is not None and violation(made[0], limits, jerk=True) is None:
-        return made[0], DROPPED if made[1] else ""
+        return made[0], (Note(NoteCode.ACCELERATIONS_DROPPED),) if made[1] else ()
     plan = brake(state, limits)
     problem = violation(plan, limits, jerk=False)
     if problem is not None:
         raise PlanningError(f"no stop from this state: {problem}")
-    return plan, BRAKED_ONLY
+    return plan, (Note(NoteCode.NO_SMOOTH_STEERING),)
 
 
 def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twist:
@@ -859,7 +858,7 @@ def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits
     if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
         hindrance = _singular(state.q, model)
     if plan is not None:
-        return Steered(plan, "", hindrance)
+        return Steered(plan, (), hindrance)
     u = share * sliding_rates(J[0], asked, low, high)
     return Steered(*_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance)
 
@@ -896,14 +895,14 @@ def _singular(q: Array, model: RobotModel) -> str:
     return f"near a singularity: jog joint {joint + 1}{way}, or move back"
 
 
-def _released(state: State, J: Array, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, str]:
+def _released(state: State, J: Array, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, Notes]:
     """Stop on the way that the tool is going."""
     u = state.qd
     if float((np.abs(u) / limits.qd_max).max()) >= STANDING:
         present = J @ u
         plan, _ = along(state, model, u, Twist(present[:3], present[3:], False), 0.0, hold, limits)
         if plan is not None:
-            return plan, ""
+            return plan, ()
     return _by_rates(state, np.zeros_like(u), hold, limits)
 
 

@@ -616,16 +616,20 @@ def check_receipts(
 
 
 def check_names(
-    answer: Receipt, version: int, before: dict[int, Receipt], after: dict[int, Receipt], moves: Collection[int]
+    answer: Receipt,
+    before: dict[int, Receipt],
+    after: dict[int, Receipt],
+    moves: Collection[int],
+    replanned: Collection[int],
 ) -> None:
     """A receipt names what it shifted and superseded, and no other.
 
     Args:
         answer: The receipt.
-        version: Of the timeline before the edit.
         before: All receipts before the edit, by command id.
         after: After it.
         moves: Commands that have moves of their own.
+        replanned: Commands that the edit made go from elsewhere.
 
     Raises:
         LawBrokenError: If it doesn't.
@@ -642,7 +646,7 @@ def check_names(
                 raise LawBrokenError("receipts", f"command {i} stands no more, and doesn't name command {mine}")
             if i in moves:
                 gone.add(i)
-        elif "elsewhere" in r.reason and r.version > version:
+        elif i in replanned:
             shifted.discard(i)
         elif was.execute_at != was.end:
             times = zip((was.execute_at, was.end), (r.execute_at, r.end), strict=True)

@@ -33,6 +33,7 @@ from vrs.commands import (
 from vrs.engine import Engine
 from vrs.errors import VrsError
 from vrs.ledger import Receipt, Status
+from vrs.notes import NoteCode, is_rough
 from vrs.segment import HOLD
 from vrs.testing.laws import (
     Columns,
@@ -179,8 +180,6 @@ def given(value: float | None) -> float:
 
 
 _FIGURES = re.compile(r"-?\d[\d.,e+-]*|\[.*?\]", re.DOTALL)
-_ROUGH = ("parabolas", "accelerations dropped")
-"""What receipts say where jerk limits don't hold."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -301,7 +300,7 @@ class Watch:
             self._steps.clear()
             if not answer.undone or answer.command_id != step.command_id:
                 raise LawBrokenError("undo", "the receipt doesn't say that its command is undone")
-            smooth = self._smooth_before(given(now), scene) and not _rough(answer.reason)
+            smooth = self._smooth_before(given(now), scene) and not self._is_rough(answer.command_id)
             self._smooth.add(step.command_id) if smooth else self._smooth.discard(step.command_id)
         at = step.at if now is None else max(now, step.at) if whole else now
         # Knots that were cut at a receipt's time, which is rounded, move back by as much.
@@ -338,7 +337,9 @@ class Watch:
 
     def _remember(self, command: Command, answer: Receipt, at: float, scene: Scene) -> None:
         """Keep what later edits are judged by."""
-        mine, smooth = answer.command_id, not _rough(answer.reason)
+        mine = answer.command_id
+        rough = self._is_rough(mine)
+        smooth = not rough
         if isinstance(command, MotionCommand):
             self._commands[mine] = command
             smooth = smooth and command.profile is Profile.JERK_LIMITED
@@ -348,9 +349,9 @@ class Watch:
             smooth = smooth and mine in self._smooth
         self._smooth.add(mine) if smooth else self._smooth.discard(mine)
         for i, receipt in scene.now_receipts.items():
-            if receipt.version > scene.before.version and _rough(receipt.reason):
+            if receipt.version > scene.before.version and self._is_rough(i):
                 self._smooth.discard(i)
-        if _rough(answer.reason):
+        if rough:
             low, high = changed(scene.old, scene.new, at)
             self._smooth.difference_update(scene.new.owners[low:high])
         goes_on = isinstance(command, SteerCommand) and mine in scene.receipts
@@ -375,6 +376,17 @@ class Watch:
             first = old.next_move(first)
             check_tail(old, scene.new, first, answer.shift, self.figures)
 
+    def _is_rough(self, command_id: int) -> bool:
+        """Whether jerk limits don't hold throughout, by what the receipt of a command says."""
+        return is_rough(self.engine.notes(command_id))
+
+    def _says(self, command_id: int, code: NoteCode) -> bool:
+        return any(note.code is code for note in self.engine.notes(command_id))
+
+    def _replanned(self, scene: Scene) -> set[int]:
+        """Commands that go from elsewhere, as the one before them was cancelled."""
+        return {i for i in scene.now_receipts if self._says(i, NoteCode.REPLANNED)}
+
     def _smooth_before(self, t: float, scene: Scene) -> bool:
         """Whether what moved just before a time keeps jerk limits."""
         i = int(np.searchsorted(scene.old.starts, t)) - 1
@@ -386,14 +398,15 @@ class Watch:
         self._check_edit(scene, at, self._left)
         if not isinstance(command, Resume):
             moves = {*self._commands, *scene.old.owners}
-            check_names(answer, scene.before.version, scene.receipts, scene.now_receipts, moves)
+            planned = {i for i, r in scene.now_receipts.items() if r.version > scene.before.version}
+            check_names(answer, scene.receipts, scene.now_receipts, moves, planned & self._replanned(scene))
         old, new = scene.old, scene.new
         if isinstance(command, MotionCommand):
             self._check_move(command, answer, at, scene)
         elif isinstance(command, ScaleTime):
             self._check_pace(command.factor, answer, at, scene)
         elif isinstance(command, Stop):
-            if "on its way" in answer.reason:
+            if self._says(answer.command_id, NoteCode.STOPPED_ON_WAY):
                 check_way(scene.before, scene.after, (at, new.end), None, 0.0, self.figures)
             self._ends(answer, at, scene)
         elif isinstance(command, SteerCommand):
@@ -402,9 +415,8 @@ class Watch:
             first = scene.first_that_stays(command)
             if isinstance(command, Retime):
                 # Taking the move out and putting it in again may each shift what comes after it.
-                planned = {i for i, r in scene.now_receipts.items() if "elsewhere" in r.reason}
                 stand = {i for i in self._commands if scene.now_receipts[i].stands}
-                check_moves(old, new, first, stand - planned - {command.command_id}, self.figures)
+                check_moves(old, new, first, stand - self._replanned(scene) - {command.command_id}, self.figures)
             else:
                 check_tail(old, new, first, answer.shift, self.figures)
 
@@ -466,7 +478,3 @@ class Watch:
             raise LawBrokenError("undo", f"the timeline isn't what it was before command {step.command_id}")
         now = {i: r for i, r in scene.now_receipts.items() if i in step.receipts}
         check_same(step.receipts, now, "undo")
-
-
-def _rough(reason: str) -> bool:
-    return any(word in reason for word in _ROUGH)

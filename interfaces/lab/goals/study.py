@@ -31,6 +31,7 @@ from robots.bullet.rooms import Block, Column, Room
 from robots.ipr.chassis import IPR
 from robots.ipr.navigation import route_config
 from robots.onboard.journey import JourneyState
+from robots.onboard.routes import RouteProblem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -177,7 +178,7 @@ def conclude_asked(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
 
 def conclude_shut(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     """Where there's no way the robot says so."""
-    clear = sum(one.trip.state is JourneyState.FAILED and "way" in one.trip.reason for one in found)
+    clear = sum(one.trip.state is JourneyState.FAILED and one.trip.problem is RouteProblem.NO_WAY for one in found)
     total = len(found)
     claim = Claim(
         f"goals of {total} behind a closed door that were given up with the reason", OWN_BAR, f"{total}", clear,

@@ -15,7 +15,7 @@ from robots.ipr.robot import BareBody, Collision, MobileRobot
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
-from robots.onboard.routes import Route
+from robots.onboard.routes import Route, RouteProblem
 from vrs.mobile import wrapped
 from vrs.model import Array
 
@@ -64,6 +64,8 @@ class Trip:
     """What it ran into, or who into it."""
     track: Array
     """True postures, (k, 3)."""
+    problem: RouteProblem | None = None
+    """What a route failed for; None where the trip didn't fail so."""
 
     @property
     def arrived(self) -> bool:
@@ -153,6 +155,7 @@ def travel(setting: TripSetting) -> Trip:
         return Trip(
             state=journey.state,
             reason=journey.reason,
+            problem=journey.problem,
             way=float(np.hypot(*np.diff(track[:, :2], axis=0).T).sum()),
             time=body.time - begun,
             routes=journey.routes,

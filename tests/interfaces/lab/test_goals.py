@@ -34,7 +34,7 @@ from robots.ipr.chassis import IPR
 from robots.ipr.navigation import route_map
 from robots.ipr.robot import Collision
 from robots.onboard.journey import Goal, JourneyState
-from robots.onboard.routes import Route
+from robots.onboard.routes import Route, RouteProblem
 from vrs.errors import InvalidValueError
 
 
@@ -95,7 +95,7 @@ def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
 
 
 TRIP = Trip(JourneyState.ARRIVED, "", 5.2, 20.0, 1, 5.2, 0.01, 0.01, 0.02, (), np.zeros((2, 3)))
-FAILED = {"state": JourneyState.FAILED, "reason": "no way"}
+FAILED = {"state": JourneyState.FAILED, "problem": RouteProblem.NO_WAY}
 
 
 def found(group: str, *, mapped: float = 5.0, **changes: Any) -> MeasuredTrip:
@@ -147,7 +147,7 @@ def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
 
     shut = found(SHUT, **FAILED)
     assert holds(conclude_shut, shut) == [True]
-    for wrong in ({}, {"state": JourneyState.ENDED, "reason": "no way"}, FAILED | {"reason": "stuck"}):
+    for wrong in ({}, FAILED | {"state": JourneyState.ENDED}, FAILED | {"problem": None}):
         assert holds(conclude_shut, shut, found(SHUT, **wrong)) == [False]
     assert holds(conclude_physics, found(PHYSICS)) == [True, True]
     assert holds(conclude_physics, found(PHYSICS), found(PHYSICS, **FAILED)) == [False, True]

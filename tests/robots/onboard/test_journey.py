@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture, kept
 from robots.onboard.journey import GOING, Goal, Journey, JourneyConfig, JourneyState, way_out
 from robots.onboard.path_following import PathFollowingConfig
-from robots.onboard.routes import Route, RouteConfig, RouteMap
+from robots.onboard.routes import Route, RouteConfig, RouteMap, RouteProblem
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
 from vrs.model import Array
@@ -81,6 +81,7 @@ def test_a_door_that_opens_is_waited_for_and_one_that_stays_closed_is_a_reason()
         world.run(12.0)
         assert world.journey.state is (JourneyState.WAITING if state is JourneyState.ARRIVED else state)
         assert "no way" in world.journey.reason
+        assert world.journey.problem is RouteProblem.NO_WAY
         assert world.posture.x < 3.0 - CONFIG.half_width
         world.seen = NOTHING
         world.run(60.0)
@@ -116,6 +117,7 @@ def test_who_is_ended_or_carried_off_does_what_is_right() -> None:
     assert world.journey.way_left > 1.0
     world.journey.end()
     assert world.journey.state is JourneyState.ENDED
+    assert world.journey.problem is None
     assert world.journey.control(world.posture, now=world.now, v_before=0.3) == STAND
     assert world.journey.way_left == 0.0
 
@@ -126,8 +128,10 @@ def test_where_the_map_has_no_way_it_fails_at_once() -> None:
     for world.seen in (NOTHING, np.array([[1.0, 3.5]])):
         assert world.journey.go(Goal(5.0, 2.0), world.posture, now=0.0) is JourneyState.FAILED
         assert "no way" in world.journey.reason
+        assert world.journey.problem is RouteProblem.NO_WAY
         assert world.journey.go(Goal(3.0, 2.0), world.posture, now=0.0) is JourneyState.FAILED
         assert "too near to something" in world.journey.reason
+        assert world.journey.problem is RouteProblem.GOAL
 
 
 def test_out_of_a_narrow_place_leads_the_shortest_free_curve() -> None:
