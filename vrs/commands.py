@@ -380,7 +380,7 @@ def _check_id(command: Retime | Cancel | InsertVia) -> None:
 
 
 def _deviation(value: object, *, endless: bool = False) -> float:
-    if endless and (value == ENDLESS or (isinstance(value, float) and value == inf)):
+    if endless and isinstance(value, str | float) and value in (ENDLESS, inf):
         return _FOR_EVER
     return normal(number_in("deviation", value, 0.0, FARTHEST, unit=" m"))
 
