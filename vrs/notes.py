@@ -80,6 +80,11 @@ def text_of(notes: Notes) -> str:
     return "; ".join([code.value.format(*values) for code, values in notes]) if notes else ""
 
 
+def rough_in(text: str) -> Notes:
+    """The notes of a stored receipt, which has their text alone, that say where jerk limits don't hold."""
+    return tuple(Note(code) for code in NoteCode if code in ROUGH and code.value in text)
+
+
 def is_rough(notes: Notes) -> bool:
     """Whether they say that jerk limits don't hold throughout."""
     return any(note.code in ROUGH for note in notes)

@@ -33,6 +33,7 @@ from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.mobile import Grid
 from vrs.model import Array, frozen_array
+from vrs.notes import rough_in
 from vrs.segment import PolynomialSegment, known_segment
 from vrs.timeline import Timeline
 
@@ -373,7 +374,7 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         if command is not None and not isinstance(command, MotionCommand):
             raise InvalidValueError("command", command, "a motion command")
         profile = Profile.JERK_LIMITED if self.smooth else Profile.PARABOLIC
-        return Known(self.receipt, command, profile)
+        return Known(self.receipt, command, profile, rough_in(self.receipt.reason))
 
 
 class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):

@@ -22,7 +22,7 @@ from interfaces.system import software
 from tests.interfaces.live_rig import NOMINAL, READY, operator_here, robot_here, until
 from tests.interfaces.recording.taken import MODEL, Sitting
 from vrs import JointTarget, MotionCommand
-from vrs.commands import Insertion, ParameterChange, Resume, Retime, SteerCommand, Stop
+from vrs.commands import Insertion, ParameterChange, Profile, Resume, Retime, SteerCommand, Stop
 from vrs.errors import InvalidValueError
 
 
@@ -66,6 +66,27 @@ def test_commands_run_again_from_the_middle(tmp_path, seed, most_before):
         for edit, timeline in zip(recording.edits, made.timelines, strict=True):
             t = np.linspace(recording.session.t, timeline.end + 1.0, 60)
             assert edit.timeline.sample(t) == pytest.approx(timeline.sample(t), abs=1e-11)
+
+
+def test_a_move_that_is_rough_stays_so(tmp_path):
+    made, path = Sitting(tmp_path / "whole.mcap", 0), tmp_path / "late.mcap"
+    low = np.array([-2.0, 0.0, -2.0, 0.0, 0.0, 0.0])
+    high = np.array([MODEL.limits.q_max[0], 0.0, -2.0, 0.0, 0.0, 0.0])
+    made.tell(MotionCommand(JointTarget(low), execute_at=0.1))
+    made.tell(MotionCommand(JointTarget(high), insertion=Insertion.APPEND))
+    t = made.site.engine.timeline.segments[-1].start - 1e-3
+    made.tell(MotionCommand(JointTarget(low), execute_at=t, profile=Profile.JERK_LIMITED))
+    assert made.site.engine.receipts[-1].reason.startswith("braked with parabolas first")
+    made.clock = t + 0.02
+    made.end()
+    begin_late(made, path)
+    made.tell(Stop())
+    assert made.site.engine.receipts[-1].reason.startswith("each joint braked")
+    made.end()
+    with open_recording(path) as recording:
+        again = rerun(recording)
+        assert (again.difference, again.missing) == ("", "")
+        assert again.receipts[-1].reason == made.site.engine.receipts[-1].reason
 
 
 def test_what_stays_behind_an_edit_is_counted_from_where_the_recording_begins(tmp_path):
