@@ -45,6 +45,7 @@ T = TypeVar("T")
 KINDS: tuple[type[Message], ...] = get_args(Value)
 """Classes of what crosses."""
 KNOWN = frozenset(KINDS)
+"""The same, for a look at every message that's written."""
 ASKED = frozenset(kind for kind in KINDS if kind.sender not in {Party.SERVER, Party.ROBOT})
 """What clients and the operator's site send: their numbers may move a robot, and none may be subnormal."""
 TYPES = {kind.__struct_config__.tag: kind for kind in KINDS}
@@ -91,10 +92,8 @@ def encode(message: Value, encoding: Encoding) -> bytes:
     Raises:
         InvalidValueError: If it's no message.
     """
-    if type(message) not in KINDS:
-        raise InvalidValueError(
-            "message", message, f"one of {', '.join(kind.__name__ for kind in get_args(Value))}"
-        )
+    if type(message) not in KNOWN:
+        raise InvalidValueError("message", message, f"one of {', '.join(kind.__name__ for kind in KINDS)}")
     return _WRITERS[encoding](message.as_written(encoding is Encoding.MSGPACK))
 
 
