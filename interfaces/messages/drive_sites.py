@@ -12,7 +12,6 @@ from typing import Annotated, ClassVar, Final
 
 import msgspec
 from msgspec import Meta
-from msgspec.structs import force_setattr
 
 from interfaces.messages.fields import (
     Coordinate,
@@ -36,6 +35,7 @@ from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.supervisor import CellChange
 from vrs.checks import normal
 from vrs.errors import InvalidValueError
+from vrs.record import set_field
 from vrs.segment import ArcSegment, known_arc
 
 Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -275,4 +275,4 @@ class DriveReport(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.left:
-            force_setattr(self, "left", NONE_LEFT)
+            set_field(self, "left", NONE_LEFT)

@@ -18,7 +18,7 @@ from vrs.checks import SMALLEST
 from vrs.commands import ENDLESS, FARTHEST, Endless
 from vrs.errors import InvalidValueError
 from vrs.model import frozen_array
-from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Twist, Value
+from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Twist, Value, set_field
 from vrs.record import Record as Wire
 
 __all__ = ["Count", "Number", "Pose", "Text", "Time", "Twist", "Value", "Wire"]
@@ -288,4 +288,4 @@ class Leased(Message, frozen=True, omit_defaults=True, gc=False):
         if epoch is not None and type(epoch) is not Epoch:
             optional = type(self).__struct_defaults__
             number = None if epoch == 0 and optional else Epoch(epoch)
-            msgspec.structs.force_setattr(self, "epoch", number)
+            set_field(self, "epoch", number)

@@ -10,12 +10,13 @@ from typing import Annotated, Final, TypeAlias
 
 import msgspec
 from msgspec import Meta
-from msgspec.structs import force_setattr, replace
+from msgspec.structs import replace
 
 from interfaces.messages.fields import Number, Points, Span, Text, Wire
 from robots.onboard.journey import Goal
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
+from vrs.record import set_field
 
 MOST_JOBS: Final = 64
 """Jobs of a list."""
@@ -102,7 +103,7 @@ class WaitJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="wait"
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.seconds is not None:
-            force_setattr(self, "seconds", number_in("seconds", self.seconds, 0.0, LONGEST_WAIT, unit=" s"))
+            set_field(self, "seconds", number_in("seconds", self.seconds, 0.0, LONGEST_WAIT, unit=" s"))
 
 
 class ArmJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="arm"):
@@ -133,8 +134,8 @@ class JobList(Wire, frozen=True, omit_defaults=True, gc=False):
     """By name."""
 
     def __post_init__(self) -> None:
-        force_setattr(self, "jobs", tuple(self.jobs))
-        force_setattr(self, "places", dict(self.places))
+        set_field(self, "jobs", tuple(self.jobs))
+        set_field(self, "places", dict(self.places))
         if len(self.jobs) > MOST_JOBS:
             raise InvalidValueError("jobs", f"{len(self.jobs)} jobs", f"at most {MOST_JOBS}")
         if len({job.number for job in self.jobs}) < len(self.jobs):
@@ -238,7 +239,7 @@ POLICY_SAYS: Final = {
 
 def _cut_reason(progress: JobProgress | Progress) -> None:
     if len(progress.reason) > LONGEST_REASON:
-        force_setattr(progress, "reason", progress.reason[:LONGEST_REASON])
+        set_field(progress, "reason", progress.reason[:LONGEST_REASON])
 
 
 class JobProgress(Wire, frozen=True, omit_defaults=True, gc=False):

@@ -6,7 +6,6 @@ from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
-from msgspec.structs import force_setattr
 
 from interfaces.messages.control import MOST_MESSAGES, Lease, Role
 from interfaces.messages.drive_sites import NONE_LEFT, Doing, RobotTask, SensedPoints
@@ -31,6 +30,7 @@ from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
+from vrs.record import set_field
 
 MOST_THINGS = 1000
 """Outlines of a map."""
@@ -166,7 +166,7 @@ class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
 
     def __post_init__(self) -> None:
         if not self.left:
-            force_setattr(self, "left", NONE_LEFT)
+            set_field(self, "left", NONE_LEFT)
 
 
 class Seen(Message, SensedPoints, frozen=True, omit_defaults=True, gc=False, tag="seen"):
