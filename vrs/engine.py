@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from enum import Enum
 from math import cos, sin
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, cast, overload
 
@@ -307,10 +308,15 @@ class Engine:
         """Let an engine that was just made on a timeline go on as the one did that stood so."""
         self.scheduler.take_up(stand)
 
-    def refuse(self, command: Command, reason: str) -> Receipt:
-        """Answer a command that something outside the engine forbids."""
+    def refuse(self, command: Command, reason: str, refusal: Enum | None = None) -> Receipt:
+        """Answer a command that something outside the engine forbids; `refusal` is the reason as a code."""
         issued, asked = getattr(command, "issued_at", None), getattr(command, "execute_at", None)
-        return self.scheduler.reject(issued, asked, reason)
+        return self.scheduler.reject(issued, asked, reason, refusal)
+
+    def refusal(self, command_id: int) -> Enum | None:
+        """The code with which something outside the engine refused a command; None for any other."""
+        entry = self.scheduler.ledger.entries.get(command_id)
+        return None if entry is None else entry.refusal
 
     def anchor(self, truth: Timeline) -> Anchored:
         """Go over from now on into a timeline that turned out to be the true one; see `vrs.anchoring.anchored`.

@@ -125,6 +125,8 @@ class LedgerEntry(NamedTuple):
     """The motion command that it answers; None where it was something else."""
     notes: Notes = ()
     """What its reason is the text of; empty where it was rejected."""
+    refusal: enum.Enum | None = None
+    """Why somebody outside the engine refused it; None where nobody did, or no code was given."""
 
 
 class Change(NamedTuple):
@@ -301,11 +303,18 @@ class Ledger(Generic[_TimelineT]):
         """Write down a command of another ledger, which can't be taken back here."""
         self._write((entry,))
 
-    def reject(self, issued: float | None, asked: float | None, reason: str, version: int) -> Receipt:
+    def reject(
+        self,
+        issued: float | None,
+        asked: float | None,
+        reason: str,
+        version: int,
+        refusal: enum.Enum | None = None,
+    ) -> Receipt:
         """Give out a receipt for a command that can't be."""
         self.newest += 1
         receipt = Receipt(self.newest, Status.REJECTED, issued, asked, reason=reason, version=version)
-        self._set(LedgerEntry(receipt))
+        self._set(LedgerEntry(receipt, refusal=refusal))
         return receipt
 
     def accept(
@@ -399,7 +408,7 @@ class Ledger(Generic[_TimelineT]):
 
     def rewrite(self, receipt: Receipt, notes: Notes | None = None) -> None:
         """Write over a receipt of a command that goes on, and its notes unless they're None, without a way back."""
-        old, command, known = self.entries[receipt.command_id]
+        old, command, known, _ = self.entries[receipt.command_id]
         if old.is_still and old.end is not None and (old.end, old.command_id) in self.stills:
             self.stills.remove((old.end, old.command_id))
         self._set(LedgerEntry(receipt, command, known if notes is None else notes))

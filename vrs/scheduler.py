@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from enum import Enum
 from functools import partial
 from math import inf
 from operator import add
@@ -195,9 +196,11 @@ class BaseScheduler(Generic[TimelineT]):
             return partial(_names, self.ledger, timeline, index, t)
         return tuple(i for i in timeline.owners(index, len(timeline)) if not self.ledger.arrived(i, t))
 
-    def reject(self, issued: float | None, asked: float | None, reason: str) -> Receipt:
+    def reject(
+        self, issued: float | None, asked: float | None, reason: str, refusal: Enum | None = None
+    ) -> Receipt:
         """Answer a command that can't be."""
-        return self.ledger.reject(issued, asked, reason, self.timeline.version)
+        return self.ledger.reject(issued, asked, reason, self.timeline.version, refusal)
 
     def end_of_active(self, now: float) -> float:
         """End of the segment that is valid now; in a hold, or where none is, now."""

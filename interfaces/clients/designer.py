@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from interfaces.clients.ports import EnginePort, port_to
 from interfaces.engine_server.site import earliest
 from interfaces.link.delivery import Resending
-from interfaces.messages import Order, Outcome, Reply
+from interfaces.messages import Order, Outcome, RefusalCode, Reply
 from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop, finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
@@ -43,6 +43,8 @@ class Issued:
     """Why it couldn't be taken at all."""
     revision: int = -1
     """Which state of the receipt it is, from 0; −1 while it's pending."""
+    code: RefusalCode = RefusalCode.OTHER
+    """Why it was refused or rejected, where that's decided by."""
 
     @property
     def is_pending(self) -> bool:
@@ -144,6 +146,7 @@ class Designer:
             receipt=message.receipt,
             refusal=message.refusal,
             revision=message.revision,
+            code=message.code,
         )
         self._news[message.number] = None
         if len(self._news) > REMEMBERED:

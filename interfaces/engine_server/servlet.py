@@ -24,6 +24,8 @@ from interfaces.messages import (
     Order,
     Outcome,
     Pulse,
+    Refusal,
+    RefusalCode,
     Reply,
     Request,
     Scene,
@@ -34,6 +36,7 @@ from interfaces.messages.commands import portable
 from interfaces.messages.fields import MOST_NAMES
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
+from vrs.ledger import Status
 from vrs.model import frozen_array
 from vrs.timeline import Timeline
 
@@ -59,7 +62,7 @@ class Servlet:
         *,
         lead: float = 0.0,
         broadcasters: Sequence[Broadcaster] = (),
-        admit: Callable[[Order], str] | None = None,
+        admit: Callable[[Order], Refusal | None] | None = None,
     ) -> None:
         """Serve one client.
 
@@ -67,7 +70,7 @@ class Servlet:
             source: The engine, or its journal where others serve it too.
             lead: How far ahead of the engine's time answers to `Ask(None)` are [s].
             broadcasters: Where followers of frames find them.
-            admit: Says why an order isn't carried out when its turn comes; empty where it is.
+            admit: Says why an order isn't carried out when its turn comes; None where it is.
         """
         self._admit = admit
         self.journal = source if isinstance(source, Journal) else Journal(source)
@@ -141,21 +144,23 @@ class Servlet:
         self._slot = self._source = self._beat = self._follow = None
 
     def _carry_out(self, order: Order, now: float) -> Outcome:
-        refusal = "" if self._admit is None else self._admit(order)
-        if refusal:
-            return Outcome(order.number, now, None, refusal)
+        refused = None if self._admit is None else self._admit(order)
+        if refused is not None:
+            return Outcome(order.number, now, None, refused.text, code=refused.code)
+        engine = self.journal.engine
         try:
-            if order.command is None:
-                refusal = self.journal.engine.undo_refusal()
+            why = engine.undo_refusal() if order.command is None else ""
             receipt = self.journal.execute(order.command)
         except VrsError as error:
             return Outcome(order.number, now, None, str(error))
         if receipt is None:
-            return Outcome(order.number, now, None, refusal)
+            return Outcome(order.number, now, None, why)
+        known = engine.refusal(receipt.command_id) if receipt.status is Status.REJECTED else None
+        code = known if isinstance(known, RefusalCode) else RefusalCode.OTHER
         # It's done, whether the other commands that it names are found now or when it's written.
         with contextlib.suppress(Exception):
             receipt = portable(receipt, MOST_NAMES)
-        return Outcome(order.number, now, receipt)
+        return Outcome(order.number, now, receipt, code=code)
 
     def _answer(self, ask: Ask, now: float) -> None:
         frame = self.answers.get(ask.number)

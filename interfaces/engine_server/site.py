@@ -9,7 +9,7 @@ from typing import Protocol
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal
 from interfaces.engine_server.servlet import Servlet
-from interfaces.messages import Order
+from interfaces.messages import Order, Refusal
 from vrs.clock import ManualClock
 from vrs.commands import finite
 from vrs.engine import Engine
@@ -74,7 +74,7 @@ class Site:
         self._broadcasters.append(Broadcaster(self.journal, rate=rate, lead=lead))
         return self._broadcasters[-1]
 
-    def servlet(self, *, lead: float = 0.0, admit: Callable[[Order], str] | None = None) -> Servlet:
+    def servlet(self, *, lead: float = 0.0, admit: Callable[[Order], Refusal | None] | None = None) -> Servlet:
         """Make the server submodule of one more client, which finds the broadcasters that are there now."""
         return Servlet(self.journal, lead=lead, broadcasters=self._broadcasters, admit=admit)
 

@@ -14,6 +14,8 @@ from interfaces.messages.requests import (
     Order,
     Outcome,
     Pulse,
+    Refusal,
+    RefusalCode,
     Reply,
     Request,
     Scene,
@@ -24,5 +26,6 @@ from interfaces.messages.requests import (
 
 __all__ = [
     "Answer", "Ask", "Broadcast", "Change", "Compact", "Follow", "Frame", "FrameStatus", "FrameVerdict", "History",
-    "Order", "Outcome", "Pulse", "Reply", "Request", "Scene", "Verdicts", "ViewForm", "Want",
+    "Order", "Outcome", "Pulse", "Refusal", "RefusalCode", "Reply", "Request", "Scene", "Verdicts", "ViewForm",
+    "Want",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -61,6 +61,30 @@ class FrameStatus(enum.StrEnum):
     """The engine's clock has passed the time it shows, and what it shows came true."""
     FALSIFIED = "falsified"
     """A command has changed what happens at the time it shows."""
+
+
+class RefusalCode(enum.StrEnum):
+    """Why a command isn't carried out, as far as clients decide by it."""
+
+    OTHER = "other"
+    """What the text says; from a peer of another age perhaps one of these."""
+    OVERRULED = "overruled"
+    """Another session has commanded since the lease was shared: it's to be shared again."""
+    NOT_FOLLOWING = "not-following"
+    """The real robot has stopped by itself, or is gone."""
+
+    @classmethod
+    @override
+    def _missing_(cls, value: object) -> RefusalCode:
+        return cls.OTHER
+
+
+class Refusal(NamedTuple):
+    """Why a command isn't carried out."""
+
+    text: str
+    """For people."""
+    code: RefusalCode = RefusalCode.OTHER
 
 
 class ViewForm(enum.StrEnum):
@@ -180,6 +204,8 @@ class Outcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
     """Why the command couldn't be taken at all; empty where it could."""
     revision: Count = 0
     """Counts up with each change of the receipt, from 0."""
+    code: RefusalCode = RefusalCode.OTHER
+    """Why it was refused or rejected, where clients decide by it."""
 
     @override
     def as_written(self, _packed: bool) -> Outcome:

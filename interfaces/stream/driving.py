@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 
 from interfaces.link.delivery import OrderBook
-from interfaces.messages import Order, Outcome, Request
+from interfaces.messages import Order, Outcome, Refusal, Request
 from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
 from interfaces.messages.mobile import MobileWelcome
 from interfaces.stream.codec import Value
@@ -55,7 +55,7 @@ class DriveSite:
         """
         raise InvalidValueError("rate", rate, "none: a mobile robot has no frames")
 
-    def servlet(self, *, admit: Callable[[Order], str]) -> DriveServlet:
+    def servlet(self, *, admit: Callable[[Order], Refusal | None]) -> DriveServlet:
         """Make what serves one more client."""
         return DriveServlet(self._operator, admit)
 
@@ -87,7 +87,7 @@ class DriveSite:
 class DriveServlet:
     """Carries out a client's orders once each, in their order."""
 
-    def __init__(self, operator: DrivingOperator, admit: Callable[[Order], str]) -> None:
+    def __init__(self, operator: DrivingOperator, admit: Callable[[Order], Refusal | None]) -> None:
         """Serve one client of an operator's site, which may order what is admitted."""
         self._operator, self._admit = operator, admit
         self._outbox: deque[Value] = deque(maxlen=OUTBOX)
@@ -101,7 +101,8 @@ class DriveServlet:
             self._outbox.append(Problem(ProblemCode.NOT_ALLOWED, _NOTHING, getattr(message, "number", None)))
 
     def _carry_out(self, order: Order, now: float) -> Outcome:
-        return Outcome(order.number, now, None, self._admit(order) or self._refusal(order, now))
+        refused = self._admit(order) or Refusal(self._refusal(order, now))
+        return Outcome(order.number, now, None, refused.text, code=refused.code)
 
     def _refusal(self, order: Order, now: float) -> str:
         """Give the operator's site an order; why it isn't carried out, empty if it is."""

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.site import Site
-from interfaces.messages import Order, control
+from interfaces.messages import Order, Refusal, control
 from interfaces.stream.session import Served, Welcome
 
 
@@ -36,8 +36,8 @@ class Hosted(Protocol):
     def broadcast(self, rate: float) -> object:
         """Add a broadcaster of a rate [1/s]."""
 
-    def servlet(self, *, admit: Callable[[Order], str]) -> Served:
-        """Make what serves one more client; it says why an order isn't carried out now, empty if it is."""
+    def servlet(self, *, admit: Callable[[Order], Refusal | None]) -> Served:
+        """Make what serves one more client; `admit` says why an order isn't carried out now, None if it is."""
 
     def time(self, now: float) -> float:
         """The site's own time at the session time now [s]."""

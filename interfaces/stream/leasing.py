@@ -5,7 +5,7 @@ from __future__ import annotations
 import hmac
 from typing import Protocol
 
-from interfaces.messages import Order, control
+from interfaces.messages import Order, Refusal, RefusalCode, control
 from interfaces.messages.control import OVERRULED, Problem, ProblemCode, may_send
 from interfaces.messages.fields import Epoch
 from interfaces.stream.session import SessionState, Wish
@@ -86,19 +86,21 @@ class Leasing:
             self.holder = taker
             self._robot.began(grant, now=now)
 
-    def refusal(self, seat: SessionState, order: Order, now: float) -> str:
-        """Why an order isn't carried out now; empty if it is. One that is ends the shares of all others."""
+    def refusal(self, seat: SessionState, order: Order, now: float) -> Refusal | None:
+        """Why an order isn't carried out now; None if it is. One that is ends the shares of all others."""
         shares = self._shares.get(seat)
         if seat is not self.holder and not shares:
-            return "no lease: acquire it first" if shares is None else OVERRULED
+            if shares is None:
+                return Refusal("no lease: acquire it first")
+            return Refusal(OVERRULED, RefusalCode.OVERRULED)
         heard = self._lease.heard if seat is self.holder else self._lease.refused
         epoch = order.epoch or 0
         if heard(epoch, now=now) is not None:
-            return f"no lease: epoch {epoch} isn't in force"
+            return Refusal(f"no lease: epoch {epoch} isn't in force")
         for other in [other for other, counts in self._shares.items() if counts and other is not seat]:
             self._shares[other] = False
             self.version += 1
-        return ""
+        return None
 
     def wish(self, seat: SessionState, wish: Wish, now: float) -> control.Lease | Problem | None:
         """Do what a client asks of the lease; the answer, None for a beat that counts."""

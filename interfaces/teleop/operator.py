@@ -11,6 +11,7 @@ from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
+from interfaces.messages import Refusal, RefusalCode
 from interfaces.messages.commands import check_crosses
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
@@ -93,7 +94,7 @@ class LoggedEngine(Engine):
 
     def __init__(
         self,
-        refusal: Callable[[], str],
+        refusal: Callable[[], Refusal | None],
         told: Callable[[CommandRecord, int], None],
         model: RobotModel,
         *,
@@ -104,7 +105,7 @@ class LoggedEngine(Engine):
         """Make an engine.
 
         Args:
-            refusal: Says why commands are refused now; empty if they aren't.
+            refusal: Says why commands are refused now; None if they aren't.
             told: Is told what it was given, and the newest id before that.
             model: See `Engine`, as for the rest.
             q: Initial joints.
@@ -119,14 +120,16 @@ class LoggedEngine(Engine):
         if isinstance(command, PositionQuery):
             return super().execute(command)
         with self.atomic():
-            reason, newest = self._refusal(), self.newest
-            answer: Receipt | None = self.refuse(command, reason) if reason else super().execute(command)  # type: ignore[arg-type]
-            self._tell(CommandRecord(self.now(), command, answer, bool(reason)), newest)
+            refused, newest = self._refusal(), self.newest
+            answer: Receipt | None = (
+                super().execute(command) if refused is None else self.refuse(command, *refused)  # type: ignore[arg-type]
+            )
+            self._tell(CommandRecord(self.now(), command, answer, refused is not None), newest)
             return answer
 
     def undo(self) -> Receipt | None:
         """Take back the newest command; see `Engine.undo`."""
-        if self._refusal():
+        if self._refusal() is not None:
             return None
         with self.atomic():
             newest = self.newest
@@ -137,7 +140,8 @@ class LoggedEngine(Engine):
 
     def undo_refusal(self) -> str:
         """Why nothing is taken back now; see `Engine.undo_refusal`."""
-        return self._refusal() or super().undo_refusal()
+        refused = self._refusal()
+        return super().undo_refusal() if refused is None else refused.text
 
 
 def resolved(command: Command, answer: Receipt, now: float) -> Command:
@@ -281,15 +285,15 @@ class OperatorSite:
         self.clock.set(now)
         return self.engine.undo()
 
-    def _refusal(self) -> str:
-        """Why the robot can't be commanded; empty if it can."""
+    def _refusal(self) -> Refusal | None:
+        """Why the robot can't be commanded; None if it can."""
         if self.gone:
-            return f"{NOT_FOLLOWING}: {self.gone}"
+            return Refusal(f"{NOT_FOLLOWING}: {self.gone}", RefusalCode.NOT_FOLLOWING)
         if self.halted:
-            return f"{NOT_FOLLOWING}: {self.halted}; resume first"
+            return Refusal(f"{NOT_FOLLOWING}: {self.halted}; resume first", RefusalCode.NOT_FOLLOWING)
         if len(self.under_way) >= _UNDER_WAY_MOST:
-            return f"{_UNDER_WAY_MOST} commands wait to be acknowledged"
-        return ""
+            return Refusal(f"{_UNDER_WAY_MOST} commands wait to be acknowledged")
+        return None
 
     def _told(self, deed: CommandRecord, newest: int) -> None:
         """Write what the engine carried out into the log, to be sent.

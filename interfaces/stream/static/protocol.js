@@ -214,6 +214,7 @@ function map(x, where) {
  * @property {Receipt|null} [receipt] map of `command_id`, `status`, `issued_at` (absent), `asked_at` (absent), `execute_at` (absent), `end` (absent), `q` (absent), `reason` (empty), `version` (0), `shift` (0), `superseded_by` (absent), `undone` (false), `shifted` (none), `superseded` (none), `hindrance` (empty) (absent). None where there was nothing to take back, the command gives no receipt, or it was refused.
  * @property {string} [refusal] text (empty). Why the command couldn't be taken at all; empty where it could.
  * @property {number} [revision] count (0). Counts up with each change of the receipt, from 0.
+ * @property {"other"|"overruled"|"not-following"} [code] `other`, `overruled`, `not-following` (`other`). Why it was refused or rejected, where clients decide by it.
  */
 /**
  * Server: The frame that was asked for, with its status as it is now.
@@ -657,15 +658,16 @@ function map(x, where) {
  * @property {[number, number, number]} [robot] [real ≥ 0, real ≥ 0, real ≥ 0] ([0, 0, 0]). What it reaches ahead and back from its axle, and its width [m].
  */
 const WORDS_1 = new Set(["accepted", "postponed", "rejected"]);
-const WORDS_2 = new Set(["predicted", "confirmed", "falsified"]);
-const WORDS_3 = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "failed"]);
-const WORDS_4 = new Set(["free", "held", "ending"]);
-const WORDS_5 = new Set(["released", "expired", "taken over"]);
-const WORDS_6 = new Set(["viewer", "operator", "admin", "site"]);
-const WORDS_7 = new Set(["planned", "running", "paused", "done", "failed", "aborted"]);
-const WORDS_8 = new Set(["nothing", "goal", "jobs"]);
-const WORDS_9 = new Set(["idle", "driving", "waiting", "arrived", "failed", "ended"]);
-const WORDS_10 = new Set(["stop", "carry-on"]);
+const WORDS_2 = new Set(["other", "overruled", "not-following"]);
+const WORDS_3 = new Set(["predicted", "confirmed", "falsified"]);
+const WORDS_4 = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "failed"]);
+const WORDS_5 = new Set(["free", "held", "ending"]);
+const WORDS_6 = new Set(["released", "expired", "taken over"]);
+const WORDS_7 = new Set(["viewer", "operator", "admin", "site"]);
+const WORDS_8 = new Set(["planned", "running", "paused", "done", "failed", "aborted"]);
+const WORDS_9 = new Set(["nothing", "goal", "jobs"]);
+const WORDS_10 = new Set(["idle", "driving", "waiting", "arrived", "failed", "ended"]);
+const WORDS_11 = new Set(["stop", "carry-on"]);
 function checkReceipt(m) {
   map(m, "Receipt");
   whole(m.command_id, 0, WHOLE, "Receipt.command_id");
@@ -717,6 +719,8 @@ function checkOutcome(m) {
   else text(m.refusal, 0, 2000, "outcome.refusal");
   if (m.revision === undefined) m.revision = 0;
   else whole(m.revision, 0, WHOLE, "outcome.revision");
+  if (m.code === undefined) m.code = "other";
+  else word(m.code, WORDS_2, "outcome.code");
 }
 function checkAnswer(m) {
   map(m, "answer");
@@ -726,7 +730,7 @@ function checkAnswer(m) {
   real(m.made_at, -1e9, 1e9, "answer.made_at");
   list(m.q, 1, 64, "answer.q");
   for (const x of m.q) real(x, -1e9, 1e9, "answer.q");
-  word(m.status, WORDS_2, "answer.status");
+  word(m.status, WORDS_3, "answer.status");
   real(m.now, -1e9, 1e9, "answer.now");
   if (m.falsified_by === undefined || m.falsified_by === null) m.falsified_by = null;
   else whole(m.falsified_by, -WHOLE, WHOLE, "answer.falsified_by");
@@ -742,7 +746,7 @@ function checkBroadcast(m) {
   whole(m.since, 0, WHOLE, "broadcast.since");
   whole(m.through, 0, WHOLE, "broadcast.through");
   if (m.status === undefined) m.status = "predicted";
-  else word(m.status, WORDS_2, "broadcast.status");
+  else word(m.status, WORDS_3, "broadcast.status");
   if (m.falsified_by === undefined || m.falsified_by === null) m.falsified_by = null;
   else whole(m.falsified_by, -WHOLE, WHOLE, "broadcast.falsified_by");
   if (m.falsified === undefined) m.falsified = [];
@@ -863,7 +867,7 @@ function checkPong(m) {
 function checkProblem(m) {
   map(m, "problem");
   if (m.type !== undefined && m.type !== "problem") fail("problem", "problem");
-  word(m.code, WORDS_3, "problem.code");
+  word(m.code, WORDS_4, "problem.code");
   text(m.text, 0, 2000, "problem.text");
   if (m.number === undefined || m.number === null) m.number = null;
   else whole(m.number, 1, WHOLE, "problem.number");
@@ -889,7 +893,7 @@ function checkLimits(m) {
 function checkLease(m) {
   map(m, "lease");
   if (m.type !== undefined && m.type !== "lease") fail("lease", "lease");
-  word(m.state, WORDS_4, "lease.state");
+  word(m.state, WORDS_5, "lease.state");
   if (m.epoch === undefined || m.epoch === null) m.epoch = null;
   else like(m.epoch, /^[1-9][0-9]{0,19}$/, "lease.epoch");
   if (m.holder === undefined || m.holder === null) m.holder = null;
@@ -899,7 +903,7 @@ function checkLease(m) {
   if (m.answers === undefined || m.answers === null) m.answers = null;
   else whole(m.answers, 1, WHOLE, "lease.answers");
   if (m.ended === undefined || m.ended === null) m.ended = null;
-  else word(m.ended, WORDS_5, "lease.ended");
+  else word(m.ended, WORDS_6, "lease.ended");
   if (m.shared === undefined) m.shared = false;
   else flag(m.shared, "lease.shared");
 }
@@ -908,7 +912,7 @@ function checkWelcome(m) {
   if (m.type !== undefined && m.type !== "welcome") fail("welcome", "welcome");
   whole(m.protocol, 1, WHOLE, "welcome.protocol");
   text(m.session, 0, 200, "welcome.session");
-  word(m.role, WORDS_6, "welcome.role");
+  word(m.role, WORDS_7, "welcome.role");
   text(m.robot, 0, 200, "welcome.robot");
   whole(m.dof, 1, 64, "welcome.dof");
   checkLimits(m.limits);
@@ -1044,7 +1048,7 @@ function checkMobileWelcome(m) {
   if (m.type !== undefined && m.type !== "mobile-welcome") fail("mobile-welcome", "mobile-welcome");
   whole(m.protocol, 1, WHOLE, "mobile-welcome.protocol");
   text(m.session, 0, 200, "mobile-welcome.session");
-  word(m.role, WORDS_6, "mobile-welcome.role");
+  word(m.role, WORDS_7, "mobile-welcome.role");
   text(m.robot, 0, 200, "mobile-welcome.robot");
   checkDriveLimits(m.limits);
   real(m.period, 5e-324, 1e9, "mobile-welcome.period");
@@ -1192,7 +1196,7 @@ function checkJobProgress(m) {
   map(m, "JobProgress");
   whole(m.number, 1, 2147483647, "JobProgress.number");
   if (m.stage === undefined) m.stage = "planned";
-  else word(m.stage, WORDS_7, "JobProgress.stage");
+  else word(m.stage, WORDS_8, "JobProgress.stage");
   if (m.reason === undefined) m.reason = "";
   else text(m.reason, 0, 500, "JobProgress.reason");
   if (m.left === undefined || m.left === null) m.left = null;
@@ -1201,7 +1205,7 @@ function checkJobProgress(m) {
 function checkProgress(m) {
   map(m, "Progress");
   if (m.stage === undefined) m.stage = "planned";
-  else word(m.stage, WORDS_7, "Progress.stage");
+  else word(m.stage, WORDS_8, "Progress.stage");
   if (m.jobs === undefined) m.jobs = [];
   else {
     list(m.jobs, 0, 64, "Progress.jobs");
@@ -1232,9 +1236,9 @@ function checkTasks(m) {
   map(m, "tasks");
   if (m.type !== undefined && m.type !== "tasks") fail("tasks", "tasks");
   if (m.doing === undefined) m.doing = "nothing";
-  else word(m.doing, WORDS_8, "tasks.doing");
+  else word(m.doing, WORDS_9, "tasks.doing");
   if (m.journey === undefined) m.journey = "idle";
-  else word(m.journey, WORDS_9, "tasks.journey");
+  else word(m.journey, WORDS_10, "tasks.journey");
   if (m.reason === undefined) m.reason = "";
   else text(m.reason, 0, 2000, "tasks.reason");
   if (m.goal === undefined || m.goal === null) m.goal = null;
@@ -1260,7 +1264,7 @@ function checkTasks(m) {
     for (const x of m.forecast) checkJobForecast(x);
   }
   if (m.loss === undefined || m.loss === null) m.loss = null;
-  else word(m.loss, WORDS_10, "tasks.loss");
+  else word(m.loss, WORDS_11, "tasks.loss");
   if (m.shows === undefined) m.shows = "";
   else text(m.shows, 0, 2000, "tasks.shows");
   if (m.says === undefined) m.says = "";

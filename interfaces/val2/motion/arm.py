@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.messages.control import OVERRULED
+from interfaces.messages import RefusalCode
 from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand
@@ -592,11 +592,11 @@ class Arm(SettingsInForce):
 
 def _refusal(outcome: CommandOutcome, straight: bool) -> ValError:
     """What a refusal is in VAL's words."""
-    if outcome.refusal == OVERRULED:
+    if outcome.code is RefusalCode.OVERRULED:
         return ValError("Motion interrupted", TAKEN)
     if outcome.receipt is None:
         return ValError("Command refused", outcome.reason)
-    if outcome.reason.startswith(NOT_FOLLOWING):
+    if outcome.code is RefusalCode.NOT_FOLLOWING:
         why = outcome.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
         return robot_halted(why)
     if straight:

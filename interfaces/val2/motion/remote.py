@@ -91,7 +91,7 @@ class RemoteRobot(RobotPort):
             return None
         if number == self._open:
             self._open, self._outdated = None, self._connection.state
-        outcome = CommandOutcome(issued.receipt, issued.refusal)
+        outcome = CommandOutcome(issued.receipt, issued.refusal, issued.code)
         if outcome.reason or number not in self._asked:
             return outcome
         command, before = self._asked[number]

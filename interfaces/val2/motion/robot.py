@@ -10,6 +10,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
+from interfaces.messages import RefusalCode
 from interfaces.teleop.operator import OperatorSite
 from vrs.clock import ManualClock
 from vrs.commands import Command
@@ -28,6 +29,8 @@ class CommandOutcome:
     """As later commands left it; None where there's none."""
     refusal: str = ""
     """Why it couldn't be taken at all."""
+    code: RefusalCode = RefusalCode.OTHER
+    """Why nothing came of it, where that's decided by."""
 
     @property
     def reason(self) -> str:
@@ -112,7 +115,7 @@ class EngineRobot(RobotPort):
             outcome = CommandOutcome(refusal=str(error))
         else:
             outcome = (
-                CommandOutcome(answer)
+                CommandOutcome(answer, code=self._code(answer))
                 if answer is not None
                 else CommandOutcome(refusal="there's nothing to take back")
             )
@@ -120,6 +123,10 @@ class EngineRobot(RobotPort):
         if len(self._outcomes) > _REMEMBERED:
             self._outcomes.popitem(last=False)
         return self._number
+
+    def _code(self, answer: Receipt) -> RefusalCode:
+        known = self.engine.refusal(answer.command_id) if answer.status is Status.REJECTED else None
+        return known if isinstance(known, RefusalCode) else RefusalCode.OTHER
 
     def _do(self, command: Command | None, now: float) -> Receipt | None:
         clock = self.engine.clock

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from interfaces.messages import Order, Outcome
+from interfaces.messages import Order, Outcome, Refusal
 from interfaces.messages.control import Problem
 from interfaces.messages.drive_sites import RobotTask
 from interfaces.messages.mobile import Postures, Seen, Tasks
@@ -51,7 +51,7 @@ def ordered(servlet: DriveServlet, number: int, command: Any, now: float) -> Out
 
 def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     rig = met()
-    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: "")
+    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: None)
     now = rig.now
     assert ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), now).refusal == ""
     rig.run(0.2)
@@ -68,7 +68,7 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
 
 def test_who_isnt_admitted_drives_nothing() -> None:
     rig = met()
-    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: "no lease: acquire it first")
+    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: Refusal("no lease: acquire it first"))
     assert "no lease" in ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), rig.now).refusal
     rig.run(0.5)
     assert rig.operator.stands

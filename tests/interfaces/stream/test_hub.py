@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from interfaces.messages import Follow, Order, ViewForm, control
+from interfaces.messages import Follow, Order, RefusalCode, ViewForm, control
 from interfaces.messages.control import ProblemCode, Role
 from interfaces.stream.codec import encode
 from interfaces.stream.limits import ClientLimits
@@ -357,7 +357,8 @@ def test_an_order_of_one_ends_the_shares_of_the_others_until_they_share_anew(com
     assert not leases(other.got(now=0.2))[-1].commands
     made = hub.site.engine.newest
     assert made >= newest
-    assert refusal(other, Order(2, to(3), epoch), 0.3) == control.OVERRULED
+    [refused] = [m for m in other.tell(Order(2, to(3), epoch), now=0.3) if m.kind == "outcome"]
+    assert (refused.refusal, refused.code) == (control.OVERRULED, RefusalCode.OVERRULED)
     assert hub.site.engine.newest == made
     assert leases(other.tell(control.Share(2, owner.welcome.session), now=0.4))[-1].commands
     assert refusal(other, Order(3, to(3), epoch), 0.5) == ""
