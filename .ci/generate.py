@@ -23,6 +23,7 @@ from interfaces.messages.description import (
     alternatives,
     bounds,
     described,
+    fallback,
     field_texts,
     is_nullable,
     words,
@@ -325,6 +326,9 @@ def _one_check(
             yield f"text({at}, {_sizes(kind)}, {place});"
         case kinds.BoolType():
             yield f"flag({at}, {place});"
+        case kinds.EnumType() if (other := fallback(kind)) is not None:
+            yield f'if (typeof {at} === "string" && !{names[words(kind)]}.has({at})) {at} = {json.dumps(other)};'
+            yield f"word({at}, {names[words(kind)]}, {place});"
         case kinds.EnumType() | kinds.LiteralType():
             yield f"word({at}, {names[words(kind)]}, {place});"
         case kinds.ListType(item) | kinds.VarTupleType(item):
@@ -491,7 +495,9 @@ def _one_what(kind: kinds.Type) -> str:
         case kinds.BoolType():
             return "boolean"
         case kinds.EnumType() | kinds.LiteralType():
-            return ", ".join(f"`{one}`" for one in words(kind))
+            known = ", ".join(f"`{one}`" for one in words(kind))
+            other = fallback(kind) if isinstance(kind, kinds.EnumType) else None
+            return known if other is None else f"{known}; any other word counts as `{other}`"
         case kinds.ListType(item, least, most) | kinds.VarTupleType(item, least, most):
             if isinstance(item, kinds.FloatType) and (least, most) == (1, 64):
                 return "joints"

@@ -392,6 +392,8 @@ class Problem(Message, frozen=True, omit_defaults=True, gc=False, tag="problem")
     """Of what it's about, where that's known."""
     fatal: bool = False
     """Whether the connection ends."""
+    field: Word = ""
+    """Of an `Impair`: which of `delay`, `loss` and `service` it's about; empty where it's none of them."""
 
 
 class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):

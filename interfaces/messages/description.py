@@ -157,6 +157,12 @@ def words(kind: kinds.EnumType | kinds.LiteralType) -> tuple[Any, ...]:
     return tuple(one.value for one in kind.cls)
 
 
+def fallback(kind: kinds.EnumType) -> Any:
+    """What stands for a word of a choice that isn't known, as from a newer peer; None where that's refused."""
+    known = kind.cls._missing_("")
+    return None if known is None else known.value
+
+
 def bounds(kind: kinds.IntType | kinds.FloatType) -> tuple[float | None, float | None]:
     """Least and largest number, both included; None where nothing bounds it."""
     low, high = kind.ge, kind.le

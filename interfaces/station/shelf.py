@@ -139,4 +139,4 @@ def look_into(path: Path, entry: ShelfEntry) -> ShelfEntry:
             session, damage = recording.session, recording.damage
             return ShelfEntry(*facts, session.began, end - start, str(damage) if damage else "")
     except FormatError as error:
-        return ShelfEntry(*facts, problem=str(error).removeprefix(f"{path}: "), playable=False)
+        return ShelfEntry(*facts, problem=error.problem, playable=False)

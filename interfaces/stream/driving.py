@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 
 from interfaces.link.delivery import OrderBook
-from interfaces.messages import Order, Outcome, Refusal, Request
+from interfaces.messages import Order, Outcome, Refusal, RefusalCode, Request
 from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
 from interfaces.messages.mobile import MobileWelcome
 from interfaces.stream.codec import Value
@@ -101,21 +101,24 @@ class DriveServlet:
             self._outbox.append(Problem(ProblemCode.NOT_ALLOWED, _NOTHING, getattr(message, "number", None)))
 
     def _carry_out(self, order: Order, now: float) -> Outcome:
-        refused = self._admit(order) or Refusal(self._refusal(order, now))
+        refused = self._admit(order) or self._refusal(order, now)
+        if refused is None:
+            return Outcome(order.number, now)
         return Outcome(order.number, now, None, refused.text, code=refused.code)
 
-    def _refusal(self, order: Order, now: float) -> str:
-        """Give the operator's site an order; why it isn't carried out, empty if it is."""
+    def _refusal(self, order: Order, now: float) -> Refusal | None:
+        """Give the operator's site an order; why it isn't carried out, None if it is."""
         command = order.command
         if isinstance(command, Stop):
             self._operator.stop()
-            return ""
+            return None
         if not isinstance(command, DriveCommand):
-            return _COMMANDS
+            return Refusal(_COMMANDS)
         if command.execute_at is not None:
-            return _AT_ONCE
+            return Refusal(_AT_ONCE)
         issued = now if command.issued_at is None else command.issued_at
-        return self._operator.wish(command.v, command.w, issued_at=issued, now=now, lasts=command.duration)
+        why = self._operator.wish(command.v, command.w, issued_at=issued, now=now, lasts=command.duration)
+        return Refusal(why, RefusalCode.NOT_FOLLOWING) if why else None
 
     def advance(self, *, now: float) -> tuple[Value, ...]:  # noqa: ARG002 - it's a servlet's
         """What is to be sent to the client."""

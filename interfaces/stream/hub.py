@@ -50,6 +50,14 @@ _KEPT = 16
 _SERVED = frozenset({Role.VIEWER, Role.OPERATOR, Role.ADMIN})
 
 
+class ConditionError(VrsError):
+    """A condition of the way to the robot that isn't one of those that are allowed."""
+
+    def __init__(self, field: str, reason: VrsError) -> None:
+        self.field = field
+        super().__init__(str(reason))
+
+
 class Emulation(Protocol):
     """The emulated way to the robot."""
 
@@ -60,7 +68,7 @@ class Emulation(Protocol):
         """Change it.
 
         Raises:
-            InvalidValueError: If a condition isn't one of those that are allowed; nothing has changed then.
+            ConditionError: If a condition isn't one of those that are allowed; nothing has changed then.
         """
 
 
@@ -361,6 +369,8 @@ class Hub:
             return Problem(ProblemCode.TOO_FAST, text, wish.number)
         try:
             self.emulation.impair(wish, seat.name, now=now)
+        except ConditionError as error:
+            return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number, field=error.field)
         except VrsError as error:
             return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number)
         self.network_version += 1

@@ -11,11 +11,12 @@ from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
-from interfaces.messages import Refusal, RefusalCode
+from interfaces.messages import Refusal
 from interfaces.messages.commands import check_crosses
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.teleop.connection import SiteLine
+from interfaces.teleop.halt import Halt, HaltCause, not_following, text_of
 from interfaces.teleop.samples import Gathering
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
@@ -165,8 +166,6 @@ def resolved(command: Command, answer: Receipt, now: float) -> Command:
     return command
 
 
-NOT_FOLLOWING = "the robot doesn't follow"
-"""How refusals begin while the real robot has stopped by itself."""
 _SAME = 1e-9
 """Joints nearer than this [rad] are one."""
 STUCK = 2.0
@@ -208,7 +207,7 @@ class OperatorSite:
         now: float,
         config: OperatorSiteConfig | None = None,
         lateness: Lateness = Lateness.POSTPONE,
-        halted: str = "",
+        halted: Halt | None = None,
     ) -> None:
         """Start with both robots at rest at q.
 
@@ -230,11 +229,9 @@ class OperatorSite:
         """The virtual robot; what it's told goes to the real one, whoever tells it."""
         self.epoch, self._began = 1, now
         self.halted = halted
-        """Why the robot stopped by itself; empty while it follows."""
+        """Why the robot doesn't follow; None while it does."""
         self.gone = ""
         """Why there's no robot any more, whatever anybody does; empty while there may be one."""
-        self.stuck = False
-        """Whether it's halted because it made no progress."""
         self.corrections: list[Correction] = []
         self.report: Report | None = None
         """The newest one."""
@@ -288,9 +285,9 @@ class OperatorSite:
     def _refusal(self) -> Refusal | None:
         """Why the robot can't be commanded; None if it can."""
         if self.gone:
-            return Refusal(f"{NOT_FOLLOWING}: {self.gone}", RefusalCode.NOT_FOLLOWING)
-        if self.halted:
-            return Refusal(f"{NOT_FOLLOWING}: {self.halted}; resume first", RefusalCode.NOT_FOLLOWING)
+            return not_following(self.gone)
+        if self.halted is not None:
+            return not_following(f"{self.halted.text}; resume first")
         if len(self.under_way) >= _UNDER_WAY_MOST:
             return Refusal(f"{_UNDER_WAY_MOST} commands wait to be acknowledged")
         return None
@@ -351,7 +348,7 @@ class OperatorSite:
         heard = 0 if self.report is None else self.report.number
         wanted = self.gathering.wanted(now=now, patience=patience)
         # A robot that knows that it has halted isn't told.
-        halted = "" if self.report is None or self.report.halted else self.halted
+        halted = "" if self.report is None or self.report.halted else text_of(self.halted)
         facts = self.entries_sent, now, self._began, heard, entries, wanted, halted
         return (Orders(Epoch(self.epoch), self._packets, now, *facts),)
 
@@ -385,7 +382,7 @@ class OperatorSite:
         self._watch_progress(report, now)
         new = bool(report.halted) and not self.halted
         if new:
-            self._give_up(report.halted, stuck=False)
+            self._give_up(Halt(HaltCause.REPORTED, report.halted))
         correcting = bool(self.corrections) and now < self.corrections[-1].end
         # One at a time: what the correction under way leaves over is corrected after it.
         if report.plan is not None and (new or not correcting):
@@ -423,7 +420,8 @@ class OperatorSite:
             self._waits = since, heard, hearing + min(heard - before, self._patience)
             if self._waits[2] > self._stuck_after(STUCK):
                 waited = f"{heard - since:.1f} s before"
-                self._give_up(f"it hears the operator, but hasn't carried out a command that it was sent {waited}")
+                why = f"it hears the operator, but hasn't carried out a command that it was sent {waited}"
+                self._give_up(Halt(HaltCause.STUCK, why))
 
     def _watch_begin(self, report: Report, now: float) -> None:
         """Count a robot as halted that goes on saying that it follows an earlier epoch."""
@@ -442,15 +440,15 @@ class OperatorSite:
             since = now
         self._of_earlier = since, now
         if now > since + self._stuck_after(EPOCH_TIMEOUT) + 2.0 * longest:
-            self._give_up("it hears nothing of being resumed, or can't take it up")
+            self._give_up(Halt(HaltCause.STUCK, "it hears nothing of being resumed, or can't take it up"))
 
     def _stuck_after(self, least: float) -> float:
         """How long a robot may make nothing of what it's sent [s]: it has been sent again often by then."""
         return max(least, RESENDS * self._patience)
 
-    def _give_up(self, reason: str, *, stuck: bool = True) -> None:
+    def _give_up(self, halt: Halt) -> None:
         """Command the robot no more until somebody resumes; it's told so."""
-        self.halted, self.stuck = reason, stuck
+        self.halted = halt
         self.under_way.clear()
         self.new_entries = []
         self._waits = None
@@ -507,7 +505,7 @@ class OperatorSite:
         if now < self.engine.timeline.end:
             left = self.engine.timeline.end - now
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"
-        self.epoch, self._began, self.halted, self.stuck = self.epoch + 1, now, "", False
+        self.epoch, self._began, self.halted = self.epoch + 1, now, None
         self.entries_sent, self._acknowledged, self._due = 0, 0, now
         self.new_entries = []
         self._recent.clear()

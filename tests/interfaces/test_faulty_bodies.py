@@ -15,6 +15,7 @@ from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import JointReference, RobotSiteConfig
+from interfaces.teleop.halt import Halt, HaltCause
 from robots.onboard import FollowingAbort, SensorFault, StopReason, WatchdogConfig, WatchdogState
 from tests.interfaces.test_host import READY, STEP, Ends, to
 from tests.interfaces.test_tick_loop import Bench, rows
@@ -171,7 +172,7 @@ def test_a_site_uses_no_bad_sample_brakes_if_they_last_and_goes_on_by_resume(bad
     assert isinstance(site.violation, SensorFault)
     assert site.violation.joint == (None if bad == "short" else 2)
     assert site.halted == str(site.violation)
-    assert ends.operator.halted == site.halted
+    assert ends.operator.halted == Halt(HaltCause.REPORTED, site.halted)
     ends.run(1.0)
     assert not ends.asked[-1][1:].any()
     stood = ends.asked[-1][0]

@@ -13,6 +13,7 @@ from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import ExactTicks
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine
+from interfaces.teleop.halt import Halt, HaltCause
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
 from vrs import JointTarget, MotionCommand
 
@@ -25,7 +26,9 @@ class Site:
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
-        self.operator = OperatorSite(MODEL, NOMINAL, now=0.0, halted="no robot has come yet")
+        self.operator = OperatorSite(
+            MODEL, NOMINAL, now=0.0, halted=Halt(HaltCause.NOT_MET, "no robot has come yet")
+        )
         link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.003")))
         self.line = RobotLine(self.operator, link, np.random.default_rng(seed))
         self.line.connected = True

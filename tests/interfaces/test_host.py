@@ -10,6 +10,7 @@ import pytest
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.sites import Orders
 from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
+from interfaces.teleop.halt import Halt, HaltCause
 from robots import puma560
 from robots.onboard import LossPolicy, WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
@@ -49,7 +50,9 @@ class Ends:
 
     def new_operator(self, session: str, link_loss: LossPolicy | None = None) -> None:
         self.began, self.session = self.t, session
-        self.operator = OperatorSite(MODEL, NOMINAL, now=0.0, halted="no robot has come yet")
+        self.operator = OperatorSite(
+            MODEL, NOMINAL, now=0.0, halted=Halt(HaltCause.NOT_MET, "no robot has come yet")
+        )
         self.line = RobotLine(self.operator, self.conditions, np.random.default_rng(3))
         self.line.connected = True
         self.refused = self.host.hello(session, now=self.robots(), link_loss=link_loss)

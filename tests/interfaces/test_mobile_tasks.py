@@ -14,7 +14,7 @@ from interfaces.messages.mobile import Plan, Tasks
 from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
 from interfaces.stream.session import News
-from interfaces.teleop.driving.operator import NOT_MET
+from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Place, Room
 from robots.ipr.chassis import chassis
 from robots.onboard.journey import Goal
@@ -52,7 +52,7 @@ def test_everybody_is_told_the_map_and_its_places() -> None:
     assert isinstance(plan, Plan)
     assert (plan.size, plan.via) == ((8.0, 6.0), ((2.0, 2.0),))
     assert dict(office.desk.jobs.places) == {"A": Goal(1.0, 2.0, 0.5), "B": Goal(2.5, 3.0)}
-    assert office.order(RobotTask(go=Goal(1.0, 1.0))) == NOT_MET
+    assert office.order(RobotTask(go=Goal(1.0, 1.0))) == HaltCause.NOT_MET
 
 
 def test_a_list_is_done_and_saved_at_each_step(tmp_path: Path) -> None:

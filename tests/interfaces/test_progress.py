@@ -56,7 +56,7 @@ def test_a_robot_that_waits_for_ever_is_halted_and_resuming_mends_it(delay, halt
     assert not lab.operator.halted
     lab.run(7.0 + within)
     operator, robot = lab.operator, lab.robot
-    assert "hasn't carried out" in operator.halted
+    assert "hasn't carried out" in operator.halted.text
     assert "hasn't carried out" in robot.halted
     assert operator.engine.execute(MotionCommand(JointTarget(READY))).status == "rejected"
     lab.run(lab.now + 15.0)
@@ -79,7 +79,7 @@ def test_long_ways_that_lose_much_are_no_halt(delay, loss, service):
     for _ in range(200):
         lab.run(lab.now + 1.0)
         if lab.operator.halted:
-            halted.append((lab.now, lab.operator.halted))
+            halted.append((lab.now, lab.operator.halted.text))
             break
     assert not halted
 
@@ -93,7 +93,7 @@ def test_a_robot_that_doesnt_take_up_a_new_epoch_is_halted_again():
     assert lab.operator.resume(now=lab.now) == ""
     assert not lab.operator.halted
     lab.run(lab.now + 11.0)
-    assert "resumed" in lab.operator.halted
+    assert "resumed" in lab.operator.halted.text
     lab.robot.begin = begin  # type: ignore[method-assign]
     assert lab.operator.resume(now=lab.now) == ""
     lab.run(lab.now + 3.0)

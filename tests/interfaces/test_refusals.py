@@ -8,6 +8,7 @@ from interfaces.clients.designer import Designer
 from interfaces.engine_server.servlet import Servlet
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode
 from interfaces.stream import Encoding, decode, encode
+from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from tests.interfaces.joined import MODEL, to
 from vrs import PositionQuery
@@ -23,7 +24,7 @@ def outcome(servlet: Servlet, number: int, command: object) -> Outcome:
 
 
 def test_what_a_halted_robot_refuses_has_a_code_that_clients_are_told() -> None:
-    site = OperatorSite(MODEL, READY, now=0.0, halted="nothing fresh came")
+    site = OperatorSite(MODEL, READY, now=0.0, halted=Halt(HaltCause.REPORTED, "nothing fresh came"))
     refused = outcome(Servlet(site.engine), 1, to(1))
     assert refused.receipt is not None
     assert refused.receipt.reason == "the robot doesn't follow: nothing fresh came; resume first"

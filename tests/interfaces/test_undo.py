@@ -5,6 +5,7 @@ from __future__ import annotations
 from interfaces.engine_server.site import Site
 from interfaces.messages import Order
 from interfaces.teleop import OperatorSite
+from interfaces.teleop.halt import Halt, HaltCause
 from robots import puma560
 from vrs import JointTarget, MotionCommand
 from vrs.commands import Cancel
@@ -68,5 +69,5 @@ def test_what_is_over_or_was_never_there_is_told_apart():
 def test_a_robot_that_does_not_follow_is_named():
     hand = Hand()
     hand.order(MotionCommand(JointTarget(READY), execute_at=30.0), 1.0)
-    hand.operator.halted = "the link was lost"
+    hand.operator.halted = Halt(HaltCause.REPORTED, "the link was lost")
     assert "the link was lost" in hand.order(None, 2.0).refusal

@@ -11,8 +11,9 @@ from interfaces.link.delays import ALLOWED, DelayProfile
 from interfaces.messages.control import DirectionConditions, Impair, LinkFigures, Network
 from interfaces.runs.twin_run import QUANTILE
 from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.stream.hub import ConditionError
 from interfaces.teleop.connection import SiteLine
-from vrs.errors import InvalidValueError
+from vrs.errors import InvalidValueError, VrsError
 
 
 def too_slow(conditions: LinkConditions, max_age: float) -> str:
@@ -102,10 +103,14 @@ class LiveEmulation:
         """What a direction does from now on, if it can be as is wished."""
         if wish is None:
             return before
-        profile, loss = self._profile(wish.delay), loss_model(wish.loss)
-        if wish.service not in list(Service):
-            raise InvalidValueError("service", wish.service, " or ".join(Service))
-        return replace(before, delay=profile, loss=loss, service=Service(wish.service))
+        readers = {"delay": self._profile, "loss": loss_model, "service": _service}
+        found: dict[str, Any] = {}
+        for name, read in readers.items():
+            try:
+                found[name] = read(getattr(wish, name))
+            except VrsError as error:
+                raise ConditionError(name, error) from None
+        return replace(before, **found)
 
     def _profile(self, text: str) -> DelayProfile:
         """The delay profile of a name; of traces, which are files here, only those that it began with."""
@@ -116,6 +121,12 @@ class LiveEmulation:
             allowed = f"{ALLOWED}; and a trace only if the server was started with it"
             raise InvalidValueError("delay profile", text, allowed)
         return delay_profile(text)
+
+
+def _service(text: str) -> Service:
+    if text not in list(Service):
+        raise InvalidValueError("service", text, " or ".join(Service))
+    return Service(text)
 
 
 def _positive(seconds: float | None) -> float | None:

@@ -35,7 +35,7 @@ from interfaces.stream.server import HubServer
 from interfaces.teleop.architectures import OperatorSurroundings
 from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.driving import DriveLine, DrivingOperator
-from interfaces.teleop.driving.operator import BY_ITSELF, FREE, STOPPED
+from interfaces.teleop.halt import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.chassis import chassis
@@ -177,7 +177,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
         for message in self.line.advance(now=now):
             self.robot.send(message)
         held = self.hub.lease_state is LeaseState.HELD
-        if self._wants_resume or (held and self.operator.halted == STOPPED):
+        if self._wants_resume or (held and self.operator.cause is HaltCause.STOPPED):
             # After a stop, too: the next drive begins where the real robot has come to rest.
             self._wants_resume = bool(self.operator.resume(now=now))
         self._end_lease(now)
@@ -236,14 +236,14 @@ class LiveMobileOperator(LeasedRobot, Workers):
             or now >= self._ending + PATIENCE
         ):
             self._ending = -math.inf
-            self.operator.halted = FREE
+            self.operator.halted = Halt(HaltCause.FREE)
             self.hub.stopped(now=now)
             self.server.kick()
 
     def lose(self, reason: str) -> None:
         """The robot is lost for good: nothing is sent any more, and commands are refused with the reason."""
         self.robot.lost = self.operator.gone = reason
-        self.operator.halt(reason)
+        self.operator.halt(Halt(HaltCause.GONE, reason))
         self._show(self.clock.now())
         self._turning.soon()
 
@@ -271,7 +271,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
                 command=operator.site.before,
                 estimate=Posture(*operator.site.estimator.posture.tolist()),
                 connected=self.connected,
-                halted=operator.gone or ("" if operator.halted == BY_ITSELF else operator.halted),
+                halted=operator.gone or ("" if operator.cause is HaltCause.BY_ITSELF else text_of(operator.halted)),
                 drives=operator.epochs,
                 round_trip=operator.round_trip,
                 messages=self.line.messages()[-MOST_MESSAGES:],
@@ -292,7 +292,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
             "problem": self.robot.problem,
             **self.robot.health(),
             "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
-            "halted": self.operator.halted,
+            "halted": text_of(self.operator.halted),
             "epoch": self.operator.epoch,
             "drives": self.operator.epochs,
             "doing": self.operator.doing,

@@ -25,7 +25,7 @@ from interfaces.messages.jobs import (
 from interfaces.messages.mobile import Plan, Seen, Tasks
 from interfaces.stream.session import News
 from interfaces.teleop.driving import DrivingOperator
-from interfaces.teleop.driving.operator import NOT_MET
+from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Chassis
 from robots.ipr.navigation import outline_of, route_map
@@ -141,7 +141,7 @@ class TaskDesk:
             return EMPTY
         report = self._operator.report
         if report is None:
-            return NOT_MET
+            return HaltCause.NOT_MET.value
         if self._trying is None or self._trying.done():
             self._trying = asyncio.get_running_loop().create_task(self._forecasts(self.jobs))
         return ""

@@ -33,6 +33,7 @@ from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine
+from interfaces.teleop.halt import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.onboard import LossPolicy
 from robots.onboard.lease import Ended, Grant, Lease
@@ -49,8 +50,6 @@ UNHEARD = 0.75
 """A robot of which nothing has come for so long [s] isn't connected, as clients are told."""
 GONE = 2.0
 """A robot of which nothing has come for so long [s] has stopped by itself, as far as a lease is concerned."""
-NOT_MET = "the robot hasn't been met yet"
-"""Why nothing can be commanded at first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +95,9 @@ class LiveOperator(LeasedRobot):
         self.config = config
         warm(config.model, config.q)
         self.clock = WallClock()
-        self.operator = OperatorSite(config.model, config.q, now=0.0, config=config.site, halted=NOT_MET)
+        self.operator = OperatorSite(
+            config.model, config.q, now=0.0, config=config.site, halted=Halt(HaltCause.NOT_MET)
+        )
         self.site = Site(self.operator.engine)
         self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self.recorder: LiveRecorder | None = None
@@ -281,7 +282,7 @@ class LiveOperator(LeasedRobot):
     def _show(self, now: float) -> None:
         """Tell clients where the real robot is, when that's news."""
         report = self.operator.report
-        halted = self.operator.gone or self.operator.halted
+        halted = self.operator.gone or text_of(self.operator.halted)
         shown = report, self.connected, halted
         if report is None or shown == self._shown:
             return
@@ -311,16 +312,16 @@ class LiveOperator(LeasedRobot):
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
-        report, attached = self.operator.report, self.robot.attached
+        report, attached, halted = self.operator.report, self.robot.attached, self.operator.halted
         silence = self.clock.now() - self.robot.heard
         return {
             "robot_at": self.robot.url,
             "delay": self.line.link.conditions.forward.delay.name,
             "connected": self.connected,
             "problem": self.robot.problem,
-            **self.robot.health(self.operator.halted if self.operator.stuck else ""),
+            **self.robot.health(halted.text if halted is not None and halted.cause is HaltCause.STUCK else ""),
             "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
-            "halted": self.operator.halted,
+            "halted": text_of(halted),
             "epoch": self.operator.epoch,
             "corrections": len(self.operator.corrections),
             "behind": None if report is None or report.halted else report.measured_at - report.q_at,

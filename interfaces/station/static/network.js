@@ -94,10 +94,10 @@ export function mount(station, box) {
     complain("");
   }
 
-  function complain(text) {
+  function complain(text, about = "") {
     write(fault, text);
     for (const way of WAYS) {
-      for (const [name, field] of Object.entries(fields[way])) mark(field, "aria-invalid", text.startsWith(name) ? "true" : null);
+      for (const [name, field] of Object.entries(fields[way])) mark(field, "aria-invalid", name === about ? "true" : null);
     }
   }
 
@@ -127,10 +127,10 @@ export function mount(station, box) {
   }
 
   station.on("network", answered);
-  station.on("problem", ({ number, text }) => {
+  station.on("problem", ({ number, text, field }) => {
     if (!asked || number !== asked) return;
     asked = null;
-    complain(text);
+    complain(text, field);
   });
   station.on("welcome", () => {
     asked = null;

@@ -76,10 +76,10 @@ export class Notices {
     // STOP has a note of its own, and later changes of a receipt aren't of this hand's doing.
     if (command?.type === "stop" || outcome.revision) return;
     const { refusal, receipt } = outcome;
-    const halted = this.session.state?.halted;
-    // Why it waits stands across the picture.
     const why = refusal || (receipt?.status === "rejected" ? receipt.reason : "");
-    if (halted && why.includes(halted)) this.say("the robot doesn't follow: press Resume", control);
+    // Why it waits stands across the picture.
+    const waits = outcome.code === "not-following" && this.session.state?.halted;
+    if (waits) this.say("the robot doesn't follow: press Resume", control);
     else if (why) this.say(why, control);
     else if (command === null && !receipt) this.say("there's nothing to take back", control);
     else if (receipt?.hindrance) this.say(receipt.hindrance, control);

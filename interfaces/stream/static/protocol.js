@@ -214,7 +214,7 @@ function map(x, where) {
  * @property {Receipt|null} [receipt] map of `command_id`, `status`, `issued_at` (absent), `asked_at` (absent), `execute_at` (absent), `end` (absent), `q` (absent), `reason` (empty), `version` (0), `shift` (0), `superseded_by` (absent), `undone` (false), `shifted` (none), `superseded` (none), `hindrance` (empty) (absent). None where there was nothing to take back, the command gives no receipt, or it was refused.
  * @property {string} [refusal] text (empty). Why the command couldn't be taken at all; empty where it could.
  * @property {number} [revision] count (0). Counts up with each change of the receipt, from 0.
- * @property {"other"|"overruled"|"not-following"} [code] `other`, `overruled`, `not-following` (`other`). Why it was refused or rejected, where clients decide by it.
+ * @property {"other"|"overruled"|"not-following"} [code] `other`, `overruled`, `not-following`; any other word counts as `other` (`other`). Why it was refused or rejected, where clients decide by it.
  */
 /**
  * Server: The frame that was asked for, with its status as it is now.
@@ -387,6 +387,7 @@ function map(x, where) {
  * @property {string} text text. For people.
  * @property {number|null} [number] number (absent). Of what it's about, where that's known.
  * @property {boolean} [fatal] boolean (false). Whether the connection ends.
+ * @property {string} [field] text of up to 200 characters (empty). Of an `Impair`: which of `delay`, `loss` and `service` it's about; empty where it's none of them.
  */
 /**
  * Joint limits, each of shape (n,).
@@ -720,7 +721,10 @@ function checkOutcome(m) {
   if (m.revision === undefined) m.revision = 0;
   else whole(m.revision, 0, WHOLE, "outcome.revision");
   if (m.code === undefined) m.code = "other";
-  else word(m.code, WORDS_2, "outcome.code");
+  else {
+    if (typeof m.code === "string" && !WORDS_2.has(m.code)) m.code = "other";
+    word(m.code, WORDS_2, "outcome.code");
+  }
 }
 function checkAnswer(m) {
   map(m, "answer");
@@ -873,6 +877,8 @@ function checkProblem(m) {
   else whole(m.number, 1, WHOLE, "problem.number");
   if (m.fatal === undefined) m.fatal = false;
   else flag(m.fatal, "problem.fatal");
+  if (m.field === undefined) m.field = "";
+  else text(m.field, 0, 200, "problem.field");
 }
 function checkLimits(m) {
   map(m, "Limits");

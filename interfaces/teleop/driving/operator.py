@@ -24,6 +24,7 @@ from interfaces.messages.drive_sites import (
 from interfaces.messages.fields import Epoch
 from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
 from interfaces.teleop.connection import SiteLine
+from interfaces.teleop.halt import Halt, HaltCause, not_following
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from vrs.checks import finite, normal
 from vrs.mobile import MobileModel
@@ -118,14 +119,6 @@ def _beside(a: _Point, b: _Point, posture: Posture) -> _Point:
     return _Point(t, a.x + share * x, a.y + share * y, t)
 
 
-NOT_MET: Final = "the robot hasn't been met yet"
-"""Why nothing can be commanded at first."""
-FREE: Final = "nobody has control"
-"""Why the real robot doesn't follow between two drives."""
-STOPPED: Final = "stopped"
-"""The same after a stop."""
-BY_ITSELF: Final = "the robot drives by itself"
-"""The same while it does what it was told to do by itself."""
 MOVING: Final = "the robot isn't at rest yet"
 """Why it can't go on."""
 HOLDS: Final = 0.3
@@ -158,8 +151,8 @@ class DrivingOperator:
             around: Makes what the virtual robot avoids, for a drive that begins at a posture.
         """
         self._model, self._around = model, around
-        self.halted = NOT_MET
-        """Why the real robot doesn't follow; empty while it does."""
+        self.halted: Halt | None = Halt(HaltCause.NOT_MET)
+        """Why the real robot doesn't follow; None while it does."""
         self.gone = ""
         """Why there's no robot any more, whatever anybody does; empty while there may be one."""
         self.epoch = 1
@@ -218,17 +211,17 @@ class DrivingOperator:
             lasts: For how long from then on [s], at most `HOLDS`.
 
         Returns:
-            Why not; empty if it counts.
+            That the robot doesn't follow, and why; empty if it counts.
         """
         finite("v", v)
         finite("w", w)
         if self.gone:
-            return f"the robot doesn't follow: {self.gone}"
-        if self.halted == BY_ITSELF and (v or w):
+            return not_following(self.gone).text
+        if self.cause is HaltCause.BY_ITSELF and (v or w):
             # Who takes the wheel drives: first the robot comes to rest.
             self.stop()
-        if self.halted:
-            return f"the robot doesn't follow: {self.halted}"
+        if self.halted is not None:
+            return not_following(self.halted.text).text
         self._wish, self._until = Drive(v, w), min(issued_at, now) + min(lasts, HOLDS)
         return ""
 
@@ -240,14 +233,19 @@ class DrivingOperator:
         self._later = ()
         if self.doing is not Doing.NOTHING:
             self._send(HALT)
-            self.halted = ""
-        self.halt(STOPPED)
+            self.halted = None
+        self.halt(Halt(HaltCause.STOPPED))
+
+    @property
+    def cause(self) -> HaltCause | None:
+        """Why the real robot doesn't follow, in a word; None while it does."""
+        return None if self.halted is None else self.halted.cause
 
     @property
     def doing(self) -> Doing:
         """What the real robot does by itself, as far as is known; something, while it may have been told to."""
         report = self.report
-        if self.halted == BY_ITSELF and any(not errand.task.stops for errand in self._errands):
+        if self.cause is HaltCause.BY_ITSELF and any(not errand.task.stops for errand in self._errands):
             return Doing.JOBS
         return Doing.NOTHING if report is None else report.doing
 
@@ -261,17 +259,17 @@ class DrivingOperator:
             Why not; empty if it's told to.
         """
         if self.gone:
-            return f"the robot doesn't follow: {self.gone}"
+            return not_following(self.gone).text
         if self.report is None:
-            return NOT_MET
+            return HaltCause.NOT_MET.value
         if not all(task.stops for task in tasks):
-            if self.halted == STOPPED:
+            if self.cause is HaltCause.STOPPED:
                 # It's told once it has come to rest, and the next drive has begun.
                 self._later = *self._later, (self._now, tasks)
                 return ""
-            if self.halted and self.halted != BY_ITSELF:
-                return f"the robot doesn't follow: {self.halted}"
-            self.halt(BY_ITSELF)
+            if self.halted is not None and self.cause is not HaltCause.BY_ITSELF:
+                return not_following(self.halted.text).text
+            self.halt(Halt(HaltCause.BY_ITSELF))
         self._send(*tasks)
         return ""
 
@@ -304,18 +302,18 @@ class DrivingOperator:
         """Begin a drive where the real robot stands; why that can't be, empty if it does."""
         report = self.report
         if self.gone or report is None:
-            return self.gone or NOT_MET
-        if not self.halted:
+            return self.gone or HaltCause.NOT_MET.value
+        if self.halted is None:
             return ""
         if report.doing is not Doing.NOTHING and not self._errands:
-            self.halted = BY_ITSELF
+            self.halted = Halt(HaltCause.BY_ITSELF)
             return ""
         if not self.done:
             return MOVING
         self._errands.clear()
         self.epoch += 1
         self.epochs += 1
-        self.halted, self._wish, self._until = "", STAND, -math.inf
+        self.halted, self._wish, self._until = None, STAND, -math.inf
         self._set(report.posture, now)
         later, self._later = self._later, ()
         for given, tasks in later:
@@ -323,10 +321,10 @@ class DrivingOperator:
                 self.order(*tasks)
         return ""
 
-    def halt(self, reason: str) -> None:
+    def halt(self, why: Halt) -> None:
         """Let the drive be over; the virtual robot comes to rest."""
-        if not self.halted:
-            self.halted = reason
+        if self.halted is None:
+            self.halted = why
             self._until = -math.inf
             self._later = ()
 
@@ -341,18 +339,20 @@ class DrivingOperator:
                 return ()
             # That a drive is over is said at once.
             packet = ArcPacket((), 0.0)
-        if self.halted in {"", BY_ITSELF} and self.report is not None and (self.report.epoch or 0) < self.epoch:
+        behind = self.report is not None and (self.report.epoch or 0) < self.epoch
+        if self.cause in {None, HaltCause.BY_ITSELF} and self.report is not None and behind:
             usual = self.round_trips.quantile(0.95) or 0.0
             if now > self.began + EPOCH_TIMEOUT + 2.0 * usual:
-                self.halted = ""
-                self.halt(self.report.refused or "the robot doesn't take up the new drive")
+                self.halted = None
+                why = self.report.refused or "the robot doesn't take up the new drive"
+                self.halt(Halt(HaltCause.STUCK, why))
         self._packets += 1
         if self.halted and not self._over:
             self._over = self._packets
         self._prompt = False
         # What it's to do by itself belongs to a drive, too: that must have begun.
-        begins = self.halted == BY_ITSELF and self.report is not None and (self.report.epoch or 0) < self.epoch
-        start = None if self.halted and not begins else self.start
+        begins = self.cause is HaltCause.BY_ITSELF and behind
+        start = None if self.halted is not None and not begins else self.start
         return (
             DriveOrders(
                 epoch=Epoch(self.epoch),
@@ -405,7 +405,7 @@ class DrivingOperator:
         self._heard = now
         if self.report is None:
             self._set(report.posture, now)
-            self.halted = FREE
+            self.halted = Halt(HaltCause.FREE)
         self.report = report
         self.tasks = self.tasks if report.tasks is None else report.tasks
         self.sight = self.sight if report.sight is None else report.sight
@@ -420,13 +420,13 @@ class DrivingOperator:
         if report.halted:
             # What it was told and hasn't begun isn't to begin after a stop.
             self._errands = [errand for errand in self._errands if errand.task.stops]
-            if self.halted == BY_ITSELF:
-                self.halted = ""
-            self.halt(report.halted)
-        elif self.halted == BY_ITSELF:
+            if self.cause is HaltCause.BY_ITSELF:
+                self.halted = None
+            self.halt(Halt(HaltCause.REPORTED, report.halted))
+        elif self.cause is HaltCause.BY_ITSELF:
             if not self._errands and report.doing is Doing.NOTHING:
                 # The next drive begins where it has come to.
-                self.halted = STOPPED
+                self.halted = Halt(HaltCause.STOPPED)
         elif report.report is not None:
             self.site.receive(report.report, now=self.next_t)
             self.deviation = self.path.match(report.posture, report.measured_at - self.began)

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from interfaces.messages import RefusalCode
-from interfaces.teleop.operator import NOT_FOLLOWING
+from interfaces.teleop.halt import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand
 from interfaces.val2.motion.places import (

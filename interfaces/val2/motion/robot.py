@@ -11,6 +11,7 @@ from typing import Final, Protocol
 from typing_extensions import override
 
 from interfaces.messages import RefusalCode
+from interfaces.teleop.halt import text_of
 from interfaces.teleop.operator import OperatorSite
 from vrs.clock import ManualClock
 from vrs.commands import Command
@@ -188,7 +189,7 @@ class SiteRobot(EngineRobot):
 
     @override
     def halt_reason(self) -> str:
-        return self._site.halted
+        return text_of(self._site.halted)
 
     @override
     def real(self, *, now: float) -> Array | None:

@@ -93,6 +93,16 @@ def test_what_is_stale_is_named_with_the_command_that_mends_it(
     assert "run `make generate`" in told
 
 
+def test_pages_take_a_word_of_a_newer_server_for_the_one_that_stands_for_it(script: Script) -> None:
+    for sent, taken in (("overruled", "overruled"), ("overcame", "other")):
+        frame = json.dumps({"type": "outcome", "number": 1, "made_at": 2.5, "refusal": "no", "code": sent})
+        message, said = script.decode(frame)
+        assert (message["code"], said) == (taken, [])
+    message, said = script.decode(frame.replace('"overcame"', "5"))
+    assert message is None
+    assert said
+
+
 # A field that is added.
 
 ADDED = '''

@@ -23,6 +23,7 @@ from interfaces.runs.twin_run import RunEvent, RunFacts, Turn
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.teleop import OperatorSite
+from interfaces.teleop.halt import Halt, HaltCause
 from tests.interfaces.recording import shown
 from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
 from vrs import JointTarget, MotionCommand, Status
@@ -72,7 +73,7 @@ def test_a_site_tells_every_command_once_with_the_time_and_the_receipt():
     with pytest.raises(UnknownCommandError):
         site.execute(Retime(77, 1.0), now=0.4)
     assert len(heard.deeds) == 4
-    site.halted = "it stands in the way"
+    site.halted = Halt(HaltCause.REPORTED, "it stands in the way")
     refused = site.execute(move, now=0.5)
     assert site.undo(now=0.5) is None
     assert heard.deeds[4:] == [(0.5, move, refused, True)]

@@ -101,7 +101,7 @@ def test_a_robot_that_waits_says_why_and_refuses_at_the_control(browser: Any, se
         page.page.evaluate(
             f"""(() => {{ const {{ session }} = station; const take = session.take.bind(session);
             session.take = (message) => take(message.type === "state" ? {{ ...message, halted: "{why}" }}
-                : message.type === "outcome" ? {{ type: "outcome", number: message.number,
+                : message.type === "outcome" ? {{ type: "outcome", number: message.number, code: "not-following",
                     refusal: "the robot doesn't follow: {why}; resume first" }} : message); }})()"""
         )
         page.wait("document.getElementById('banner').textContent.includes('--link-loss hold')")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from interfaces.messages import Order, Outcome, Refusal
+from interfaces.messages import Order, Outcome, Refusal, RefusalCode
 from interfaces.messages.control import Problem
 from interfaces.messages.drive_sites import RobotTask
 from interfaces.messages.mobile import Postures, Seen, Tasks
@@ -61,7 +61,9 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     assert ordered(servlet, 4, None, now).refusal
     assert ordered(servlet, 6, Stop(), now).refusal == ""
     assert "before a stop" in ordered(servlet, 5, DriveCommand(0.3, 0.0, 0.3), now).refusal
-    assert "stopped" in ordered(servlet, 7, DriveCommand(0.3, 0.0, 0.3), now).refusal
+    refused = ordered(servlet, 7, DriveCommand(0.3, 0.0, 0.3), now)
+    assert "stopped" in refused.refusal
+    assert refused.code is RefusalCode.NOT_FOLLOWING
     rig.run(1.0)
     assert rig.operator.stands
 

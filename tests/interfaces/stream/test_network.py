@@ -72,23 +72,24 @@ def test_who_asks_is_told_and_of_every_change_from_then_on():
 
 
 @pytest.mark.parametrize(
-    ("way", "words"),
+    ("way", "words", "field"),
     [
-        (DirectionConditions("tomorrow"), "constant:S"),
-        (DirectionConditions("constant:-1"), "[0, 3600]"),
-        (DirectionConditions("trace:/etc/passwd"), "only if the server was started with it"),
-        (DirectionConditions("none", "1.5"), "burst:P,N"),
-        (DirectionConditions("none", "nan"), "burst:P,N"),
-        (DirectionConditions("none", "0", "sometimes"), "datagram"),
+        (DirectionConditions("tomorrow"), "constant:S", "delay"),
+        (DirectionConditions("constant:-1"), "[0, 3600]", "delay"),
+        (DirectionConditions("trace:/etc/passwd"), "only if the server was started with it", "delay"),
+        (DirectionConditions("none", "1.5"), "burst:P,N", "loss"),
+        (DirectionConditions("none", "nan"), "burst:P,N", "loss"),
+        (DirectionConditions("none", "0", "sometimes"), "datagram", "service"),
     ],
 )
-def test_what_is_wrong_is_said_once_and_changes_nothing(way, words):
+def test_what_is_wrong_is_said_once_and_changes_nothing(way, words, field):
     hub, line, told = emulated()
     mine, epoch = holder(hub)
     before = line.link.conditions
     for wish in (Impair(5, epoch, way), Impair(6, epoch, DirectionConditions("mon"), way)):
         (problem,) = mine.tell(wish, now=0.3)
         assert (problem.code, problem.number, problem.fatal) == (ProblemCode.OUT_OF_RANGE, wish.number, False)
+        assert problem.field == field
         assert words in problem.text
         assert "root:" not in problem.text
     assert (line.link.conditions, told) == (before, [])

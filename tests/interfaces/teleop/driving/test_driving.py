@@ -12,8 +12,9 @@ from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.drive_sites import DriveOrders
 from interfaces.messages.fields import Epoch
 from interfaces.teleop.architectures import ARCHITECTURES
-from interfaces.teleop.driving.operator import HOLDS, MOVING, NOT_MET
+from interfaces.teleop.driving.operator import HOLDS, MOVING
 from interfaces.teleop.driving.robot import TOO_FAR
+from interfaces.teleop.halt import Halt, HaltCause
 from robots.onboard.driving import IPR_LIMITS, Posture
 from tests.interfaces.teleop.driving.rig import CONTROL, MODEL, TURN, Rig
 
@@ -27,8 +28,8 @@ def within_limits(rig: Rig) -> bool:
 
 def test_nothing_moves_before_the_robot_is_met() -> None:
     rig = Rig()
-    assert NOT_MET in rig.operator.wish(0.3, 0.0, issued_at=0.0, now=0.0)
-    assert rig.operator.resume(now=0.0) == NOT_MET
+    assert HaltCause.NOT_MET in rig.operator.wish(0.3, 0.0, issued_at=0.0, now=0.0)
+    assert rig.operator.resume(now=0.0) == HaltCause.NOT_MET
     rig.run(3.5)
     assert rig.operator.halted
     assert rig.operator.wish(0.3, 0.0, issued_at=rig.now, now=rig.now)
@@ -109,7 +110,7 @@ def test_a_lost_link_halts_both_and_only_a_resume_goes_on() -> None:
     assert "link loss" in rig.robot.halted
     rig.line.connected = True
     rig.run(1.0)
-    assert "link loss" in rig.operator.halted
+    assert "link loss" in rig.operator.halted.text
     assert "link loss" in rig.operator.wish(0.4, 0.0, issued_at=rig.now, now=rig.now)
     here = rig.truth
     rig.run(1.0)
@@ -139,7 +140,7 @@ def test_old_messages_move_a_robot_that_holds_and_none_that_halts(hold: bool) ->
         # The clocks are known to 20 ms: it's their age for which they are refused.
         assert rig.operator.resume(now=rig.now) == ""
         rig.run(3.0, lambda now: rig.operator.wish(0.3, 0.0, issued_at=now, now=now))
-        assert "too old" in rig.operator.halted
+        assert "too old" in rig.operator.halted.text
         assert math.dist(rig.truth[:2], start[:2]) < 0.02
 
 
@@ -164,7 +165,7 @@ def test_a_drive_begins_at_rest_and_where_the_robot_is() -> None:
     rig = Rig()
     rig.begin()
     rig.run(1.0, rig.wish(0.3, 0.0))
-    rig.operator.halt("for a test")
+    rig.operator.halt(Halt(HaltCause.STOPPED, "for a test"))
     assert rig.operator.resume(now=rig.now) == MOVING
     robot, far = rig.robot, Posture(9.0, 9.0, 0.0)
     orders = DriveOrders(Epoch(robot.epoch + 1), 1, rig.now, rig.now, 0.0, far)
@@ -187,7 +188,7 @@ def test_a_robot_that_never_takes_up_a_drive_is_given_up() -> None:
     assert rig.operator.resume(now=rig.now) == ""
     rig.operator.start = Posture(5.0, 5.0, 0.0)
     rig.run(6.0)
-    assert rig.operator.halted == TOO_FAR
+    assert rig.operator.halted == Halt(HaltCause.STUCK, TOO_FAR)
 
 
 def test_another_operator_finds_the_robot_where_it_stands() -> None:
@@ -209,7 +210,7 @@ def test_one_drive_after_another_needs_no_halt_in_between() -> None:
     for _ in range(3):
         rig.run(1.5, rig.wish(0.3, 0.0))
         rig.run(3.0)
-        rig.operator.halt("given back")
+        rig.operator.halt(Halt(HaltCause.STOPPED, "given back"))
         rig.run(0.5)
         epoch = rig.robot.epoch
         assert rig.operator.resume(now=rig.now) == ""
@@ -223,7 +224,7 @@ def test_a_robot_whose_drive_is_over_stands_wherever_it_is() -> None:
     rig = Rig()
     rig.begin()
     rig.run(2.0, rig.wish(0.4, 0.0))
-    rig.operator.halt("given back")
+    rig.operator.halt(Halt(HaltCause.STOPPED, "given back"))
     rig.run(0.12)
     assert rig.drives[-1][0] > 0
     rig.run(2.0)

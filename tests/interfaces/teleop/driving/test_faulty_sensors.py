@@ -16,6 +16,7 @@ from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRob
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
+from interfaces.teleop.halt import Halt, HaltCause
 from robots.ipr.chassis import Senses
 from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture
@@ -83,7 +84,7 @@ def test_a_position_that_fails_stops_the_robot_and_a_resume_goes_on(bad: float, 
     spoilt.bad = {field: bad}
     made.run(2.0, asks(made))
     assert made.robot.halted.startswith("the position reads ")
-    assert made.operator.halted == made.robot.halted
+    assert made.operator.halted == Halt(HaltCause.REPORTED, made.robot.halted)
     assert made.drives[-1] == (0.0, 0.0)
     stood = made.truth
     assert made.operator.resume(now=made.now) == ""

@@ -24,7 +24,7 @@ from interfaces.messages.jobs import (
     VoiceJob,
     WaitJob,
 )
-from interfaces.teleop.driving.operator import BY_ITSELF, STOPPED
+from interfaces.teleop.halt import HaltCause
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
@@ -57,7 +57,7 @@ def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
     rig.begin()
     assert rig.operator.order(RobotTask(go=THERE)) == ""
     rig.run(2.0)
-    assert rig.operator.halted == BY_ITSELF
+    assert rig.operator.cause is HaltCause.BY_ITSELF
     assert rig.operator.doing is Doing.GOAL
     assert rig.operator.tasks is not None
     assert rig.operator.tasks.route[-1] == (THERE.x, THERE.y)
@@ -67,7 +67,7 @@ def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
     assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) < 0.05
     assert abs(math.remainder(rig.truth[2] - math.pi / 2, math.tau)) < math.radians(2)
     assert within_limits(rig)
-    assert rig.operator.halted == STOPPED
+    assert rig.operator.cause is HaltCause.STOPPED
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(2.0, rig.wish(-0.3, 0.0))
     assert rig.truth[1] < 3.9
@@ -100,7 +100,7 @@ def test_a_goal_given_while_driving_waits_until_the_robot_rests_and_the_wheel_ta
     # A wish to stand takes nothing over; one to drive does.
     rig.operator.wish(0.0, 0.0, issued_at=rig.now, now=rig.now)
     assert rig.operator.doing is Doing.GOAL
-    assert STOPPED in rig.operator.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
+    assert HaltCause.STOPPED in rig.operator.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
     rig.run(3.0)
     assert rig.autonomy.doing is Doing.NOTHING
     assert stands(rig)
@@ -238,7 +238,7 @@ def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_tak
     rig.operator.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
     rig.run(4.0)
     rig.operator.order(RobotTask(do=ListCommand.PAUSE))
-    while rig.operator.halted != STOPPED:
+    while rig.operator.cause is not HaltCause.STOPPED:
         rig.run(0.05)
     assert rig.operator.order(RobotTask(do=ListCommand.RESUME)) == ""
     assert rig.operator.doing is Doing.NOTHING
