@@ -27,12 +27,12 @@ from interfaces.messages.fields import (
     Time,
     Timeout,
     Value,
-    Wire,
     Word,
 )
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, Limits
+from vrs.record import Record
 
 
 class Ping(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
@@ -57,7 +57,7 @@ class Pong(Message, frozen=True, omit_defaults=True, gc=False, tag="pong"):
     """When this left, by the answerer's clock [s]."""
 
 
-class LinkFigures(Wire, frozen=True, omit_defaults=True, gc=False):
+class LinkFigures(Record, frozen=True, omit_defaults=True, gc=False):
     """Sums over the newest packets."""
 
     packets: Count = 0
@@ -72,7 +72,7 @@ class LinkFigures(Wire, frozen=True, omit_defaults=True, gc=False):
     """How long they were sent, up to now [s]."""
 
 
-class DirectionConditions(Wire, frozen=True, omit_defaults=True, gc=False):
+class DirectionConditions(Record, frozen=True, omit_defaults=True, gc=False):
     """What is emulated in one direction, as the command line spells it."""
 
     delay: Word

@@ -26,7 +26,6 @@ from interfaces.messages.fields import (
     Stamp,
     Text,
     Time,
-    Wire,
     Word,
 )
 from interfaces.messages.jobs import JobList, ListCommand, OperatorLoss, Progress
@@ -35,7 +34,7 @@ from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.supervisor import CellChange
 from vrs.checks import normal
 from vrs.errors import InvalidValueError
-from vrs.record import set_field
+from vrs.record import Record, set_field
 from vrs.segment import ArcSegment, known_arc
 
 Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -45,7 +44,7 @@ NONE_LEFT: Final = 0.0
 """Of a way [m]: a field with it isn't written, where it's this very number."""
 
 
-class RobotTask(Wire, frozen=True, omit_defaults=True, gc=False):
+class RobotTask(Record, frozen=True, omit_defaults=True, gc=False):
     """What a robot, or a list of jobs, is asked to do: `go`, `do`, `jobs` or `halt`."""
 
     go: Goal | None = None
@@ -74,7 +73,7 @@ HALT: Final = RobotTask(halt="somebody stopped the robot")
 """What a stop tells a robot that does something by itself."""
 
 
-class Errand(Wire, frozen=True, omit_defaults=True, gc=False):
+class Errand(Record, frozen=True, omit_defaults=True, gc=False):
     """A task with its number: it's sent until the robot says that it has it, and done once."""
 
     number: Number
@@ -93,7 +92,7 @@ class Doing(enum.StrEnum):
     JOBS = "jobs"
 
 
-class TaskReport(Wire, frozen=True, omit_defaults=True, gc=False):
+class TaskReport(Record, frozen=True, omit_defaults=True, gc=False):
     """How far a robot is with what it does by itself."""
 
     journey: JourneyState = JourneyState.IDLE
@@ -114,7 +113,7 @@ class TaskReport(Wire, frozen=True, omit_defaults=True, gc=False):
     """What it's saying."""
 
 
-class SensedPoints(Wire, frozen=True, omit_defaults=True, gc=False):
+class SensedPoints(Record, frozen=True, omit_defaults=True, gc=False):
     """What a robot sees of its surroundings."""
 
     time: Stamp
@@ -204,7 +203,7 @@ class DriveOrders(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
         return ArcPacket(runs, self.complete_until, _arcs(self.tail))
 
 
-class ArchitectureReport(Wire, frozen=True, omit_defaults=True, gc=False):
+class ArchitectureReport(Record, frozen=True, omit_defaults=True, gc=False):
     """What the robot sends back of its architecture."""
 
     number: Number

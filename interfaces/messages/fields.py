@@ -18,10 +18,9 @@ from vrs.checks import SMALLEST
 from vrs.commands import ENDLESS, FARTHEST, Endless
 from vrs.errors import InvalidValueError
 from vrs.model import frozen_array
-from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Text, Time, Twist, Value, set_field
-from vrs.record import Record as Wire
+from vrs.record import LARGEST, LONGEST_TEXT, Count, Number, Pose, Record, Text, Time, Twist, Value, set_field
 
-__all__ = ["Count", "Number", "Pose", "Text", "Time", "Twist", "Value", "Wire"]
+__all__ = ["Count", "Number", "Pose", "Text", "Time", "Twist", "Value"]
 
 MOST_JOINTS = 64
 """Joints of a robot, at most."""
@@ -88,7 +87,7 @@ class Party(enum.StrEnum):
     ROBOT = "Robot's site"
 
 
-class Message(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
+class Message(Record, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
     """A message, or a part that has a type."""
 
     sender: ClassVar[Party]

@@ -12,11 +12,11 @@ import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
-from interfaces.messages.fields import Number, Points, Span, Text, Wire
+from interfaces.messages.fields import Number, Points, Span, Text
 from robots.onboard.journey import Goal
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
-from vrs.record import set_field
+from vrs.record import Record, set_field
 
 MOST_JOBS: Final = 64
 """Jobs of a list."""
@@ -46,7 +46,7 @@ def _check_text(name: str, value: object, longest: int) -> None:
         raise InvalidValueError(name, value, f"1 to {longest} characters, not all blank")
 
 
-class NumberedJob(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="do"):
+class NumberedJob(Record, frozen=True, omit_defaults=True, gc=False, tag_field="do"):
     """A job of a list."""
 
     number: JobNumber
@@ -125,7 +125,7 @@ Job: TypeAlias = MoveJob | VoiceJob | MessageJob | WaitJob | ArmJob
 """One thing to be done."""
 
 
-class JobList(Wire, frozen=True, omit_defaults=True, gc=False):
+class JobList(Record, frozen=True, omit_defaults=True, gc=False):
     """Jobs in their order, and the places that they name. Every edit makes another list."""
 
     jobs: Annotated[tuple[Job, ...], Meta(max_length=MOST_JOBS)] = ()
@@ -242,7 +242,7 @@ def _cut_reason(progress: JobProgress | Progress) -> None:
         set_field(progress, "reason", progress.reason[:LONGEST_REASON])
 
 
-class JobProgress(Wire, frozen=True, omit_defaults=True, gc=False):
+class JobProgress(Record, frozen=True, omit_defaults=True, gc=False):
     """How far a job is."""
 
     number: JobNumber
@@ -256,7 +256,7 @@ class JobProgress(Wire, frozen=True, omit_defaults=True, gc=False):
         _cut_reason(self)
 
 
-class Progress(Wire, frozen=True, omit_defaults=True, gc=False):
+class Progress(Record, frozen=True, omit_defaults=True, gc=False):
     """How far a list is."""
 
     stage: JobStage = JobStage.PLANNED
@@ -294,7 +294,7 @@ class ListCommand(enum.StrEnum):
     """Say how long the list is likely to take: that's asked of the virtual robot alone."""
 
 
-class JobForecast(Wire, frozen=True, omit_defaults=True, gc=False):
+class JobForecast(Record, frozen=True, omit_defaults=True, gc=False):
     """What is likely to become of a job."""
 
     number: Number

@@ -24,7 +24,6 @@ from interfaces.messages.fields import (
     Stamp,
     Text,
     Time,
-    Wire,
     Word,
 )
 from interfaces.messages.segments import MOST_POWERS
@@ -34,6 +33,7 @@ from vrs.ledger import Known, Receipt
 from vrs.mobile import Grid
 from vrs.model import Array, frozen_array
 from vrs.notes import rough_in
+from vrs.record import Record
 from vrs.segment import PolynomialSegment, known_segment
 from vrs.timeline import Timeline
 
@@ -54,7 +54,7 @@ Cells = Annotated[tuple[Annotated[int, Meta(ge=0, le=4095)], ...], Meta(max_leng
 """Of the virtual environment, two numbers a cell: along x, along y."""
 
 
-class GridFacts(Wire, frozen=True, omit_defaults=True, gc=False):
+class GridFacts(Record, frozen=True, omit_defaults=True, gc=False):
     """The cells of the virtual environment."""
 
     shape: Annotated[list[Annotated[int, Meta(ge=1, le=4096)]], Meta(min_length=2, max_length=2)]
@@ -63,7 +63,7 @@ class GridFacts(Wire, frozen=True, omit_defaults=True, gc=False):
     origin: Place
 
 
-class DriveFacts(Wire, frozen=True, omit_defaults=True, gc=False):
+class DriveFacts(Record, frozen=True, omit_defaults=True, gc=False):
     """How a mobile robot's run was set up."""
 
     body: Literal["ipr", "micro", "bare"]
@@ -80,7 +80,7 @@ class DriveFacts(Wire, frozen=True, omit_defaults=True, gc=False):
     """None where there was no virtual environment."""
 
 
-class ThingEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class ThingEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A block, or a column where it has a radius."""
 
     name: Word
@@ -98,7 +98,7 @@ class ThingEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     end: Finite | None = None
 
 
-class PersonEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class PersonEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """Somebody who walks."""
 
     name: Word
@@ -110,7 +110,7 @@ class PersonEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     repeat: bool = False
 
 
-class DoorEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class DoorEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A door that opens and closes."""
 
     name: Word
@@ -127,7 +127,7 @@ class DoorEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     repeat: bool = False
 
 
-class RoomEntry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind", tag="room"):
+class RoomEntry(Record, frozen=True, omit_defaults=True, gc=False, tag_field="kind", tag="room"):
     """Where it was: written at the beginning, and once more at the end."""
 
     name: Word
@@ -139,7 +139,7 @@ class RoomEntry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind
     doors: Annotated[tuple[DoorEntry, ...], Meta(max_length=1000)] = ()
 
 
-class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class ArcEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """An arc at constant speeds."""
 
     duration: Seconds
@@ -155,7 +155,7 @@ class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """[s]; None where the arc before ends."""
 
 
-class ArcHistory(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="arcs"):
+class ArcHistory(Record, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="arcs"):
     """A part of the whole timeline with an edit; as `HistoryEntry`."""
 
     edit: Count
@@ -168,7 +168,7 @@ class ArcHistory(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, 
     segments: tuple[ArcEntry, ...] = ()
 
 
-class ArcChange(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="drive"):
+class ArcChange(Record, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="drive"):
     """An edit of the timeline: its first `first` arcs stay, these follow."""
 
     edit: Number
@@ -181,7 +181,7 @@ class ArcChange(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, t
     command_id: CommandId | None = None
 
 
-class PostureSample(Wire, frozen=True, omit_defaults=True, gc=False):
+class PostureSample(Record, frozen=True, omit_defaults=True, gc=False):
     """Where a robot is, or is thought to be, at a time."""
 
     t: Time
@@ -236,7 +236,7 @@ class EstimatedPosture(PostureSample, frozen=True, omit_defaults=True, gc=False)
     edit: ClassVar[int] = 0
 
 
-class CellsEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class CellsEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """Cells of the virtual environment, beside the known map, that came and went since the entry before."""
 
     t: Time
@@ -262,11 +262,11 @@ _Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * M
 Site: TypeAlias = Literal["virtual", "real"]
 
 
-class Entry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
+class Entry(Record, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
     """A message of a channel that has several kinds."""
 
 
-class Late(Wire, frozen=True, omit_defaults=True, gc=False):
+class Late(Record, frozen=True, omit_defaults=True, gc=False):
     """How the operator's engine stood when a recording began in the middle of its session; see `vrs.ledger`."""
 
     newest: Count
@@ -316,7 +316,7 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     """Of a mobile robot; None of an arm."""
 
 
-class Drop(Wire, frozen=True, omit_defaults=True, gc=False):
+class Drop(Record, frozen=True, omit_defaults=True, gc=False):
     """Messages of a topic for which there was no room."""
 
     topic: Word
@@ -377,7 +377,7 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         return Known(self.receipt, command, profile, rough_in(self.receipt.reason))
 
 
-class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class SegmentEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A segment: a row of `dof` numbers a power, ascending, one row after the other."""
 
     duration: Seconds
@@ -471,7 +471,7 @@ class ChangeEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="change"
     command_id: CommandId | None = None
 
 
-class VirtualSample(Wire, frozen=True, omit_defaults=True, gc=False):
+class VirtualSample(Record, frozen=True, omit_defaults=True, gc=False):
     """Joints of the virtual robot as it's shown: a comfort for other readers, ours compute them."""
 
     t: Time
@@ -480,7 +480,7 @@ class VirtualSample(Wire, frozen=True, omit_defaults=True, gc=False):
     """Number of the newest edit."""
 
 
-class RealSample(Wire, frozen=True, omit_defaults=True, gc=False):
+class RealSample(Record, frozen=True, omit_defaults=True, gc=False):
     """Joints of the real robot as measured."""
 
     t: Time
@@ -491,7 +491,7 @@ class RealSample(Wire, frozen=True, omit_defaults=True, gc=False):
     """What its own timeline asked for; None where that isn't known."""
 
 
-class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class LinkEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A packet of the link whose fate is known."""
 
     direction: Literal["forward", "backward"]
@@ -504,7 +504,7 @@ class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """[byte]; 0 where that wasn't recorded."""
 
 
-class EventEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+class EventEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """Something that happened, as `interfaces.runs.twin_run.RunEvent`."""
 
     t: Time

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from interfaces.messages.fields import Wire
 from vrs.model import Array
+from vrs.record import Record
 
 BASE = "base"
 """Frame of both arms' bases."""
@@ -30,14 +30,14 @@ _STILL = 1.0
 """How often a robot that stands is shown [s]."""
 
 
-class Timestamp(Wire, frozen=True, gc=False):
+class Timestamp(Record, frozen=True, gc=False):
     """Foxglove's time; of the user's timeline, not negative."""
 
     sec: int
     nsec: int
 
 
-class Vector3(Wire, frozen=True, gc=False):
+class Vector3(Record, frozen=True, gc=False):
     """Foxglove's vector [m]."""
 
     x: float
@@ -45,7 +45,7 @@ class Vector3(Wire, frozen=True, gc=False):
     z: float
 
 
-class Quaternion(Wire, frozen=True, gc=False):
+class Quaternion(Record, frozen=True, gc=False):
     """Foxglove's quaternion."""
 
     x: float
@@ -54,14 +54,14 @@ class Quaternion(Wire, frozen=True, gc=False):
     w: float
 
 
-class Pose(Wire, frozen=True, gc=False):
+class Pose(Record, frozen=True, gc=False):
     """`foxglove.Pose`."""
 
     position: Vector3
     orientation: Quaternion
 
 
-class PoseInFrame(Wire, frozen=True, gc=False):
+class PoseInFrame(Record, frozen=True, gc=False):
     """`foxglove.PoseInFrame`."""
 
     timestamp: Timestamp
@@ -77,7 +77,7 @@ class RealPose(PoseInFrame, frozen=True, gc=False):
     """Of the real robot's last link, or of the mobile robot."""
 
 
-class FrameTransform(Wire, frozen=True, gc=False):
+class FrameTransform(Record, frozen=True, gc=False):
     """`foxglove.FrameTransform`."""
 
     timestamp: Timestamp
@@ -87,7 +87,7 @@ class FrameTransform(Wire, frozen=True, gc=False):
     rotation: Quaternion
 
 
-class FrameTransforms(Wire, frozen=True, gc=False):
+class FrameTransforms(Record, frozen=True, gc=False):
     """`foxglove.FrameTransforms`."""
 
     transforms: tuple[FrameTransform, ...]
