@@ -17,6 +17,7 @@ from msgspec import inspect as kinds
 
 from interfaces.messages.control import Role, may_send
 from interfaces.messages.description import (
+    BASE64,
     Described,
     FieldDescription,
     MessageDescription,
@@ -52,14 +53,16 @@ def recorded() -> list[MessageDescription]:
 def parts(message: MessageDescription) -> Iterator[MessageDescription]:
     """What has fields of its own within a message, innermost first, and the message."""
     for field in message.fields:
-        yield from _within(field.type)
+        for part in _within(field.type):
+            yield from parts(part)
     yield message
 
 
 def _within(kind: kinds.Type) -> Iterator[MessageDescription]:
+    """What has fields of its own in a place, in lists and maps there, too."""
     for one in alternatives(kind):
         if isinstance(one, Described):
-            yield from parts(described(one))
+            yield described(one)
         for name in ("item_type", "item_types", "key_type", "value_type"):
             inner = getattr(one, name, ())
             for part in inner if isinstance(inner, tuple) else (inner,):
@@ -377,20 +380,36 @@ def _sizes(kind: Any) -> str:
 
 # The documents' tables.
 
-MARKED = re.compile(r"<!-- (fields|messages|roles|topics|words)(?:: ([\w ./-]+))? -->\n.*?<!-- end -->", re.S)
+MARKED = re.compile(r"<!-- (fields|messages|roles|topics|words)(?:: ([\w ./=-]+))? -->\n.*?<!-- end -->", re.S)
+Names = dict[str, str]
+"""What a document calls what has a table of its own there, by the name of its class."""
 
 
 def document(text: str, found: Iterable[MessageDescription]) -> str:
     """A document with its tables as the definitions have them.
 
+    `fields: report.plan` is a table of what stands in a field, `fields: receipt = outcome.receipt` one with a name,
+    and `messages: order.command` one of all that may stand in a field.
+
     Raises:
         KeyError: If it asks for a table of something that isn't there.
     """
     known = list(found)
-    tables = {name: part for part in _each(known) for name in (part.name, part.tag) if name}
+    tables = {name: part for part in [*_each(known), *known] for name in (part.name, part.tag) if name}
     tags = {part.name: part.tag for part in _each(known) if part.tag}
     choices = {one.cls.__name__: one.cls for part in _each(known) for field in part.fields
                for one in alternatives(field.type) if isinstance(one, kinds.EnumType)}  # fmt: skip
+
+    def found_at(path: str) -> list[MessageDescription]:
+        first, *inner = path.split(".")
+        return _inside(tables[first], inner) if inner else [tables[first]]
+
+    names: Names = {}
+    for what, said in MARKED.findall(text):
+        name, _, path = said.rpartition(" = ")
+        if what == "fields":
+            *_, part = found_at(path)
+            names[part.name] = name or part.tag or path
 
     def table(match: re.Match[str]) -> str:
         what, name = match[1], match[2]
@@ -399,12 +418,12 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         elif what == "words":
             rows = _words_table(choices[name])
         elif what == "fields":
-            first, *inner = name.split(".")
-            rows = _fields_table(name, _part(tables[first], inner), tags)
+            *_, part = found_at(name.rpartition(" = ")[2])
+            rows = _fields_table(names[part.name], part, tags, names)
         elif what == "topics":
             rows = _topics_table(tags)
         else:
-            rows = _messages_table([tables[one] for one in name.split()], tags)
+            rows = _messages_table([one for path in name.split() for one in found_at(path)], tags, names)
         head = f"<!-- {what}{f': {name}' if name else ''} -->"
         # A table is one to Markdown between blank lines.
         return "\n".join([head, "", *rows, "", "<!-- end -->"])
@@ -412,11 +431,12 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
     return MARKED.sub(table, text)
 
 
-def _part(message: MessageDescription, inner: list[str]) -> MessageDescription:
-    """What stands in a field of a field of a message, and so on."""
+def _inside(message: MessageDescription, inner: list[str]) -> list[MessageDescription]:
+    """What may stand in a field of a field of a message, and so on."""
+    found = [message]
     for name in inner:
-        *_, message = _within(next(field.type for field in message.fields if field.name == name))
-    return message
+        found = list(_within(next(field.type for field in found[-1].fields if field.name == name)))
+    return found
 
 
 def _topics_table(tags: dict[str, str]) -> list[str]:
@@ -429,17 +449,33 @@ def _topics_table(tags: dict[str, str]) -> list[str]:
     return rows
 
 
-def _fields_table(name: str, message: MessageDescription, tags: dict[str, str]) -> list[str]:
+def _fields_table(name: str, message: MessageDescription, tags: dict[str, str], names: Names) -> list[str]:
     rows = [f"| `{name}` | | |", "|---|---|---|"]
-    rows += [_row(f"`{field.name}`", _what(field), _told(field.text, tags)) for field in message.fields]
+    for field in message.fields:
+        told = _told(field.text or _words_told(field.type), tags, "absent" if field.null_is_absence else "null")
+        rows.append(_row(f"`{field.name}`", _what(field, names), told))
     return rows
 
 
-def _messages_table(found: list[MessageDescription], tags: dict[str, str]) -> list[str]:
+def _words_told(kind: kinds.Type) -> str:
+    """What the words of a choice mean, where something says so."""
+    found = [one for one in alternatives(kind) if isinstance(one, kinds.EnumType)]
+    texts = [(one.value, field_texts(choice.cls).get(one.name, "")) for choice in found for one in choice.cls]
+    return "; ".join(f"`{word}`: {_begun(text.removesuffix('.'))}" for word, text in texts if text)
+
+
+def _begun(text: str) -> str:
+    """A text that goes on where it stands."""
+    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
+
+
+def _messages_table(found: list[MessageDescription], tags: dict[str, str], names: Names) -> list[str]:
     rows = ["| message | fields | |", "|---|---|---|"]
     for message in found:
-        fields = "; ".join(f"`{field.name}` {_what(field)}" for field in message.fields)
-        rows.append(_row(f"`{message.tag}`", fields, _told(message.text, tags)))
+        fields = "; ".join(f"`{field.name}` {_what(field, names)}" for field in message.fields)
+        rows.append(
+            _row(f"`{message.tag}`", "see below" if message.name in names else fields, _told(message.text, tags))
+        )
     return rows
 
 
@@ -447,10 +483,10 @@ def _row(*cells: str) -> str:
     return "|" + "".join(f" {cell} |" if cell else " |" for cell in cells)
 
 
-def _told(text: str, tags: dict[str, str]) -> str:
-    """A docstring as documents have it: messages have other names there, and what is None is left out."""
+def _told(text: str, tags: dict[str, str], none: str = "absent") -> str:
+    """A docstring as documents have it: messages have other names there, and what is None is left out, or null."""
     text = re.sub(r"`(\w+)`", lambda match: f"`{tags.get(match[1], match[1])}`", text).removesuffix(".")
-    return re.sub(r"\bNone\b", lambda match: "absent" if match.start() else "Absent", text)
+    return re.sub(r"\bNone\b", lambda match: none if match.start() else none.capitalize(), text)
 
 
 def _words_table(kind: type[enum.Enum]) -> list[str]:
@@ -472,12 +508,11 @@ def _roles_table(known: list[MessageDescription]) -> list[str]:
     return rows
 
 
-def _what(field: FieldDescription) -> str:
+def _what(field: FieldDescription, names: Names | None = None) -> str:
     """A field's type, its range and its default, for people."""
-    what = " or ".join(dict.fromkeys(_one_what(one) for one in alternatives(field.type)))
-    if field.required:
-        return what + " or null" * field.nullable
-    return f"{what} ({_default(field)})"
+    what = " or ".join(dict.fromkeys(_one_what(one, names or {}) for one in alternatives(field.type)))
+    what += " or null" * (field.nullable and not field.null_is_absence)
+    return what if field.required else f"{what} ({_default(field)})"
 
 
 def _default(field: FieldDescription) -> str:
@@ -503,15 +538,15 @@ TERMS = {(1, 2**63 - 1): "number", (0, 2**63 - 1): "count", (-(2**63), 2**63 - 1
 """Ranges of integers that have a name."""
 
 
-def _one_what(kind: kinds.Type) -> str:
+def _one_what(kind: kinds.Type, names: Names) -> str:
     match kind:
         case kinds.IntType():
             low, high = bounds(kind)
-            return TERMS.get((low, high)) or f"integer from {low} to {high}"
+            return TERMS.get((low, high)) or f"integer from {_figure(low)} to {_figure(high)}"
         case kinds.FloatType():
             return _real(kind)
-        case kinds.StrType(pattern=str()):
-            return "epoch"
+        case kinds.StrType(pattern=str(pattern)):
+            return "bytes" if pattern == BASE64 else "epoch"
         case kinds.StrType(least, most):
             return "text" if (least, most) == (None, 2000) else f"text of {least or 'up'} to {most} characters"
         case kinds.BoolType():
@@ -524,24 +559,26 @@ def _one_what(kind: kinds.Type) -> str:
             if isinstance(item, kinds.FloatType) and (least, most) == (1, 64):
                 return "joints"
             size = "" if least == most else f"{least} to " if least else "up to "
-            return f"{size}{most or 'any number'} × {_several(item)}"
+            return f"{size}{most or 'any number'} × {_several(item, names)}"
         case kinds.TupleType(items):
-            return f"[{', '.join(_several(item) for item in items)}]"
+            return f"[{', '.join(_several(item, names) for item in items)}]"
         case kinds.NamedTupleType(_, fields):
             return f"[{', '.join(f'`{field.encode_name}`' for field in fields)}]"
         case kinds.DictType(_, item):
-            return f"map of {_several(item)}"
+            return f"map of {_several(item, names)}"
     inner = described(kind)
+    if inner.name in names and not inner.is_array and not inner.tag:
+        return f"`{names[inner.name]}`"
     if inner.is_array:
         return f"[{', '.join(f'`{field.name}`' for field in inner.fields)}]"
     if inner.tag:
         return f"`{inner.tag}`"
-    names = (f"`{field.name}`" + ("" if field.required else f" ({_default(field)})") for field in inner.fields)
-    return "map of " + ", ".join(names)
+    fields = (f"`{field.name}`" + ("" if field.required else f" ({_default(field)})") for field in inner.fields)
+    return "map of " + ", ".join(fields)
 
 
-def _several(kind: kinds.Type) -> str:
-    found = list(dict.fromkeys(_one_what(one) for one in alternatives(kind)))
+def _several(kind: kinds.Type, names: Names) -> str:
+    found = list(dict.fromkeys(_one_what(one, names) for one in alternatives(kind)))
     return " or ".join([*found, *(["null"] if is_nullable(kind) else [])])
 
 
@@ -561,7 +598,7 @@ def _figure(number: Any) -> str:
     if size >= 1e4 and 10 ** (len(str(int(size))) - 1) == size:
         raised = str(len(str(int(size))) - 1).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
         return ("−" if number < 0 else "") + f"10{raised}"
-    return f"{number:g}".replace("-", "−")
+    return (str(number) if isinstance(number, int) else f"{number:g}").replace("-", "−")
 
 
 # What is written, and what is stale.

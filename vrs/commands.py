@@ -129,9 +129,9 @@ class PoseTarget(Record, frozen=True, omit_defaults=True, gc=False, eq=False, ta
     """A target pose of the last link in the base frame."""
 
     X: Pose
-    """Homogeneous transform, (4, 4), with a proper rotation."""
+    """Homogeneous transform, (4, 4), by rows, with a proper rotation."""
     configuration: Annotated[str, Meta(max_length=200)] | None = None
-    """Asked-for arm configuration, as `LEFTY BELOW FLIP` or a part of it; None keeps the arm's own."""
+    """Asked-for arm configuration, as `LEFTY BELOW FLIP` or a part of it; None: the arm's own."""
 
     if TYPE_CHECKING:
 
@@ -162,14 +162,15 @@ class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=Fals
     """Move to a target: (p, t, v) of eq. (1), Doulgeri, Zikos, Delopoulos."""
 
     target: Target
+    """Where to."""
     issued_at: Time | None = None
-    """Issue time t_iss [s]; None is stamped by whoever registers the command.
+    """Issue time t_iss [s]; None: whoever registers the command stamps it.
 
     An engine in real-time mode stamps its present time; a command for an earlier t_exec then is rejected, so one
     that was issued in time and comes late must carry its own stamp to be postponed.
     """
     execute_at: Time | None = None
-    """Execution time t_exec [s]; None means as soon as possible: now, or the end of the plan when offline."""
+    """Execution time t_exec [s]; None: as soon as possible, which is now, or the end of the plan when offline."""
     speed: _Share = field(default_factory=lambda: 1.0)
     """Share v of the nominal speeds, in (0, 1]. The paper's v = 0 would never arrive, so it is refused."""
     motion: Motion = Motion.JOINT
@@ -178,15 +179,19 @@ class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=Fals
     deviation: _Deviation = field(default_factory=float)
     """How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops.
 
-    Infinity is a continuous path: the move begins where the one before it begins to brake, or so late that it's at
-    its speed when that one ends. Such moves take half of the acceleration, so that any two can overlap.
+    Infinity, written as `inf`, is a continuous path: the move begins where the one before it begins to brake, or so
+    late that it's at its speed when that one ends. Such moves take half of the acceleration, so that any two can
+    overlap.
     """
     pace: _Share = _UNCHANGED
     """Planned as at 1, a move takes 1/pace times as long on the same path, roundings included; in [0.001, 1]."""
     acceleration: Annotated[float, Meta(ge=1e-2, le=1)] = _UNCHANGED
     """Share of the limits of acceleration and jerk that the move takes, in [0.01, 1]."""
     tool: Pose | None = None
-    """What goes straight and keeps the deviation: a frame in the last link's, (4, 4). Targets stay that link's."""
+    """What goes straight and keeps the deviation: a frame in the last link's, (4, 4), by rows; None: that link.
+
+    Targets stay the last link's.
+    """
 
     def __post_init__(self) -> None:
         if not isinstance(self.target, (JointTarget, PoseTarget)):
@@ -218,7 +223,7 @@ class PositionQuery(_Command, frozen=True, omit_defaults=True, gc=False, tag="qu
     """Ask for the position at time t: g of eq. (4)."""
 
     t: Time | None = None
-    """Timeline time [s]; None means now (offline: the end of the plan)."""
+    """Timeline time [s]; None: now (offline: the end of the plan)."""
 
     def __post_init__(self) -> None:
         if self.t is not None:
@@ -226,7 +231,7 @@ class PositionQuery(_Command, frozen=True, omit_defaults=True, gc=False, tag="qu
 
 
 class ParameterChange(_Command, frozen=True, omit_defaults=True, gc=False, tag="parameter"):
-    """Change an internal simulation parameter; `Engine.parameters` names them."""
+    """Change a parameter of the simulation, at rest; `Engine.parameters` names them."""
 
     name: Annotated[str, Meta(max_length=200)]
     value: _Parameter = None
@@ -242,9 +247,9 @@ class DriveCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="dri
     duration: Annotated[float, Meta(gt=0, le=LARGEST)]
     """[s], positive."""
     issued_at: Time | None = None
-    """Issue time t_iss [s]; None is stamped by whoever registers the command."""
+    """Issue time t_iss [s]; None: whoever registers the command stamps it."""
     execute_at: Time | None = None
-    """Execution time t_exec [s]; None means as soon as possible."""
+    """Execution time t_exec [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
         for name in ("v", "w", "duration"):
@@ -266,7 +271,7 @@ class SteerCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="ste
     issued_at: Time | None = None
     """Issue time t_iss [s]; an input older than 0.2 s moves nothing."""
     execute_at: Time | None = None
-    """Execution time t_exec [s]; None means as soon as possible."""
+    """Execution time t_exec [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
         if (self.rates is None) == (self.twist is None):
@@ -299,7 +304,7 @@ class Cancel(_Command, frozen=True, omit_defaults=True, gc=False, tag="cancel"):
     command_id: Number
     issued_at: Time | None = None
     execute_at: Time | None = None
-    """When [s]; None means as soon as possible."""
+    """When [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
         _check_id(self)
@@ -315,7 +320,7 @@ class InsertVia(_Command, frozen=True, omit_defaults=True, gc=False, tag="via"):
     """How far the tool may stay away from the via [m], so as not to stop there; 0 stops."""
     issued_at: Time | None = None
     execute_at: Time | None = None
-    """When a move under way turns to the via [s]; None means as soon as possible."""
+    """When a move under way turns to the via [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
         _check_id(self)
@@ -332,7 +337,7 @@ class ScaleTime(_Command, frozen=True, omit_defaults=True, gc=False, tag="scale"
     """Ratio of the new pace to the present one, 0.001 to 1000."""
     issued_at: Time | None = None
     execute_at: Time | None = None
-    """When it begins [s]; None means as soon as possible (offline: the start of the timeline)."""
+    """When it begins [s]; None: as soon as possible (offline: the start of the timeline)."""
 
     def __post_init__(self) -> None:
         set_field(self, "factor", number_in("factor", self.factor, 1e-3, 1e3))
@@ -344,7 +349,7 @@ class Stop(_Command, frozen=True, omit_defaults=True, gc=False, tag="stop"):
 
     issued_at: Time | None = None
     execute_at: Time | None = None
-    """When [s]; None means as soon as possible. A late stop stops at once, whatever the lateness policy."""
+    """When [s]; None: as soon as possible. A late stop stops at once, whatever the lateness policy."""
 
     def __post_init__(self) -> None:
         _check_stamps(self)
@@ -355,7 +360,7 @@ class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
 
     issued_at: Time | None = None
     execute_at: Time | None = None
-    """When [s]; None means as soon as possible."""
+    """When [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
         _check_stamps(self)

@@ -33,7 +33,10 @@ if TYPE_CHECKING:
     Names: TypeAlias = tuple[int, ...] | Callable[[], tuple[int, ...]]
 else:
     Names = tuple[Number, ...]
-"""Command ids, or what finds them when somebody asks: only those that were found can be written."""
+"""Command ids, or what finds them when somebody asks: naming a long tail takes time that a command hasn't got.
+
+Only those that were found can be written.
+"""
 
 
 class Status(enum.StrEnum):
@@ -48,7 +51,7 @@ class Receipt(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     """What became of a command; it belongs to one version of the timeline."""
 
     command_id: Count
-    """Id of the command, from 1; rejected commands have one too."""
+    """Names the command from now on, from 1; rejected commands have an id, too."""
     status: Status
     issued_at: Time | None = None
     """Issue time [s]; None where none was given to an offline engine."""
@@ -71,20 +74,20 @@ class Receipt(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     undone: bool = False
     """Whether it was taken back or cancelled."""
     shifted_names: Names = field(default=(), name="shifted")
-    """Ids for `shifted`, or what finds them: naming a long tail takes time that a command hasn't got."""
+    """Ids of commands whose moves now come at another time."""
     superseded_names: Names = field(default=(), name="superseded")
-    """Ids for `superseded`, or what finds them."""
+    """Ids of commands that won't arrive any more, wholly or in part."""
     hindrance: Text = ""
     """Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it."""
 
     @property
     def shifted(self) -> tuple[int, ...]:
-        """Ids of commands whose moves now come at another time."""
+        """`shifted_names`, found."""
         return self.shifted_names if isinstance(self.shifted_names, tuple) else self.shifted_names()
 
     @property
     def superseded(self) -> tuple[int, ...]:
-        """Ids of commands that will not arrive any more, wholly or in part."""
+        """`superseded_names`, found."""
         return self.superseded_names if isinstance(self.superseded_names, tuple) else self.superseded_names()
 
     def named(self, most: int | None = None) -> Receipt:

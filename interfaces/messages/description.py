@@ -20,7 +20,8 @@ from msgspec import inspect as kinds
 from interfaces.messages.fields import CROSSING, plain
 from vrs.errors import InvalidValueError
 
-_BASE64 = r"\A(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?\Z"
+BASE64 = r"\A(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?\Z"
+"""What bytes look like in JSON."""
 
 
 class FieldDescription(NamedTuple):
@@ -139,7 +140,7 @@ def alternatives(kind: kinds.Type) -> tuple[kinds.Type, ...]:
         return ()
     if isinstance(kind, kinds.BytesType):
         least, most = (-(-size // 3) * 4 for size in (kind.min_length or 0, kind.max_length or sys.maxsize))
-        return (kinds.StrType(least, most, _BASE64),)
+        return (kinds.StrType(least, most, BASE64),)
     if isinstance(kind, kinds.Metadata):
         return alternatives(kind.type)
     if isinstance(kind, kinds.CustomType):

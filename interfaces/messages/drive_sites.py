@@ -50,13 +50,12 @@ class RobotTask(Record, frozen=True, omit_defaults=True, gc=False):
     go: Goal | None = None
     """Drive there; a list of jobs that is being done is paused."""
     do: ListCommand | None = None
-    """Something with the list that's there."""
     jobs: JobList | None = None
     """Take this list in place of the one before; not while that is being done."""
     progress: Progress | None = None
-    """How far that list is already; None keeps what's known of jobs with the same number that are unchanged."""
+    """How far that list is already; None: as far as is known of jobs with the same number that are unchanged."""
     halt: Text | None = None
-    """Stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused."""
+    """Between sites: stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused."""
 
     def __post_init__(self) -> None:
         given = [name for name in ("go", "do", "jobs", "halt") if getattr(self, name) is not None]
@@ -77,7 +76,9 @@ class Errand(Record, frozen=True, omit_defaults=True, gc=False):
     """A task with its number: it's sent until the robot says that it has it, and done once."""
 
     number: Number
+    """From 1."""
     task: RobotTask
+    """What is to be done."""
 
     def __post_init__(self) -> None:
         if self.task.do is ListCommand.DRY_RUN:
@@ -99,6 +100,7 @@ class TaskReport(Record, frozen=True, omit_defaults=True, gc=False):
     reason: Text = ""
     """Why it waits or couldn't get there."""
     goal: Goal | None = None
+    """Where to."""
     route: Points = ()
     """The way that's being driven [m]."""
     digest: Word = ""
@@ -190,7 +192,8 @@ class DriveOrders(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     start: Posture | None = None
     """Where it began; None while nobody drives."""
     runs: Annotated[tuple[tuple[Count, ArcRows], ...], Meta(max_length=8)] = ()
-    """Runs of consecutive arcs that the robot may lack, each with the number of its first."""
+    """[number of the first, arcs]: runs of consecutive arcs, all that the robot hasn't said it has. An arc is
+    [start, x, y, θ, v, ω, duration], with the posture at its start."""
     tail: ArcRows = ()
     """How the virtual robot brakes from there, unless the operator goes on."""
     errands: Annotated[tuple[Errand, ...], Meta(max_length=16)] = ()
@@ -217,7 +220,7 @@ class ArchitectureReport(Record, frozen=True, omit_defaults=True, gc=False):
     seen_at: Time | None = None
     """When the robot said what its supervisor saw change, by its own clock [s]; None but in the extended one."""
     cells: Annotated[tuple[CellChange, ...], Meta(max_length=MOST_CELLS)] = ()
-    """What that was, each cell once."""
+    """What that was, each cell once: [[m, n], when it was last seen so [s], whether it's occupied]."""
 
     @property
     def size(self) -> int:
@@ -242,7 +245,7 @@ class DriveReport(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     drive: Drive
     """What its motors are told."""
     echo: tuple[Number, Stamp, Stamp] | None = None
-    """The newest orders heard: their number, their sent_at, and when they arrived by the robot's clock [s]."""
+    """The newest orders heard: their number, their `sent_at`, and when they arrived by the robot's clock [s]."""
     halted: Text = ""
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
     refused: Text = ""
@@ -267,9 +270,9 @@ class DriveReport(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     left: Distance = NONE_LEFT
     """Way to the goal of that [m]."""
     tasks: TaskReport | None = None
-    """How far it is with that; None where that was told a moment ago."""
+    """How far it is with that; None where it's no news and was told less than 0.5 s ago."""
     sight: SensedPoints | None = None
-    """What it sees; None where there's nothing new."""
+    """What it sees, as in `Seen`; None where there's nothing new."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -63,7 +63,7 @@ class NumberedJob(Record, frozen=True, omit_defaults=True, gc=False, tag_field="
 
 
 class MoveJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="move"):
-    """Go somewhere."""
+    """Go to a goal, or to the place of the list that has that name."""
 
     to: Goal | JobName
     """Where: a goal, or the name of a place of the list."""
@@ -95,10 +95,10 @@ class MessageJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="me
 
 
 class WaitJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="wait"):
-    """Wait."""
+    """Wait so many seconds; without a number until the key is pressed."""
 
     seconds: WaitTime | None = None
-    """For so long [s]; None until the key is pressed."""
+    """For so long [s]; None: until the key is pressed."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -107,7 +107,7 @@ class WaitJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="wait"
 
 
 class ArmJob(NumberedJob, frozen=True, omit_defaults=True, gc=False, tag="arm"):
-    """Let the arm carry out a VAL-II program."""
+    """Let the arm carry out a VAL-II program of that name: the `source`'s, or one that the arm's site has."""
 
     program: JobName
     """Its name."""
@@ -246,6 +246,7 @@ class JobProgress(Record, frozen=True, omit_defaults=True, gc=False):
     """How far a job is."""
 
     number: JobNumber
+    """Of the job."""
     stage: JobStage = JobStage.PLANNED
     reason: Reason = ""
     """Why it's paused or has failed."""

@@ -127,8 +127,11 @@ class TaskOrder(Leased, frozen=True, omit_defaults=True, gc=False, tag="task"):
 
     sender: ClassVar[Party] = Party.HOLDER
     number: Number
+    """The client's own; the answer has it, too."""
     task: RobotTask
+    """What."""
     epoch: Epoch | None = None
+    """Of the control lease."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -141,16 +144,20 @@ class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
 
     sender: ClassVar[Party] = Party.SERVER
     doing: Doing = Doing.NOTHING
+    """What that is."""
     journey: JourneyState = JourneyState.IDLE
     reason: Text = ""
     """Why it waits or couldn't get there."""
     goal: Goal | None = None
+    """Where to."""
     route: Points = ()
-    """The way that's being driven [m]."""
+    """The way there [m]."""
     left: Distance = NONE_LEFT
-    """Of that way [m]."""
+    """How much of it is left [m]."""
     jobs: JobList = msgspec.field(default_factory=JobList)
+    """The list."""
     progress: Progress = msgspec.field(default_factory=Progress)
+    """How far that is."""
     forecast: Forecast | None = None
     """What the dry run said of this list; None where there was none since it was changed."""
     loss: OperatorLoss | None = None

@@ -135,7 +135,7 @@ class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):
     number: Number
     """Orders are carried out in the order of their numbers; a stop doesn't wait."""
     command: Command | None = None
-    """None takes back the newest accepted command."""
+    """None: take back the newest accepted command."""
     epoch: Epoch | None = None
     """Of the control lease; None where none is needed, as on an engine in this process."""
 
@@ -196,12 +196,13 @@ class Outcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
 
     sender: ClassVar[Party] = Party.SERVER
     number: Number
+    """Of the order."""
     made_at: Time
     """The engine's time [s]."""
     receipt: Receipt | None = None
-    """None where there was nothing to take back, the command gives no receipt, or it was refused."""
+    """None where it was refused, there was nothing to take back, or the command gives no receipt."""
     refusal: Text = ""
-    """Why the command couldn't be taken at all; empty where it could."""
+    """Why it wasn't taken at all, `no lease: …` where the epoch isn't in force, or why nothing is taken back."""
     revision: Count = 0
     """Counts up with each change of the receipt, from 0."""
     code: RefusalCode = RefusalCode.OTHER
@@ -219,13 +220,18 @@ class Answer(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="
 
     sender: ClassVar[Party] = Party.SERVER
     number: Count
+    """Of the `Ask`."""
     t: Time
+    """Time that the frame shows [s]."""
     made_at: Time
+    """The engine's time when it was made [s]."""
     q: Array
+    """Joints [rad]."""
     status: FrameStatus
     now: Time
     """The engine's time when this was sent [s]."""
     falsified_by: CommandId | None = None
+    """Id of the first command that changed what happens at `t`; None where none did, or nobody knows which."""
 
     @classmethod
     def showing(cls, frame: Frame, now: float) -> Answer:
@@ -261,14 +267,23 @@ class Broadcast(Message, frozen=True, omit_defaults=True, gc=False, eq=False, ta
 
     sender: ClassVar[Party] = Party.SERVER
     number: Count
+    """Counts the broadcaster's frames."""
     t: Time
+    """Time that the frame shows [s]."""
     made_at: Time
+    """The engine's time when it was made [s]."""
     q: Array
+    """Joints [rad]."""
     since: Count
+    """Number of the first frame of which anything is known; what became of older ones isn't."""
     through: Count
+    """Frames from `since` to this one are confirmed, but for those in `falsified`; later ones are predicted."""
     status: FrameStatus = FrameStatus.PREDICTED
+    """How far it could be trusted when it was made."""
     falsified_by: CommandId | None = None
+    """Id of the first command that changed what happens at `t`; None where none did, or nobody knows which."""
     falsified: Annotated[tuple[Range, ...], Meta(max_length=256)] = ()
+    """[first, last, command]: numbers of frames that were falsified, and the command that did it, or null."""
 
     @classmethod
     def showing(cls, frame: Frame, verdicts: Verdicts) -> Broadcast:
@@ -292,11 +307,11 @@ class Compact(Message, frozen=True, omit_defaults=True, gc=False, tag="compact")
 
     sender: ClassVar[Party] = Party.SERVER
     q: Annotated[bytes, Meta(min_length=2, max_length=32768)]
-    """1 to 16 frames; see `interfaces.messages.compact`. In JSON base64."""
+    """1 to 16 frames that follow each other: *bin* in msgpack, in JSON base64 with padding (RFC 4648)."""
     since: Count | None = None
-    """Of older frames than this nothing is known; absent: as before, of a key frame 1."""
+    """As in `Broadcast`; absent: what was told last, with a key frame 1."""
     falsified: Annotated[tuple[Range, ...], Meta(max_length=256)] = ()
-    """Frames that were falsified since the message before; with a key frame, all that are known."""
+    """As in `Broadcast`: what is new since the message before; with a key frame all that are known."""
 
 
 class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="scene"):
@@ -328,6 +343,7 @@ class History(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=
 
     sender: ClassVar[Party] = Party.SERVER
     edit: Count
+    """Of that scene."""
     index: Count
     """Index of the first segment."""
     dof: Dof = 0
@@ -335,34 +351,34 @@ class History(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=
     start: Time = 0.0
     """Start of the first segment [s]."""
     segments: Segments = ()
+    """In their order; see above."""
 
 
 class Change(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change"):
-    """An edit of the timeline, as the segments that it put in.
-
-    The first `first` segments stay, then come `segments`, then those of the base from `tail` on, beginning at
-    `tail_start`.
-    """
+    """An edit: the first segments of its base stay, `segments` come next, then those of the base from `tail` on."""
 
     absent: ClassVar[Mapping[str, str]] = {"base": "edit - 1", "tail_start": "end"}
     sender: ClassVar[Party] = Party.SERVER
     edit: Number
     """Its number."""
     first: Count
+    """So many segments of the base stay as they are."""
     end: Time
-    """End of the new timeline [s], for a check."""
+    """End of the new timeline [s], for a check, to 10⁻⁹."""
     command_id: CommandId | None = None
     """The command that made it, where that's known."""
     base: Before = None  # type: ignore[assignment]
-    """Number of the edit that it builds on; the one before unless given."""
+    """Number of the edit that it builds on."""
     tail: Count | None = None
+    """Index, in the base, of the first segment that comes after the new ones; None: none does."""
     tail_start: When = None  # type: ignore[assignment]
-    """[s]; the end unless given."""
+    """When that one starts now [s]; it and all after it are shifted alike, to rounding (10⁻¹² s)."""
     dof: Dof = 0
     """Joints of the segments."""
     start: Time = 0.0
     """Start of the first segment [s]."""
     segments: Segments = ()
+    """These come after the first ones."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -382,16 +398,16 @@ class Change(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=F
 
 
 class Pulse(Message, frozen=True, omit_defaults=True, gc=False, tag="pulse"):
-    """Up to `past`, the timeline with this edit is what happened."""
+    """Every 0.1 s: up to `past`, the timeline with this edit is what happened."""
 
     absent: ClassVar[Mapping[str, str]] = {"past": "now"}
     sender: ClassVar[Party] = Party.SERVER
     edit: Count
+    """The newest."""
     now: Time
     """The engine's time [s]."""
     past: Past = msgspec.UNSET  # type: ignore[assignment]
-    """What lies before doesn't change any more [s]: now unless given; −∞ for an offline engine, which crosses as
-    null."""
+    """What lies before doesn't change any more [s]; null: −∞, of an offline engine."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.past, float):

@@ -38,9 +38,13 @@ class SegmentRow(msgspec.Struct, frozen=True, array_like=True, gc=False):
     """A segment as it crosses: an array of three or four."""
 
     duration: Seconds
+    """[s]."""
     command_id: CommandId | None
+    """Of the command that made it; None for a hold."""
     coefficients: Packed | Plain
+    """By ascending power, of each joint."""
     start: Time | None = None
+    """[s]; None where it's the end of the one before, or the message's."""
 
 
 Dof = Annotated[int, Meta(ge=0, le=MOST_JOINTS)]

@@ -66,7 +66,7 @@ class LogEntry(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     command_id: Count
     """Id that the operator's engine gave it."""
     command: Command | None = None
-    """What was commanded, poses and times resolved as they were accepted; None takes back the newest."""
+    """What was commanded, poses and times resolved as they were accepted; None: take back the newest."""
 
 
 class Orders(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="orders"):
@@ -90,7 +90,7 @@ class Orders(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="o
     entries: Annotated[tuple[LogEntry, ...], Meta(max_length=MOST_ENTRIES)] = ()
     """New ones, and older ones that may have been lost."""
     wanted: Annotated[Ranges, Meta(max_length=RANGES)] = ()
-    """Samples that are missing; see `interfaces.teleop.samples`."""
+    """[first, last]: numbers of samples that are missing."""
     halted: Text = ""
     """Why the operator's site commands no more until somebody resumes: the robot is to stop and wait for that."""
 
@@ -135,19 +135,19 @@ class Report(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="r
     q_at: Time
     """Time on the robot's timeline that it played then [s]."""
     echo: tuple[Number, Stamp, Stamp] | None = None
-    """The newest Orders heard: its number, its sent_at, and when it arrived by the robot's clock [s]."""
+    """The newest `Orders` heard: its number, its `sent_at`, and when it arrived by the robot's clock [s]."""
     halted: Text = ""
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
     receipts: Annotated[tuple[tuple[Number, Receipt], ...], Meta(max_length=MOST_ENTRIES)] = ()
-    """Receipts by entry number, of entries not known to have been reported."""
+    """[number, receipt] of entries that aren't known to have been reported."""
     plan: PlanPart | None = None
     """Where the robot's plan may be another than the operator thinks."""
     reference: Array | None = None
-    """What the robot's own timeline asked for at `measured_at` [rad], (n,); None where it doesn't say."""
+    """What the robot's own timeline asked for at `q_at` [rad], (n,); None where it doesn't say."""
     uncertainty: Uncertainty | None = None
     """Bound on the error of what it takes for the operator's clock [s]; None where that isn't known."""
     samples: Annotated[tuple[Sample, ...], Meta(max_length=NEW + AGAIN)] = ()
-    """Where it was measured since the report before, and earlier samples that are missing at the operator's."""
+    """Where it was measured since the report before, 128 at most, and up to 32 earlier ones that were `wanted`."""
     oldest: Count = 0
     """Number of the oldest sample that it keeps; 0 where it keeps none."""
 

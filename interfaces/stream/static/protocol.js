@@ -55,24 +55,24 @@ function map(x, where) {
  * A target pose of the last link in the base frame.
  * @typedef {object} PoseTarget
  * @property {"pose"} type
- * @property {Array<Array<number>>} X 4 × 4 × real from −10⁶ to 10⁶. Homogeneous transform, (4, 4), with a proper rotation.
- * @property {string|null} [configuration] text of up to 200 characters (absent). Asked-for arm configuration, as `LEFTY BELOW FLIP` or a part of it; None keeps the arm's own.
+ * @property {Array<Array<number>>} X 4 × 4 × real from −10⁶ to 10⁶. Homogeneous transform, (4, 4), by rows, with a proper rotation.
+ * @property {string|null} [configuration] text of up to 200 characters (absent). Asked-for arm configuration, as `LEFTY BELOW FLIP` or a part of it; None: the arm's own.
  */
 /**
  * Move to a target: (p, t, v) of eq. (1), Doulgeri, Zikos, Delopoulos.
  * @typedef {object} MotionCommand
  * @property {"move"} type
- * @property {JointTarget|PoseTarget} target `joints` or `pose`.
- * @property {number|null} [issued_at] real (absent). Issue time t_iss [s]; None is stamped by whoever registers the command. An engine in real-time mode stamps its present time; a command for an earlier t_exec then is rejected, so one that was issued in time and comes late must carry its own stamp to be postponed.
- * @property {number|null} [execute_at] real (absent). Execution time t_exec [s]; None means as soon as possible: now, or the end of the plan when offline.
+ * @property {JointTarget|PoseTarget} target `joints` or `pose`. Where to.
+ * @property {number|null} [issued_at] real (absent). Issue time t_iss [s]; None: whoever registers the command stamps it. An engine in real-time mode stamps its present time; a command for an earlier t_exec then is rejected, so one that was issued in time and comes late must carry its own stamp to be postponed.
+ * @property {number|null} [execute_at] real (absent). Execution time t_exec [s]; None: as soon as possible, which is now, or the end of the plan when offline.
  * @property {number} [speed] real from 0.001 to 1 (1). Share v of the nominal speeds, in (0, 1]. The paper's v = 0 would never arrive, so it is refused.
  * @property {"joint"|"line"} [motion] `joint`, `line` (`joint`).
  * @property {"parabolic"|"jerk-limited"} [profile] `parabolic`, `jerk-limited` (`parabolic`).
  * @property {"splice"|"replace"|"append"} [insertion] `splice`, `replace`, `append` (`splice`).
- * @property {number|"inf"} [deviation] real from 0 to 10⁶ or `inf` (0). How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops. Infinity is a continuous path: the move begins where the one before it begins to brake, or so late that it's at its speed when that one ends. Such moves take half of the acceleration, so that any two can overlap.
+ * @property {number|"inf"} [deviation] real from 0 to 10⁶ or `inf` (0). How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops. Infinity, written as `inf`, is a continuous path: the move begins where the one before it begins to brake, or so late that it's at its speed when that one ends. Such moves take half of the acceleration, so that any two can overlap.
  * @property {number} [pace] real from 0.001 to 1 (1). Planned as at 1, a move takes 1/pace times as long on the same path, roundings included; in [0.001, 1].
  * @property {number} [acceleration] real from 0.01 to 1 (1). Share of the limits of acceleration and jerk that the move takes, in [0.01, 1].
- * @property {Array<Array<number>>|null} [tool] 4 × 4 × real from −10⁶ to 10⁶ (absent). What goes straight and keeps the deviation: a frame in the last link's, (4, 4). Targets stay that link's.
+ * @property {Array<Array<number>>|null} [tool] 4 × 4 × real from −10⁶ to 10⁶ (absent). What goes straight and keeps the deviation: a frame in the last link's, (4, 4), by rows; None: that link. Targets stay the last link's.
  */
 /**
  * Move as a hand on a joystick asks: joint rates, or a twist of the tool; it ends by itself.
@@ -82,7 +82,7 @@ function map(x, where) {
  * @property {Array<number>|null} [twist] 6 × real (absent). Twist of the tool, (6,): linear [m/s], then angular [rad/s]; instead of rates.
  * @property {"base"|"tool"} [frame] `base`, `tool` (`base`). Frame of the twist.
  * @property {number|null} [issued_at] real (absent). Issue time t_iss [s]; an input older than 0.2 s moves nothing.
- * @property {number|null} [execute_at] real (absent). Execution time t_exec [s]; None means as soon as possible.
+ * @property {number|null} [execute_at] real (absent). Execution time t_exec [s]; None: as soon as possible.
  */
 /**
  * Drive a mobile robot on an arc at constant speeds.
@@ -91,8 +91,8 @@ function map(x, where) {
  * @property {number} v real. Linear speed [m/s], forward positive.
  * @property {number} w real. Angular speed [rad/s], to the left positive.
  * @property {number} duration real > 0. [s], positive.
- * @property {number|null} [issued_at] real (absent). Issue time t_iss [s]; None is stamped by whoever registers the command.
- * @property {number|null} [execute_at] real (absent). Execution time t_exec [s]; None means as soon as possible.
+ * @property {number|null} [issued_at] real (absent). Issue time t_iss [s]; None: whoever registers the command stamps it.
+ * @property {number|null} [execute_at] real (absent). Execution time t_exec [s]; None: as soon as possible.
  */
 /**
  * Let a scheduled move begin at another time.
@@ -108,7 +108,7 @@ function map(x, where) {
  * @property {"cancel"} type
  * @property {number} command_id number.
  * @property {number|null} [issued_at] real (absent).
- * @property {number|null} [execute_at] real (absent). When [s]; None means as soon as possible.
+ * @property {number|null} [execute_at] real (absent). When [s]; None: as soon as possible.
  */
 /**
  * Let a scheduled move, or what is left of one under way, go by another place.
@@ -118,7 +118,7 @@ function map(x, where) {
  * @property {JointTarget|PoseTarget} target `joints` or `pose`.
  * @property {number} [deviation] real from 0 to 10⁶ (0). How far the tool may stay away from the via [m], so as not to stop there; 0 stops.
  * @property {number|null} [issued_at] real (absent).
- * @property {number|null} [execute_at] real (absent). When a move under way turns to the via [s]; None means as soon as possible.
+ * @property {number|null} [execute_at] real (absent). When a move under way turns to the via [s]; None: as soon as possible.
  */
 /**
  * Run what is scheduled `factor` times as fast: the path stays, holds are scaled too.
@@ -126,14 +126,14 @@ function map(x, where) {
  * @property {"scale"} type
  * @property {number} factor real from 0.001 to 1000. Ratio of the new pace to the present one, 0.001 to 1000.
  * @property {number|null} [issued_at] real (absent).
- * @property {number|null} [execute_at] real (absent). When it begins [s]; None means as soon as possible (offline: the start of the timeline).
+ * @property {number|null} [execute_at] real (absent). When it begins [s]; None: as soon as possible (offline: the start of the timeline).
  */
 /**
  * Stop along the present motion as fast as the limits allow, and drop what is scheduled.
  * @typedef {object} Stop
  * @property {"stop"} type
  * @property {number|null} [issued_at] real (absent).
- * @property {number|null} [execute_at] real (absent). When [s]; None means as soon as possible. A late stop stops at once, whatever the lateness policy.
+ * @property {number|null} [execute_at] real (absent). When [s]; None: as soon as possible. A late stop stops at once, whatever the lateness policy.
  */
 /**
  * Holder: The robot goes on after it stopped by itself.
@@ -146,21 +146,21 @@ function map(x, where) {
  * Ask for the position at time t: g of eq. (4).
  * @typedef {object} PositionQuery
  * @property {"query"} type
- * @property {number|null} [t] real (absent). Timeline time [s]; None means now (offline: the end of the plan).
+ * @property {number|null} [t] real (absent). Timeline time [s]; None: now (offline: the end of the plan).
  */
 /**
- * Change an internal simulation parameter; `Engine.parameters` names them.
+ * Change a parameter of the simulation, at rest; `Engine.parameters` names them.
  * @typedef {object} ParameterChange
  * @property {"parameter"} type
  * @property {string} name text of up to 200 characters.
- * @property {boolean|number|string|Array<number>|null} [value] boolean or integer from -1000000000 to 1000000000 or real or text of up to 200 characters or joints (absent).
+ * @property {boolean|number|string|Array<number>|null} [value] boolean or integer from −10⁹ to 10⁹ or real or text of up to 200 characters or joints (absent).
  */
 /**
  * Holder: Carry out a command. It's sent again until its outcome comes, and carried out once.
  * @typedef {object} Order
  * @property {"order"} type
  * @property {number} number number. Orders are carried out in the order of their numbers; a stop doesn't wait.
- * @property {MotionCommand|SteerCommand|DriveCommand|Retime|Cancel|InsertVia|ScaleTime|Stop|Resume|PositionQuery|ParameterChange|null} [command] `move` or `steer` or `drive` or `retime` or `cancel` or `via` or `scale` or `stop` or `resume` or `query` or `parameter` (absent). None takes back the newest accepted command.
+ * @property {MotionCommand|SteerCommand|DriveCommand|Retime|Cancel|InsertVia|ScaleTime|Stop|Resume|PositionQuery|ParameterChange|null} [command] `move` or `steer` or `drive` or `retime` or `cancel` or `via` or `scale` or `stop` or `resume` or `query` or `parameter` (absent). None: take back the newest accepted command.
  * @property {string|null} [epoch] epoch (absent). Of the control lease; None where none is needed, as on an engine in this process.
  */
 /**
@@ -189,7 +189,7 @@ function map(x, where) {
 /**
  * What became of a command; it belongs to one version of the timeline.
  * @typedef {object} Receipt
- * @property {number} command_id count. Id of the command, from 1; rejected commands have one too.
+ * @property {number} command_id count. Names the command from now on, from 1; rejected commands have an id, too.
  * @property {"accepted"|"postponed"|"rejected"} status `accepted`, `postponed`, `rejected`.
  * @property {number|null} [issued_at] real (absent). Issue time [s]; None where none was given to an offline engine.
  * @property {number|null} [asked_at] real (absent). Execution time that was asked for [s]; None where none was.
@@ -201,18 +201,18 @@ function map(x, where) {
  * @property {number} [shift] real (0). Δ by which the commands in `shifted` were shifted [s].
  * @property {number|null} [superseded_by] count (absent). Id of the later command that cut this one short or dropped it, 0 for a correction; None while it stands.
  * @property {boolean} [undone] boolean (false). Whether it was taken back or cancelled.
- * @property {Array<number>} [shifted] any number × number (none). Ids for `shifted`, or what finds them: naming a long tail takes time that a command hasn't got.
- * @property {Array<number>} [superseded] any number × number (none). Ids for `superseded`, or what finds them.
+ * @property {Array<number>} [shifted] any number × number (none). Ids of commands whose moves now come at another time.
+ * @property {Array<number>} [superseded] any number × number (none). Ids of commands that won't arrive any more, wholly or in part.
  * @property {string} [hindrance] text (empty). Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it.
  */
 /**
  * Server: What became of an order; again when a later command changed that.
  * @typedef {object} Outcome
  * @property {"outcome"} type
- * @property {number} number number.
+ * @property {number} number number. Of the order.
  * @property {number} made_at real. The engine's time [s].
- * @property {Receipt|null} [receipt] map of `command_id`, `status`, `issued_at` (absent), `asked_at` (absent), `execute_at` (absent), `end` (absent), `q` (absent), `reason` (empty), `version` (0), `shift` (0), `superseded_by` (absent), `undone` (false), `shifted` (none), `superseded` (none), `hindrance` (empty) (absent). None where there was nothing to take back, the command gives no receipt, or it was refused.
- * @property {string} [refusal] text (empty). Why the command couldn't be taken at all; empty where it could.
+ * @property {Receipt|null} [receipt] map of `command_id`, `status`, `issued_at` (absent), `asked_at` (absent), `execute_at` (absent), `end` (absent), `q` (absent), `reason` (empty), `version` (0), `shift` (0), `superseded_by` (absent), `undone` (false), `shifted` (none), `superseded` (none), `hindrance` (empty) (absent). None where it was refused, there was nothing to take back, or the command gives no receipt.
+ * @property {string} [refusal] text (empty). Why it wasn't taken at all, `no lease: …` where the epoch isn't in force, or why nothing is taken back.
  * @property {number} [revision] count (0). Counts up with each change of the receipt, from 0.
  * @property {"other"|"overruled"|"not-following"} [code] `other`, `overruled`, `not-following`; any other word counts as `other` (`other`). Why it was refused or rejected, where clients decide by it.
  */
@@ -220,35 +220,35 @@ function map(x, where) {
  * Server: The frame that was asked for, with its status as it is now.
  * @typedef {object} Answer
  * @property {"answer"} type
- * @property {number} number count.
- * @property {number} t real.
- * @property {number} made_at real.
- * @property {Array<number>} q joints.
+ * @property {number} number count. Of the `Ask`.
+ * @property {number} t real. Time that the frame shows [s].
+ * @property {number} made_at real. The engine's time when it was made [s].
+ * @property {Array<number>} q joints. Joints [rad].
  * @property {"predicted"|"confirmed"|"falsified"} status `predicted`, `confirmed`, `falsified`.
  * @property {number} now real. The engine's time when this was sent [s].
- * @property {number|null} [falsified_by] integer (absent).
+ * @property {number|null} [falsified_by] integer (absent). Id of the first command that changed what happens at `t`; None where none did, or nobody knows which.
  */
 /**
  * Server: The newest frame of a broadcaster, and what became of earlier ones.
  * @typedef {object} Broadcast
  * @property {"broadcast"} type
- * @property {number} number count.
- * @property {number} t real.
- * @property {number} made_at real.
- * @property {Array<number>} q joints.
- * @property {number} since count.
- * @property {number} through count.
- * @property {"predicted"|"confirmed"|"falsified"} [status] `predicted`, `confirmed`, `falsified` (`predicted`).
- * @property {number|null} [falsified_by] integer (absent).
- * @property {Array<[number, number, number|null]>} [falsified] up to 256 × [count, count, integer or null] (none).
+ * @property {number} number count. Counts the broadcaster's frames.
+ * @property {number} t real. Time that the frame shows [s].
+ * @property {number} made_at real. The engine's time when it was made [s].
+ * @property {Array<number>} q joints. Joints [rad].
+ * @property {number} since count. Number of the first frame of which anything is known; what became of older ones isn't.
+ * @property {number} through count. Frames from `since` to this one are confirmed, but for those in `falsified`; later ones are predicted.
+ * @property {"predicted"|"confirmed"|"falsified"} [status] `predicted`, `confirmed`, `falsified` (`predicted`). How far it could be trusted when it was made.
+ * @property {number|null} [falsified_by] integer (absent). Id of the first command that changed what happens at `t`; None where none did, or nobody knows which.
+ * @property {Array<[number, number, number|null]>} [falsified] up to 256 × [count, count, integer or null] (none). [first, last, command]: numbers of frames that were falsified, and the command that did it, or null.
  */
 /**
  * Server: The newest frames of a broadcaster in compact form, and what became of earlier ones.
  * @typedef {object} Compact
  * @property {"compact"} type
- * @property {string} q epoch. 1 to 16 frames; see `interfaces.messages.compact`. In JSON base64.
- * @property {number|null} [since] count (absent). Of older frames than this nothing is known; absent: as before, of a key frame 1.
- * @property {Array<[number, number, number|null]>} [falsified] up to 256 × [count, count, integer or null] (none). Frames that were falsified since the message before; with a key frame, all that are known.
+ * @property {string} q bytes. 1 to 16 frames that follow each other: *bin* in msgpack, in JSON base64 with padding (RFC 4648).
+ * @property {number|null} [since] count (absent). As in `Broadcast`; absent: what was told last, with a key frame 1.
+ * @property {Array<[number, number, number|null]>} [falsified] up to 256 × [count, count, integer or null] (none). As in `Broadcast`: what is new since the message before; with a key frame all that are known.
  */
 /**
  * Server: What there is to see, for one who has just come.
@@ -269,34 +269,34 @@ function map(x, where) {
  * Server: A part of the timeline that a `Scene` named.
  * @typedef {object} History
  * @property {"history"} type
- * @property {number} edit count.
+ * @property {number} edit count. Of that scene.
  * @property {number} index count. Index of the first segment.
  * @property {number} [dof] integer from 0 to 64 (0). Joints of the segments.
  * @property {number} [start] real (0). Start of the first segment [s].
- * @property {Array<SegmentRow>} [segments] up to 256 × [`duration`, `command_id`, `coefficients`, `start`] (none).
+ * @property {Array<SegmentRow>} [segments] up to 256 × [`duration`, `command_id`, `coefficients`, `start`] (none). In their order; see above.
  */
 /**
- * Server: An edit of the timeline, as the segments that it put in. The first `first` segments stay, then come `segments`, then those of the base from `tail` on, beginning at `tail_start`.
+ * Server: An edit: the first segments of its base stay, `segments` come next, then those of the base from `tail` on.
  * @typedef {object} Change
  * @property {"change"} type
  * @property {number} edit number. Its number.
- * @property {number} first count.
- * @property {number} end real. End of the new timeline [s], for a check.
+ * @property {number} first count. So many segments of the base stay as they are.
+ * @property {number} end real. End of the new timeline [s], for a check, to 10⁻⁹.
  * @property {number|null} [command_id] integer (absent). The command that made it, where that's known.
- * @property {number|null} [base] count (`edit` − 1). Number of the edit that it builds on; the one before unless given.
- * @property {number|null} [tail] count (absent).
- * @property {number|null} [tail_start] real (`end`). [s]; the end unless given.
+ * @property {number|null} [base] count (`edit` − 1). Number of the edit that it builds on.
+ * @property {number|null} [tail] count (absent). Index, in the base, of the first segment that comes after the new ones; None: none does.
+ * @property {number|null} [tail_start] real (`end`). When that one starts now [s]; it and all after it are shifted alike, to rounding (10⁻¹² s).
  * @property {number} [dof] integer from 0 to 64 (0). Joints of the segments.
  * @property {number} [start] real (0). Start of the first segment [s].
- * @property {Array<SegmentRow>} [segments] up to 256 × [`duration`, `command_id`, `coefficients`, `start`] (none).
+ * @property {Array<SegmentRow>} [segments] up to 256 × [`duration`, `command_id`, `coefficients`, `start`] (none). These come after the first ones.
  */
 /**
- * Server: Up to `past`, the timeline with this edit is what happened.
+ * Server: Every 0.1 s: up to `past`, the timeline with this edit is what happened.
  * @typedef {object} Pulse
  * @property {"pulse"} type
- * @property {number} edit count.
+ * @property {number} edit count. The newest.
  * @property {number} now real. The engine's time [s].
- * @property {number|null} [past] real (`now`). What lies before doesn't change any more [s]: now unless given; −∞ for an offline engine, which crosses as null.
+ * @property {number|null} [past] real or null (`now`). What lies before doesn't change any more [s]; null: −∞, of an offline engine.
  */
 /**
  * Client: Who it is; its first message.
@@ -540,7 +540,7 @@ function map(x, where) {
  * @property {number|null} [heading] real from −1000 to 1000 (absent). In which it's to end [rad]; None for any.
  */
 /**
- * Go somewhere.
+ * Go to a goal, or to the place of the list that has that name.
  * @typedef {object} MoveJob
  * @property {"move"} do
  * @property {number} number integer from 1 to 2147483647. By which it's known; it stays the same where the job is put elsewhere.
@@ -561,14 +561,14 @@ function map(x, where) {
  * @property {string} text text of 1 to 400 characters.
  */
 /**
- * Wait.
+ * Wait so many seconds; without a number until the key is pressed.
  * @typedef {object} WaitJob
  * @property {"wait"} do
  * @property {number} number integer from 1 to 2147483647. By which it's known; it stays the same where the job is put elsewhere.
- * @property {number|null} [seconds] real from 0 to 86400 (absent). For so long [s]; None until the key is pressed.
+ * @property {number|null} [seconds] real from 0 to 86400 (absent). For so long [s]; None: until the key is pressed.
  */
 /**
- * Let the arm carry out a VAL-II program.
+ * Let the arm carry out a VAL-II program of that name: the `source`'s, or one that the arm's site has.
  * @typedef {object} ArmJob
  * @property {"arm"} do
  * @property {number} number integer from 1 to 2147483647. By which it's known; it stays the same where the job is put elsewhere.
@@ -584,7 +584,7 @@ function map(x, where) {
 /**
  * How far a job is.
  * @typedef {object} JobProgress
- * @property {number} number integer from 1 to 2147483647.
+ * @property {number} number integer from 1 to 2147483647. Of the job.
  * @property {"planned"|"running"|"paused"|"done"|"failed"|"aborted"} [stage] `planned`, `running`, `paused`, `done`, `failed`, `aborted` (`planned`).
  * @property {string} [reason] text of up to 500 characters (empty). Why it's paused or has failed.
  * @property {number|null} [left] real from 0 to 86400 (absent). Of a WAIT that's paused, what is left of it [s].
@@ -600,18 +600,18 @@ function map(x, where) {
  * What a robot, or a list of jobs, is asked to do: `go`, `do`, `jobs` or `halt`.
  * @typedef {object} RobotTask
  * @property {Goal|null} [go] map of `x`, `y`, `heading` (absent) (absent). Drive there; a list of jobs that is being done is paused.
- * @property {"run"|"pause"|"resume"|"abort"|"key"|"dry-run"|null} [do] `run`, `pause`, `resume`, `abort`, `key`, `dry-run` (absent). Something with the list that's there.
+ * @property {"run"|"pause"|"resume"|"abort"|"key"|"dry-run"|null} [do] `run`, `pause`, `resume`, `abort`, `key`, `dry-run` (absent).
  * @property {JobList|null} [jobs] map of `jobs` (none), `places` (none) (absent). Take this list in place of the one before; not while that is being done.
- * @property {Progress|null} [progress] map of `stage` (`planned`), `jobs` (none), `reason` (empty) (absent). How far that list is already; None keeps what's known of jobs with the same number that are unchanged.
- * @property {string|null} [halt] text (absent). Stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused.
+ * @property {Progress|null} [progress] map of `stage` (`planned`), `jobs` (none), `reason` (empty) (absent). How far that list is already; None: as far as is known of jobs with the same number that are unchanged.
+ * @property {string|null} [halt] text (absent). Between sites: stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused.
  */
 /**
  * Holder: Let the robot do something by itself. The answer is a `Tasks` or a `Problem`.
  * @typedef {object} TaskOrder
  * @property {"task"} type
- * @property {number} number number.
- * @property {RobotTask} task map of `go` (absent), `do` (absent), `jobs` (absent), `progress` (absent), `halt` (absent).
- * @property {string|null} [epoch] epoch (absent).
+ * @property {number} number number. The client's own; the answer has it, too.
+ * @property {RobotTask} task map of `go` (absent), `do` (absent), `jobs` (absent), `progress` (absent), `halt` (absent). What.
+ * @property {string|null} [epoch] epoch (absent). Of the control lease.
  */
 /**
  * What is likely to become of a job.
@@ -626,14 +626,14 @@ function map(x, where) {
  * Server: What the robot does by itself, and the list of jobs; the newest one counts.
  * @typedef {object} Tasks
  * @property {"tasks"} type
- * @property {"nothing"|"goal"|"jobs"} [doing] `nothing`, `goal`, `jobs` (`nothing`).
+ * @property {"nothing"|"goal"|"jobs"} [doing] `nothing`, `goal`, `jobs` (`nothing`). What that is.
  * @property {"idle"|"driving"|"waiting"|"arrived"|"failed"|"ended"} [journey] `idle`, `driving`, `waiting`, `arrived`, `failed`, `ended` (`idle`).
  * @property {string} [reason] text (empty). Why it waits or couldn't get there.
- * @property {Goal|null} [goal] map of `x`, `y`, `heading` (absent) (absent).
- * @property {Array<[number, number]>} [route] up to 720 × [real, real] (none). The way that's being driven [m].
- * @property {number} [left] real ≥ 0 (0). Of that way [m].
- * @property {JobList} [jobs] map of `jobs` (none), `places` (none) (none).
- * @property {Progress} [progress] map of `stage` (`planned`), `jobs` (none), `reason` (empty) (none).
+ * @property {Goal|null} [goal] map of `x`, `y`, `heading` (absent) (absent). Where to.
+ * @property {Array<[number, number]>} [route] up to 720 × [real, real] (none). The way there [m].
+ * @property {number} [left] real ≥ 0 (0). How much of it is left [m].
+ * @property {JobList} [jobs] map of `jobs` (none), `places` (none) (none). The list.
+ * @property {Progress} [progress] map of `stage` (`planned`), `jobs` (none), `reason` (empty) (none). How far that is.
  * @property {Array<JobForecast>|null} [forecast] up to 64 × map of `number`, `begins`, `lasts` (absent), `route` (none), `problem` (empty) (absent). What the dry run said of this list; None where there was none since it was changed.
  * @property {"stop"|"carry-on"|null} [loss] `stop`, `carry-on` (absent). What follows when the operator is lost; None before the robot is met.
  * @property {string} [shows] text (empty). What stands on its screen.
