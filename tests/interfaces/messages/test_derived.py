@@ -93,6 +93,14 @@ def test_what_is_stale_is_named_with_the_command_that_mends_it(
     assert "run `make generate`" in told
 
 
+def test_the_document_has_a_table_of_every_message_made_of_its_definition() -> None:
+    document = generate.DOCUMENTS[0].read_text(encoding="utf-8")
+    rows = [line for table in generate.MARKED.finditer(document) for line in table[0].splitlines()]
+    assert [tag for tag in TYPES if not any(row.startswith(f"| `{tag}` |") for row in rows)] == []
+    fields = [field.name for kind in KINDS for field in described(kind).fields]
+    assert [name for name in fields if not any(f"`{name}`" in row for row in rows)] == []
+
+
 def test_pages_take_a_word_of_a_newer_server_for_the_one_that_stands_for_it(script: Script) -> None:
     for sent, taken in (("overruled", "overruled"), ("overcame", "other")):
         frame = json.dumps({"type": "outcome", "number": 1, "made_at": 2.5, "refusal": "no", "code": sent})
