@@ -5,10 +5,11 @@ Source: Doulgeri, Zikos, Delopoulos, section III.
 
 from __future__ import annotations
 
-import contextlib
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+
+import msgspec
 
 from interfaces.engine_server.broadcast import DUE, MOST_VIEWERS, Broadcaster, CompactSlot, FrameSlot
 from interfaces.engine_server.forecasts import Forecasts
@@ -157,9 +158,10 @@ class Servlet:
             return Outcome(order.number, now, None, why)
         known = engine.refusal(receipt.command_id) if receipt.status is Status.REJECTED else None
         code = known if isinstance(known, RefusalCode) else RefusalCode.OTHER
-        # It's done, whether the other commands that it names are found now or when it's written.
-        with contextlib.suppress(Exception):
+        try:
             receipt = portable(receipt, MOST_NAMES)
+        except Exception:  # noqa: BLE001 - the command is carried out, whatever keeps the others from being named
+            receipt = msgspec.structs.replace(receipt, shifted_names=(), superseded_names=())
         return Outcome(order.number, now, receipt, code=code)
 
     def _answer(self, ask: Ask, now: float) -> None:

@@ -17,6 +17,7 @@ from interfaces.messages.fields import (
     Coordinate,
     Count,
     Distance,
+    Echo,
     Epoch,
     Leased,
     Number,
@@ -26,6 +27,7 @@ from interfaces.messages.fields import (
     Stamp,
     Text,
     Time,
+    Uncertainty,
     Word,
 )
 from interfaces.messages.jobs import JobList, ListCommand, OperatorLoss, Progress
@@ -244,7 +246,7 @@ class DriveReport(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     """Where it takes itself to be."""
     drive: Drive
     """What its motors are told."""
-    echo: tuple[Number, Stamp, Stamp] | None = None
+    echo: Echo | None = None
     """The newest orders heard: their number, their `sent_at`, and when they arrived by the robot's clock [s]."""
     halted: Text = ""
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""
@@ -259,7 +261,7 @@ class DriveReport(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     architecture has none."""
     starved: bool = False
     """Whether it's slower than it should be, as nothing newer is known."""
-    uncertainty: Annotated[float, Meta(ge=0, le=1e12)] | None = None
+    uncertainty: Uncertainty | None = None
     """Bound on the error of what it takes for the operator's clock [s]; None where that isn't known."""
     world: Time | None = None
     """Time of a simulated room when it was measured [s]: where people walk then; None of a real one."""

@@ -39,6 +39,10 @@ Seconds = Annotated[float, Meta(gt=0, le=1e9)]
 """A duration."""
 Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
 """Seconds by a clock with an origin of its own."""
+Echo = tuple[Number, Stamp, Stamp]
+"""Of a message that was heard: its number, when it was sent by its sender's clock and arrived by one's own [s]."""
+Uncertainty = Annotated[float, Meta(ge=0, le=1e12)]
+"""Bound on an error of a clock [s]."""
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Word = Annotated[str, Meta(max_length=200)]
 Rate = Annotated[float, Meta(gt=0, le=1e4)]

@@ -19,7 +19,6 @@ from typing_extensions import override
 
 from interfaces.messages.commands import check_command
 from interfaces.messages.fields import (
-    MOST_NAMES,
     CommandId,
     Count,
     Epoch,
@@ -207,12 +206,6 @@ class Outcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
     """Counts up with each change of the receipt, from 0."""
     code: RefusalCode = RefusalCode.OTHER
     """Why it was refused or rejected, where clients decide by it."""
-
-    @override
-    def as_written(self, _packed: bool) -> Outcome:
-        if self.receipt is None or (named := self.receipt.named(MOST_NAMES)) is self.receipt:
-            return self
-        return msgspec.structs.replace(self, receipt=named)
 
 
 class Answer(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="answer"):

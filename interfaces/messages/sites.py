@@ -11,6 +11,7 @@ from typing_extensions import override
 from interfaces.messages.fields import (
     MOST_NAMES,
     Count,
+    Echo,
     Epoch,
     Leased,
     Number,
@@ -18,6 +19,7 @@ from interfaces.messages.fields import (
     Stamp,
     Text,
     Time,
+    Uncertainty,
     Value,
 )
 from interfaces.messages.segments import Dof, Planned, Segmented
@@ -38,7 +40,6 @@ MOST_ENTRIES = 4096
 
 Ranges = tuple[tuple[Number, Number], ...]
 """First and last number of each range."""
-Uncertainty = Annotated[float, Meta(ge=0, le=1e12)]
 
 
 class Sample(msgspec.Struct, frozen=True, array_like=True, gc=False, eq=False):
@@ -134,7 +135,7 @@ class Report(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="r
     """When they were measured, by the robot's clock [s]."""
     q_at: Time
     """Time on the robot's timeline that it played then [s]."""
-    echo: tuple[Number, Stamp, Stamp] | None = None
+    echo: Echo | None = None
     """The newest `Orders` heard: its number, its `sent_at`, and when it arrived by the robot's clock [s]."""
     halted: Text = ""
     """Why it stopped by itself and waits for a new epoch; empty while it doesn't."""

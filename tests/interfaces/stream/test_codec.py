@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from interfaces import messages as m
 from interfaces.messages import control as c
+from interfaces.messages.commands import portable
 from interfaces.messages.control import ProblemCode, ProtocolError
 from interfaces.messages.drive_sites import DriveOrders, DriveReport, Errand, RobotTask
 from interfaces.messages.fields import LONGEST_TEXT, MOST_NAMES, Epoch
@@ -86,7 +87,7 @@ def test_numpys_numbers_cross(encoding: Encoding) -> None:
 def test_a_receipt_names_no_more_than_may_cross() -> None:
     names = tuple(range(1, 3001))
     receipt = Receipt(1, Status.ACCEPTED, 0.0, None, shifted_names=names, superseded_names=lambda: names)
-    data = encode(m.Outcome(1, 0.0, receipt), Encoding.JSON)
+    data = encode(m.Outcome(1, 0.0, portable(receipt, MOST_NAMES)), Encoding.JSON)
     back = decode(data, Encoding.JSON, allowed=m.Outcome).receipt
     assert back.shifted == back.superseded == names[:MOST_NAMES]
 
