@@ -158,7 +158,8 @@ def plain(value: object) -> object:
     Raises:
         InvalidValueError: If it's anything else.
     """
-    if isinstance(value, (np.ndarray, np.generic)):
+    # Arrays are what comes most, and this is the quickest way to know them.
+    if type(value) is np.ndarray or isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if isinstance(value, Epoch):
         return str(value)
@@ -249,7 +250,9 @@ def writer(encode: Callable[[Any], bytes]) -> Callable[[Any], bytes]:
             data = encode(message)
         except UnicodeEncodeError:
             return encode(cut(message))
-        return data if len(data) <= LONGEST_TEXT else encode(cut(message))
+        if len(data) <= LONGEST_TEXT or (fitting := cut(message)) is message:
+            return data
+        return encode(fitting)
 
     return write
 

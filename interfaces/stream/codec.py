@@ -80,10 +80,11 @@ _PLAIN: dict[Encoding, Callable[[bytes], Any]] = {
     Encoding.MSGPACK: msgspec.msgpack.Decoder().decode,
     Encoding.JSON: msgspec.json.Decoder().decode,
 }
-_WRITERS: dict[Encoding, Callable[[Message], bytes]] = {
-    Encoding.MSGPACK: writer(msgspec.msgpack.Encoder(enc_hook=plain).encode),
-    Encoding.JSON: writer(msgspec.json.Encoder(enc_hook=plain).encode),
+_WRITERS: dict[Encoding, tuple[Callable[[Message], bytes], bool]] = {
+    Encoding.MSGPACK: (writer(msgspec.msgpack.Encoder(enc_hook=plain).encode), True),
+    Encoding.JSON: (writer(msgspec.json.Encoder(enc_hook=plain).encode), False),
 }
+"""What writes, and whether coefficients are bytes."""
 
 
 def encode(message: Value, encoding: Encoding) -> bytes:
@@ -94,7 +95,8 @@ def encode(message: Value, encoding: Encoding) -> bytes:
     """
     if type(message) not in KNOWN:
         raise InvalidValueError("message", message, f"one of {', '.join(kind.__name__ for kind in KINDS)}")
-    return _WRITERS[encoding](message.as_written(encoding is Encoding.MSGPACK))
+    write, packed = _WRITERS[encoding]
+    return write(message.as_written(packed))
 
 
 def decode(data: bytes, encoding: Encoding, *, allowed: Any, largest: int = LARGEST) -> Any:
