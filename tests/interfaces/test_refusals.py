@@ -7,11 +7,12 @@ import pytest
 from interfaces.clients.designer import Designer
 from interfaces.engine_server.servlet import Servlet
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode
+from interfaces.messages.fields import MOST_NAMES
 from interfaces.stream import Encoding, decode, encode
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from tests.interfaces.joined import MODEL, to
-from vrs import PositionQuery
+from vrs import Engine, Insertion, ManualClock, PositionQuery
 
 READY = MODEL.poses["nominal"]
 
@@ -47,6 +48,16 @@ def test_a_servlet_passes_on_why_an_order_is_not_admitted() -> None:
     servlet = Servlet(engine, admit=lambda _: Refusal("not now", RefusalCode.OVERRULED))
     refused = outcome(servlet, 1, to(1))
     assert (refused.refusal, refused.code, engine.newest) == ("not now", RefusalCode.OVERRULED, 0)
+
+
+def test_a_servlet_names_as_many_commands_as_may_cross() -> None:
+    engine = Engine(MODEL, q=READY, clock=ManualClock(0.0))
+    for k in range(MOST_NAMES + 10):
+        engine.execute(to(k % 2, insertion=Insertion.APPEND))
+    refused = outcome(Servlet(engine), 1, to(1, insertion=Insertion.REPLACE))
+    assert refused.receipt is not None
+    assert isinstance(refused.receipt.superseded_names, tuple)
+    assert len(refused.receipt.superseded_names) == MOST_NAMES
 
 
 @pytest.mark.parametrize("encoding", Encoding)
