@@ -152,14 +152,14 @@ class LinkPath:
         departure = self._enter(now, size, waits=waits)
         if departure is None:
             return PacketOutcome(now, (), LossReason.QUEUE)
-        delay = self._delays.draw(departure, size)
-        if self._losses.lost() or delay is None:
+        delay = self._delays(departure, size)
+        if self._losses() or delay is None:
             return PacketOutcome(departure, (), LossReason.ON_THE_WAY)
         if conditions.reorder > 0 and self._reorder.random() < conditions.reorder:
             delay += conditions.reorder_by
         arrival = departure + delay
         if conditions.duplicate > 0 and self._duplicate.random() < conditions.duplicate:
-            other = self._other_delays.draw(departure, size)
+            other = self._other_delays(departure, size)
             if other is not None:
                 return PacketOutcome(departure, (min(arrival, departure + other), max(arrival, departure + other)))
         return PacketOutcome(departure, (arrival,))

@@ -10,12 +10,12 @@ import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import cycle
 from pathlib import Path
 from statistics import NormalDist
-from typing import Annotated, Protocol
+from typing import Annotated, Protocol, TypeAlias
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.system import read_within
 from vrs.checks import number_in, validated, within
@@ -28,11 +28,11 @@ CORRELATION_TIME = 2.0
 """Time constant of a link's congestion, where none is given [s]."""
 
 
-class DelaySource(Protocol):
-    """Delays of successive packets; it holds the state of the link's congestion."""
+DelaySource: TypeAlias = Callable[[float, int], float | None]
+"""Gives the one-way delay [s], ≥ 0, of the next packet; None when it is lost.
 
-    def draw(self, now: float, size: int = 0) -> float | None:
-        """One-way delay [s], ≥ 0, of a packet of `size` bytes sent at now [s]; None when it is lost."""
+It's given when the packet is sent [s], and its size [byte], 0 where that isn't told; it holds the link's state.
+"""
 
 
 class DelayProfile(Protocol):
@@ -61,7 +61,7 @@ def share_of(share: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class ConstantDelay(DelaySource):
+class ConstantDelay:
     """Every packet takes equally long."""
 
     name: str
@@ -73,15 +73,10 @@ class ConstantDelay(DelaySource):
 
     def source(self, _rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays; nothing about them is random."""
-        return self
+        return lambda _now, _size: self.delay
 
     def quantile(self, _share: float) -> float:
         """The delay, for every share [s]."""
-        return self.delay
-
-    @override
-    def draw(self, now: float, size: int = 0) -> float | None:
-        """The delay, at every time and for every size [s]."""
         return self.delay
 
 
@@ -100,26 +95,26 @@ def correlation_time(value: float) -> float:
     return number_in("correlation time", value, SHORTEST, MAX_DELAY, "0, or seconds")
 
 
-class Congestion:
+def congestion(rng: np.random.Generator, tau: float) -> Callable[[float], float]:
     """A standard normal variable z(t) with the autocorrelation exp(−|Δt|/τ), sampled as time goes on.
 
     Args:
         rng: Source of the randomness; one standard normal a sample.
         tau: Correlation time τ [s]; 0 makes every sample independent, two at the same instant too.
+
+    Returns:
+        Gives the value at a time [s]; a time before the last one counts as that one.
     """
+    z, last = 0.0, -math.inf
 
-    def __init__(self, rng: np.random.Generator, tau: float) -> None:
-        self._rng, self._tau = rng, tau
-        self._z = 0.0
-        self._last: float | None = None
+    def at(now: float) -> float:
+        nonlocal z, last
+        rho = math.exp(-max(0.0, now - last) / tau) if tau > 0 else 0.0
+        z = rho * z + math.sqrt(1.0 - rho * rho) * float(rng.standard_normal())
+        last = max(now, last)
+        return z
 
-    def at(self, now: float) -> float:
-        """The value at now [s]; a time before the last one counts as that one."""
-        gap = math.inf if self._last is None else max(0.0, now - self._last)
-        rho = math.exp(-gap / self._tau) if self._tau > 0 else 0.0
-        self._z = rho * self._z + math.sqrt(1.0 - rho * rho) * float(self._rng.standard_normal())
-        self._last = now if self._last is None else max(now, self._last)
-        return self._z
+    return at
 
 
 LEAST_MEAN = 1e-6
@@ -158,7 +153,13 @@ class GammaDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays from the stationary distribution."""
-        return _GammaState(self, rng)
+        z_at = congestion(rng, self.correlation_time)
+
+        def draw(now: float, _size: int) -> float | None:
+            z = z_at(now) / math.sqrt(2.0)
+            return self.delay_at(0.5 * math.erfc(-z), 0.5 * math.erfc(z))
+
+        return draw
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of packets does not exceed [s]; share in (0, 1)."""
@@ -170,19 +171,6 @@ class GammaDelay:
 
         value = gammaincinv(self.shape, below) if below <= above else gammainccinv(self.shape, above)
         return min(self.low + float(value) * (self.mean - self.low) / self.shape, MAX_DELAY)
-
-
-class _GammaState(DelaySource):
-    """State of one link with gamma delays."""
-
-    def __init__(self, profile: GammaDelay, rng: np.random.Generator) -> None:
-        self._profile = profile
-        self._congestion = Congestion(rng, profile.correlation_time)
-
-    @override
-    def draw(self, now: float, size: int = 0) -> float | None:
-        z = self._congestion.at(now) / math.sqrt(2.0)
-        return self._profile.delay_at(0.5 * math.erfc(-z), 0.5 * math.erfc(z))
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,23 +207,12 @@ class HeavyTailedDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays from the stationary distribution."""
-        return _HeavyTailState(self, rng)
+        z_at = congestion(rng, self.correlation_time)
+        return lambda now, _size: self.delay(z_at(now))
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of packets does not exceed [s]; share in (0, 1)."""
         return self.delay(NormalDist().inv_cdf(share_of(share)))
-
-
-class _HeavyTailState(DelaySource):
-    """State of one heavy-tailed link."""
-
-    def __init__(self, profile: HeavyTailedDelay, rng: np.random.Generator) -> None:
-        self._profile = profile
-        self._congestion = Congestion(rng, profile.correlation_time)
-
-    @override
-    def draw(self, now: float, size: int = 0) -> float | None:
-        return self._profile.delay(self._congestion.at(now))
 
 
 MEASURED = {
@@ -352,7 +329,19 @@ class RouteDelay:
 
     def source(self, rng: np.random.Generator) -> DelaySource:
         """Start a sequence of delays from the stationary distribution."""
-        return _LoadState(self, rng)
+        base, per_bit = self.parts()
+        half_means = 0.5 * np.array([hop.load for hop in self.hops])
+        vectors, last, tau = np.zeros((2, len(self.hops))), -math.inf, self.correlation_time
+
+        def draw(now: float, size: int) -> float | None:
+            nonlocal vectors, last
+            rho = math.exp(-0.5 * max(0.0, now - last) / tau) if tau > 0 else 0.0
+            vectors = rho * vectors + math.sqrt(1.0 - rho * rho) * rng.standard_normal(vectors.shape)
+            last = max(now, last)
+            load = float(half_means @ (vectors**2).sum(axis=0))
+            return min(base + 8.0 * (size or self.message) * per_bit + load, MAX_DELAY)
+
+        return draw
 
     def quantile(self, share: float) -> float:
         """One-way delay that the given share of nominal messages does not exceed [s]; share in (0, 1)."""
@@ -380,28 +369,6 @@ def _sum_quantile(means: np.ndarray[tuple[int], np.dtype[np.float64]], share: fl
     return float(brentq(excess, 0.0, high, xtol=1e-12 * high, rtol=1e-12))
 
 
-class _LoadState(DelaySource):
-    """State of the load of one route."""
-
-    def __init__(self, profile: RouteDelay, rng: np.random.Generator) -> None:
-        self._profile, self._rng = profile, rng
-        self._base, self._per_bit = profile.parts()
-        self._half_means = 0.5 * np.array([hop.load for hop in profile.hops])
-        self._vectors = np.zeros((2, len(profile.hops)))
-        self._last: float | None = None
-
-    def draw(self, now: float, size: int = 0) -> float | None:
-        gap = math.inf if self._last is None else max(0.0, now - self._last)
-        tau = self._profile.correlation_time
-        rho = math.exp(-0.5 * gap / tau) if tau > 0 else 0.0
-        fresh = self._rng.standard_normal(self._vectors.shape)
-        self._vectors = rho * self._vectors + math.sqrt(1.0 - rho * rho) * fresh
-        self._last = now if self._last is None else max(now, self._last)
-        load = float(self._half_means @ (self._vectors**2).sum(axis=0))
-        fixed = self._base + 8.0 * (size or self._profile.message) * self._per_bit
-        return min(fixed + load, MAX_DELAY)
-
-
 COLUMN = "delay_s"
 MAX_BYTES = 64 * 1024 * 1024
 
@@ -423,25 +390,13 @@ class TraceDelay:
 
     def source(self, _rng: np.random.Generator) -> DelaySource:
         """Start at the first row."""
-        return _TracePosition(self.delays)
+        rows = cycle(self.delays)
+        return lambda _now, _size: next(rows)
 
     def quantile(self, share: float) -> float:
         """Smallest recorded delay that the share of arriving packets keeps within [s]; 0 if none arrives."""
         arriving = sorted(d for d in self.delays if d is not None)
         return arriving[max(0, math.ceil(share_of(share) * len(arriving)) - 1)] if arriving else 0.0
-
-
-class _TracePosition(DelaySource):
-    """Position in a trace."""
-
-    def __init__(self, delays: tuple[float | None, ...]) -> None:
-        self._delays, self._row = delays, 0
-
-    @override
-    def draw(self, now: float, size: int = 0) -> float | None:
-        delay = self._delays[self._row]
-        self._row = (self._row + 1) % len(self._delays)
-        return delay
 
 
 def read_trace(path: Path, *, longest: float) -> tuple[float | None, ...]:

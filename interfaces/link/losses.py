@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Protocol, TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
 from vrs.checks import number_in, validated, within
 from vrs.errors import InvalidValueError
 
-
-class LossSource(Protocol):
-    """The fate of successive packets; it holds the state of the link."""
-
-    def lost(self) -> bool:
-        """Whether the next packet is lost."""
+LossSource: TypeAlias = Callable[[], bool]
+"""Says whether the next packet is lost; it holds the state of the link."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +27,7 @@ class BernoulliLoss:
 
     def source(self, rng: np.random.Generator) -> LossSource:
         """Start a sequence of packets."""
-        return _Independent(self.share, rng)
+        return lambda: bool(rng.random() < self.share)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +75,15 @@ class GilbertElliottLoss:
 
     def source(self, rng: np.random.Generator) -> LossSource:
         """Start a sequence of packets in the stationary distribution of the states."""
-        return _TwoStates(self, rng)
+        bad = bool(rng.random() < self.enter / (self.enter + self.leave))
+
+        def lost() -> bool:
+            nonlocal bad
+            found = bool(rng.random() < (self.loss_bad if bad else self.loss_good))
+            bad ^= bool(rng.random() < (self.leave if bad else self.enter))
+            return found
+
+        return lost
 
 
 LossModel: TypeAlias = BernoulliLoss | GilbertElliottLoss
@@ -113,24 +118,3 @@ def spelled_loss(model: LossModel) -> str:
     if (model.loss_bad, model.loss_good) == (1.0, 0.0):
         return f"burst:{model.share:g},{1.0 / model.leave:g}"
     return f"bursts, {model.share:g} in the long run"
-
-
-class _Independent:
-    def __init__(self, share: float, rng: np.random.Generator) -> None:
-        self._share, self._rng = share, rng
-
-    def lost(self) -> bool:
-        return bool(self._rng.random() < self._share)
-
-
-class _TwoStates:
-    def __init__(self, model: GilbertElliottLoss, rng: np.random.Generator) -> None:
-        self._model, self._rng = model, rng
-        self._bad = bool(rng.random() < model.enter / (model.enter + model.leave))
-
-    def lost(self) -> bool:
-        model = self._model
-        lost = bool(self._rng.random() < (model.loss_bad if self._bad else model.loss_good))
-        changes = self._rng.random() < (model.leave if self._bad else model.enter)
-        self._bad = self._bad != bool(changes)
-        return lost

@@ -6,13 +6,12 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
 from interfaces.lab.output import REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
 from interfaces.link import Channel, Conditions, Service, delay_profile
-from interfaces.link.delays import DelaySource
+from interfaces.link.delays import TraceDelay
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from vrs.model import Array
 
@@ -29,38 +28,12 @@ PROFILE: Final = "country"
 """Of Fig. 3: the paper's long connection."""
 
 
-class OneLate:
-    """A delay profile for one command that is late, the others not."""
-
-    name = "one late"
-
-    def __init__(self, delay: float) -> None:
-        """Take how late it is [s]."""
-        self._delay = delay
-
-    def source(self, _rng: np.random.Generator) -> DelaySource:
-        """Begin with the late one."""
-        return _OneLate(self._delay)
-
-    def quantile(self, _share: float) -> float:
-        """Of all but the first."""
-        return 0.0
-
-
-class _OneLate(DelaySource):
-    def __init__(self, delay: float) -> None:
-        self._delay = delay
-
-    @override
-    def draw(self, now: float, size: int = 0) -> float | None:
-        delay, self._delay = self._delay, 0.0
-        return delay
-
-
 def commands_at_once(T_d: float) -> int:
     """How many commands an ordered link holds back behind one that takes T_d [s]."""
-    way: Channel[int] = Channel(Conditions(delay=OneLate(T_d), service=Service.IN_ORDER), np.random.default_rng(0))
-    for k in range(math.ceil(T_d / T) + 10):
+    commands = math.ceil(T_d / T) + 10
+    late = TraceDelay("one late", (T_d, *[0.0] * commands))
+    way: Channel[int] = Channel(Conditions(delay=late, service=Service.IN_ORDER), np.random.default_rng(0))
+    for k in range(commands):
         way.send(k, k * T)
     arrivals = [found.arrived for found in way.receive(T_d + 100.0)]
     # The late one itself isn't one of them.

@@ -129,7 +129,7 @@ def test_the_network_has_the_medians_that_were_fixed():
         assert MEDIANS[0] <= 2 * profile.quantile(0.5) <= MEDIANS[1]
         rng = np.random.default_rng(seed)
         there, back = profile.source(rng), profile.source(rng)
-        trips = [there.draw(2.0 * k) + back.draw(2.0 * k) for k in range(4000)]
+        trips = [there(2.0 * k, 0) + back(2.0 * k, 0) for k in range(4000)]
         # The sum of two skewed extras has a median above the sum of theirs.
         assert MEDIANS[0] <= np.median(trips) <= MEDIANS[1] + 0.01
         assert min(trips) > 2 * profile.quantile(0.5) - 0.02

@@ -67,7 +67,8 @@ def delays(rng):
         period, phase = rng.uniform(5, 50), rng.random()
         return lambda now: base + spread * (1 + math.sin(2 * math.pi * (now / period + phase))) * rng.random()
     name = str(rng.choice(["domain", "country", "mon", "tue", "wed", "thu", "fri"]))
-    return delay_profile(name).source(rng).draw
+    source = delay_profile(name).source(rng)
+    return lambda now: source(now, 0)
 
 
 def clock(rng, until, smallest):

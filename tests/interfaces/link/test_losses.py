@@ -15,7 +15,7 @@ PACKETS = 60_000
 
 def losses(model, count=PACKETS, seed=4):
     source = model.source(np.random.default_rng(seed))
-    return np.array([source.lost() for _ in range(count)])
+    return np.array([source() for _ in range(count)])
 
 
 def runs(lost):
@@ -57,7 +57,7 @@ def test_both_states_may_lose():
 
 def test_the_first_packet_meets_the_stationary_state():
     model = GilbertElliottLoss.bursts(0.4, 1000.0)
-    first = [model.source(np.random.default_rng(seed)).lost() for seed in range(2000)]
+    first = [model.source(np.random.default_rng(seed))() for seed in range(2000)]
     assert np.mean(first) == pytest.approx(0.4, abs=5 * math.sqrt(0.24 / 2000))
 
 

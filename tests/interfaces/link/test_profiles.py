@@ -24,8 +24,8 @@ ERRORS = 5.0
 
 def test_simple_profiles():
     rng = np.random.default_rng(0)
-    assert delay_profile("none").source(rng).draw(3.0) == 0
-    assert delay_profile("constant:0.25").source(rng).draw(3.0) == 0.25
+    assert delay_profile("none").source(rng)(3.0, 0) == 0
+    assert delay_profile("constant:0.25").source(rng)(3.0, 0) == 0.25
     assert delay_profile("lunar").quantile(0.95) == 1.28
 
 
@@ -82,7 +82,7 @@ def test_values_are_checked(make):
 
 def draws(profile, count, gap, seed=5):
     source = profile.source(np.random.default_rng(seed))
-    return np.array([source.draw(gap * i) for i in range(count)])
+    return np.array([source(gap * i, 0) for i in range(count)])
 
 
 @pytest.mark.parametrize(("mean", "sd", "low"), [(0.2, 0.05, 0.0), (0.5, 0.9, 0.1), (2.0, 2.0, 0.0)])
@@ -111,7 +111,7 @@ def test_a_route_adds_up_distance_nodes_and_message():
     hops = (Hop(200.0, 1e-3, 0.0, 1e7), Hop(100.0, 2e-3, 0.0, 56e3))
     route = RouteDelay("two", hops)
     expected = 300.0 / 299_792_458.0 + 3e-3 + 8 * 100 / 1e7 + 8 * 100 / 56e3
-    assert route.source(np.random.default_rng(0)).draw(0.0, 100) == pytest.approx(expected, rel=1e-12)
+    assert route.source(np.random.default_rng(0))(0.0, 100) == pytest.approx(expected, rel=1e-12)
     assert route.fixed() == route.fixed(64)
     assert route.quantile(0.3) == route.fixed()
     country = delay_profile("route:300e3,28,1e-3,0,10e6")
@@ -152,8 +152,8 @@ def test_an_empty_cell_or_line_is_a_lost_packet(tmp_path, text, delays):
     path = tmp_path / "trace@2.csv"
     path.write_bytes(text.encode())
     source = delay_profile(f"trace:{path}").source(np.random.default_rng(0))
-    assert tuple(source.draw(0.0) for _ in delays) == delays
-    assert source.draw(0.0) == delays[0]
+    assert tuple(source(0.0, 0) for _ in delays) == delays
+    assert source(0.0, 0) == delays[0]
 
 
 @pytest.mark.parametrize(
@@ -180,4 +180,4 @@ def test_a_trace_may_hold_no_delay_and_the_longest(tmp_path):
     path = tmp_path / "trace.csv"
     path.write_text("delay_s\n0\n3600\n")
     source = delay_profile(f"trace:{path}").source(np.random.default_rng(0))
-    assert [source.draw(0.0), source.draw(0.0)] == [0.0, 3600.0]
+    assert [source(0.0, 0), source(0.0, 0)] == [0.0, 3600.0]

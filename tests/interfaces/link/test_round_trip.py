@@ -68,7 +68,7 @@ def test_statistics_are_those_of_the_window():
         if rng.random() < 0.2:
             return []
         copies = 1 + (rng.random() < 0.1)
-        return [(source.draw(now), 0.3 * rng.random(), 0.01 * rng.random()) for _ in range(copies)]
+        return [(source(now, 0), 0.3 * rng.random(), 0.01 * rng.random()) for _ in range(copies)]
 
     for outcome, echo, now in drive(estimator, fate, until=120.0):
         if not isinstance(outcome, RoundTrip):

@@ -69,7 +69,7 @@ def test_draws_reproduce_mean_deviation_smallest_and_largest(name, tau):
     rho = math.exp(-0.5) if tau else 0.0
     n = DRAWS * (1 - rho) / (1 + rho)
     source = profile.source(np.random.default_rng(11))
-    d = np.array([source.draw(gap * i) for i in range(DRAWS)])
+    d = np.array([source(gap * i, 0) for i in range(DRAWS)])
     assert d.mean() == pytest.approx(mean, abs=ERRORS * math.sqrt(variance / n))
     assert d.var() == pytest.approx(variance, abs=ERRORS * math.sqrt((fourth - variance**2) / n))
     # The smallest of n draws lies above the quantile p with probability (1 − p)^n: e^−20 for p = 20/n.
@@ -92,7 +92,7 @@ def test_congestion_lasts_as_long_as_asked(tau):
     """
     profile = delay_profile(f"thu@{tau:g}")
     source = profile.source(np.random.default_rng(3))
-    logs = np.log(np.array([source.draw((tau or 1.0) * i) for i in range(DRAWS)]) - profile.low)
+    logs = np.log(np.array([source((tau or 1.0) * i, 0) for i in range(DRAWS)]) - profile.low)
     logs -= logs.mean()
     rho = math.exp(-1.0) if tau else 0.0
     assert np.mean(logs[1:] * logs[:-1]) / np.mean(logs**2) == pytest.approx(
@@ -103,4 +103,4 @@ def test_congestion_lasts_as_long_as_asked(tau):
 def test_packets_at_one_instant_share_their_delay_unless_draws_are_independent():
     for text, equal in (("thu", True), ("thu@0", False)):
         source = delay_profile(text).source(np.random.default_rng(0))
-        assert (source.draw(1.0) == source.draw(1.0)) is equal
+        assert (source(1.0, 0) == source(1.0, 0)) is equal
