@@ -548,25 +548,21 @@ _STOP = 0.8
 _FOUR = np.arange(4.0)
 
 
-class Transient(NamedTuple):
-    """A motion that dies away: its acceleration runs straight between four knots."""
+def transient(dv: Array, da: Array, T: float) -> Array:
+    """Bring a rate dv and an acceleration da to nothing in T, with the least squared jerk.
 
-    duration: float
-    """[s]."""
-    a: Array
-    """Accelerations at the knots, the last one 0, (4, n)."""
-
-    def aside(self, dv: Array) -> Array:
-        """Where it ends, from where it began at the rate dv [rad], (n,)."""
-        h = self.duration / 3.0
-        return np.asarray(3.0 * h * dv + h * h * (self.a[0] * (4.0 / 3.0) + self.a[1] * 2.0 + self.a[2]))
-
-
-def transient(dv: Array, da: Array, T: float) -> Transient:
-    """Bring a rate dv and an acceleration da to nothing in T, with the least squared jerk."""
+    Returns:
+        Accelerations at four knots, the last one 0, (4, n); they run straight between them.
+    """
     half = -1.5 / T * dv - 0.25 * da
     bend = da / 6.0
-    return Transient(T, np.array([da, half + bend, half - bend, np.zeros_like(da)]))
+    return np.array([da, half + bend, half - bend, np.zeros_like(da)])
+
+
+def displacement(dv: Array, a: Array, T: float) -> Array:
+    """Where a transient ends, from where it began at the rate dv [rad], (n,)."""
+    h = T / 3.0
+    return np.asarray(3.0 * h * dv + h * h * (a[0] * (4.0 / 3.0) + a[1] * 2.0 + a[2]))
 
 
 def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
@@ -697,8 +693,9 @@ def along(
     s = float(state.qd @ onto_u)
     dv = state.qd - (goal if abs(s - goal) < _CLOSE else s) * u
     still = np.zeros_like(u)
-    rough = transient(dv, still, shortest(dv, still, limits, _BUDGETS[0][1]))
-    way = course(model, state.q, u, rough.aside(dv), twist, hold + _AHEAD, limits)
+    T = shortest(dv, still, limits, _BUDGETS[0][1])
+    aside = displacement(dv, transient(dv, still, T), T)
+    way = course(model, state.q, u, aside, twist, hold + _AHEAD, limits)
     bent = state.qdd - s * s * way.slope
     ds = float(bent @ onto_u)
     target = min(goal, float(way.caps[0]))
@@ -737,7 +734,7 @@ def _composed(state: State, way: TwistCourse, law: SpeedLaw, s: float, ds: float
     u = way.u + (1.0 - left * left) * way.offset + x * (way.slope + 0.5 * x * way.curve)
     du = (2.0 / T * left) * way.offset + v * (way.slope + x * way.curve)
     hats = np.maximum(1.0 - np.abs((3.0 / T) * t[:, None] - _FOUR), 0.0)
-    accelerations = a * u + v * du + hats @ beside.a
+    accelerations = a * u + v * du + hats @ beside
     accelerations[-1] = 0.0
     h = t[1:] - t[:-1]
     # What straight lines between the knots left over of the rate goes where the arm is about to stop.
