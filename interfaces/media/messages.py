@@ -43,10 +43,6 @@ class Shot(msgspec.Struct, frozen=True, tag=True):
     """Whether it's also wanted by itself."""
 
 
-class Ready(msgspec.Struct, frozen=True, tag=True):
-    """Process: pictures can be asked for."""
-
-
 class Taken(msgspec.Struct, frozen=True, tag=True):
     """Process: a picture."""
 
@@ -63,7 +59,8 @@ class Taken(msgspec.Struct, frozen=True, tag=True):
 
 
 Order: TypeAlias = Setup | Shot
-News: TypeAlias = Ready | Taken
+News: TypeAlias = Taken | None
+"""Process: a picture; None once, when pictures can be asked for."""
 _Message = TypeVar("_Message")
 _encoder = msgspec.msgpack.Encoder()
 _orders: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
