@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.media.messages import HEAD, News, Order, Setup, Shot, Taken, decode_news, encode, size_of
+from interfaces.media.messages import HEAD, NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.system import module_process
 from robots.bullet.rooms import Room
 from robots.ipr.camera import Lens, PanTilt, PanTiltConfig
@@ -85,7 +85,7 @@ async def camera_process(setup: Setup) -> AsyncIterator[Ask]:
                 writer.write(encode(order))
                 await writer.drain()
                 head = await reader.readexactly(HEAD)
-                return decode_news(await reader.readexactly(size_of(head)))
+                return decode(await reader.readexactly(size_of(head)), NEWS)
         except TimeoutError:
             raise CameraError(f"it took longer than {within:g} s") from None
         except (OSError, EOFError):

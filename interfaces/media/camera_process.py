@@ -11,7 +11,7 @@ import socket
 import sys
 
 from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
-from interfaces.media.messages import HEAD, Order, Setup, Shot, Taken, decode_order, encode, size_of
+from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
 from robots.ipr.camera import Look, Sight
 from vrs.clock import WallClock
 from vrs.errors import FormatError
@@ -64,7 +64,7 @@ def _order(connection: socket.socket) -> Order | None:
         FormatError: If it's none.
     """
     head = _read(connection, HEAD)
-    return None if head is None else decode_order(_read(connection, size_of(head)) or b"")
+    return None if head is None else decode(_read(connection, size_of(head)) or b"", ORDERS)
 
 
 def _read(connection: socket.socket, size: int) -> bytes | None:
