@@ -765,17 +765,6 @@ _TRIED = 0.1
 """How far each joint is moved to see whether that leads away from a singularity [rad]."""
 
 
-class Steered(NamedTuple):
-    """What comes of a hand's input."""
-
-    plan: Plan
-    """Certified, ends at rest; empty where the arm stands and stays."""
-    notes: Notes
-    """What the user must know of it."""
-    hindrance: str
-    """What keeps the arm from going as asked, and what leads away from it; empty if nothing does."""
-
-
 def steer(
     state: State,
     rates: ArrayLike | None,
@@ -784,7 +773,7 @@ def steer(
     hold: float,
     model: RobotModel,
     limits: Limits,
-) -> Steered:
+) -> tuple[Plan, Notes, str]:
     """Plan what a hand asks for now, for as long as the input is fresh, and the stop after that.
 
     Args:
@@ -797,6 +786,10 @@ def steer(
         model: The arm.
         limits: Limits that hold at every instant.
 
+    Returns:
+        A certified plan that ends at rest, empty where the arm stands and stays; what the user must know of it;
+        what keeps the arm from going as asked, and what leads away from it, empty if nothing does.
+
     Raises:
         InvalidValueError: If not exactly one of rates and twist is given, or something is of the wrong form.
         PlanningError: If the state can't be brought to rest within the limits.
@@ -807,7 +800,7 @@ def steer(
         raise InvalidValueError("frame", frame, "base or tool")
     if rates is not None and twist is None:
         u = finite_array("rates", rates, (n,), f"finite joint rates [rad/s], shape ({n},)")
-        return Steered(*_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits))
+        return *_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits)
     if twist is None or rates is not None:
         raise InvalidValueError("rates and twist", (rates, twist), "one of the two, the other None")
     given = finite_array("twist", twist, (6,), "a finite twist (v [m/s], w [rad/s]), shape (6,)")
@@ -839,13 +832,15 @@ def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twis
     return Twist(v / scale_linear, w / scale, frame is Frame.TOOL)
 
 
-def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits) -> Steered:
+def _by_twist(
+    state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits
+) -> tuple[Plan, Notes, str]:
     J = weighted_jacobian(model, state.q[None])
     asked = np.concatenate([twist.linear, twist.angular])
     u = damped_rates(J, asked[None])[0][0]
     if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
         stuck = hold > 0.0 and bool(asked.any())
-        return Steered(*_released(state, J[0], hold, model, limits), _singular(state.q, model) if stuck else "")
+        return *_released(state, J[0], hold, model, limits), _singular(state.q, model) if stuck else ""
     low, high = rates_to_limits(state.q, limits)
     blocked = bool((u < low).any() or (u > high).any())
     plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
@@ -855,9 +850,9 @@ def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits
     if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
         hindrance = _singular(state.q, model)
     if plan is not None:
-        return Steered(plan, (), hindrance)
+        return plan, (), hindrance
     u = share * sliding_rates(J[0], asked, low, high)
-    return Steered(*_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance)
+    return *_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance
 
 
 def _at_limit(q: Array, u: Array, limits: Limits) -> str:
