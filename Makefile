@@ -72,7 +72,7 @@ $(BENCH_STAMP): $(STAMP)
 # A million packets of RSP over ten bad links, against a model; a million fuzzed datagrams for each core.
 soak: export VRS_SOAK_EDITS ?= 1000000
 soak: $(DEV_STAMP)
-	$(PY) tests/vrs/test_soak.py
+	$(PY) -m tests.vrs.test_soak
 	$(PY) -m pytest tests/vrs/test_machine.py
 	VRS_SOAK_PACKETS=100000 VRS_SOAK_DATAGRAMS=500000 $(PY) -m pytest tests/interfaces/rsp/test_exchange.py tests/interfaces/rsp/test_fuzz.py
 

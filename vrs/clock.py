@@ -55,23 +55,19 @@ class WallClock:
     """Seconds since the clock was made, from the machine's monotonic counter."""
 
     def __init__(self, now: float = 0.0) -> None:
-        self._origin = time.monotonic() - finite("now", now, "finite seconds")
+        self.origin = time.monotonic() - finite("now", now, "finite seconds")
+        """The machine's monotonic counter [s] when this clock shows 0; it counts alike in all processes."""
 
     @classmethod
     def since(cls, origin: float) -> WallClock:
         """Make the very clock of another process of this machine, given its origin."""
         clock = cls()
-        clock._origin = finite("origin", origin, "finite seconds")
+        clock.origin = finite("origin", origin, "finite seconds")
         return clock
-
-    @property
-    def origin(self) -> float:
-        """The machine's monotonic counter [s] when this clock shows 0; it counts alike in all processes."""
-        return self._origin
 
     def now(self) -> float:
         """Present time [s]."""
-        return time.monotonic() - self._origin
+        return time.monotonic() - self.origin
 
 
 def seconds_since_1970() -> float:

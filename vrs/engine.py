@@ -129,22 +129,14 @@ class Engine:
             raise InvalidValueError("q", q, "left out where a timeline is given")
         elif not isinstance(timeline, Timeline) or timeline.dof != n:
             raise InvalidValueError("timeline", timeline, f"a Timeline of {n} joints")
-        self._model: RobotModel = model
-        self._clock = clock
+        self.model: RobotModel = model
+        """The robot."""
+        self.clock = clock
+        """The clock, None when offline."""
         ledger: Ledger[Timeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
         self.scheduler = Scheduler(model, timeline, ledger, lateness_of(lateness))
         """Plans the commands."""
         self._keeper = Keeper()
-
-    @property
-    def model(self) -> RobotModel:
-        """The robot."""
-        return self._model
-
-    @property
-    def clock(self) -> Clock | None:
-        """The clock, None when offline."""
-        return self._clock
 
     @property
     def timeline(self) -> Timeline:
@@ -183,7 +175,7 @@ class Engine:
 
     def now(self) -> float:
         """Present time [s]; offline, the end of the plan."""
-        return self.scheduler.timeline.end if self._clock is None else self._clock.now()
+        return self.scheduler.timeline.end if self.clock is None else self.clock.now()
 
     def joints(self, t: ArrayLike | None = None) -> Array:
         """g: joints at t, or now, [rad]: (n,), or (k, n) for t of shape (k,). Source: eq. (4).
@@ -195,11 +187,11 @@ class Engine:
 
     def pose(self, t: ArrayLike | None = None) -> Array:
         """Pose of the last link in the base frame at t, or now: (4, 4) or (k, 4, 4)."""
-        return self._model.forward(self.joints(t))
+        return self.model.forward(self.joints(t))
 
     def links(self, t: ArrayLike | None = None) -> Array:
         """Poses of base and links at t, or now: (n + 1, 4, 4) or (k, n + 1, 4, 4)."""
-        return self._model.links(self.joints(t))
+        return self.model.links(self.joints(t))
 
     @overload
     def execute(self, command: MotionCommand | SteerCommand | PlanEdit) -> Receipt: ...
@@ -222,11 +214,11 @@ class Engine:
             InvalidValueError: If the command's form doesn't fit the robot; nothing is changed.
             UnknownCommandError: If it names a command that this engine gave no receipt of.
         """
-        checked = check(command, self._model)
+        checked = check(command, self.model)
         if isinstance(checked, PositionQuery):
             t = self.now() if checked.t is None else checked.t
             q = frozen_array(self.joints(t))
-            return Position(t, q, frozen_array(self._model.forward(q)))
+            return Position(t, q, frozen_array(self.model.forward(q)))
         with self.atomic():
             if isinstance(checked, MotionCommand):
                 return self.scheduler.move(checked, self._present())
@@ -246,9 +238,9 @@ class Engine:
         return self.scheduler.atomic()
 
     def _present(self) -> float | None:
-        if self._clock is None:
+        if self.clock is None:
             return None
-        now = self._clock.now()
+        now = self.clock.now()
         self._keeper.tidy(self.scheduler.timeline, now)
         return now
 
@@ -352,7 +344,7 @@ class Engine:
             return
         if change.name not in self._limit_names:
             raise InvalidValueError("parameter", change.name, f"one of {', '.join(self.parameters)}")
-        if self._clock is not None and self._clock.now() < plan.timeline.end:
+        if self.clock is not None and self.clock.now() < plan.timeline.end:
             until = f"changed at rest, with nothing scheduled (the plan ends at {plan.timeline.end:.6g} s)"
             raise InvalidValueError(change.name, change.value, until)
         plan.limits = replace(plan.limits, **{change.name: self._limit(change)})
@@ -373,7 +365,7 @@ class MobileEngine(Engine):
     It takes `DriveCommand`, `Stop`, `PositionQuery` and `ParameterChange`. What is about joints raises.
     """
 
-    _model: MobileModel  # type: ignore[assignment]
+    model: MobileModel  # type: ignore[assignment]
     scheduler: DriveScheduler  # type: ignore[assignment]
     _limit_names: ClassVar[tuple[str, ...]] = ("v_max", "w_max", "a_max", "alpha_max")
 
@@ -416,17 +408,12 @@ class MobileEngine(Engine):
             raise InvalidValueError("posture", posture, "left out where a timeline is given")
         elif not isinstance(timeline, ArcTimeline):
             raise InvalidValueError("timeline", timeline, "an ArcTimeline")
-        self._model = model
-        self._clock = clock
+        self.model = model
+        self.clock = clock
         ledger: Ledger[ArcTimeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
         self.scheduler = DriveScheduler(model, timeline, ledger, lateness_of(lateness))
         """Plans the commands."""
         self._keeper = Keeper()
-
-    @property
-    def model(self) -> MobileModel:  # type: ignore[override]
-        """The robot."""
-        return self._model
 
     @property
     def timeline(self) -> ArcTimeline:  # type: ignore[override]
@@ -483,9 +470,7 @@ class MobileEngine(Engine):
         if isinstance(command, ParameterChange):
             self._set_parameter(command)
             return None
-        allowed = (
-            f"a DriveCommand, Stop, PositionQuery or ParameterChange: {self._model.name} has wheels, no joints"
-        )
+        allowed = f"a DriveCommand, Stop, PositionQuery or ParameterChange: {self.model.name} has wheels, no joints"
         raise InvalidValueError("command", command, allowed)
 
     def _limit(self, change: ParameterChange) -> float:
@@ -497,7 +482,7 @@ class MobileEngine(Engine):
         Raises:
             InvalidValueError: Always.
         """
-        raise InvalidValueError("query", f"joints({t!r})", f"posture(t): {self._model.name} has no joints")
+        raise InvalidValueError("query", f"joints({t!r})", f"posture(t): {self.model.name} has no joints")
 
     def pose(self, t: ArrayLike | None = None) -> Array:
         """Pose of the robot in the world frame at t, or now: (4, 4) or (k, 4, 4)."""
@@ -512,7 +497,7 @@ class MobileEngine(Engine):
         Raises:
             InvalidValueError: Always.
         """
-        raise InvalidValueError("query", f"links({t!r})", f"pose(t): {self._model.name} has no links")
+        raise InvalidValueError("query", f"links({t!r})", f"pose(t): {self.model.name} has no links")
 
     def anchor(self, truth: Any) -> NoReturn:
         """Not for a mobile robot; see `vrs.mobile.PostureEstimator`.
@@ -520,7 +505,7 @@ class MobileEngine(Engine):
         Raises:
             InvalidValueError: Always.
         """
-        raise InvalidValueError("correction", truth, f"made by a PostureEstimator for {self._model.name}")
+        raise InvalidValueError("correction", truth, f"made by a PostureEstimator for {self.model.name}")
 
 
 def lateness_of(value: object) -> Lateness:

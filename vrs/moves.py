@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from math import inf
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
@@ -207,17 +207,11 @@ _SAME = 1e-15
 """Times that differ by less, as a share of them or of a second, are one."""
 
 
-class _Way(NamedTuple):
-    """A move that passes the end of the one before it."""
-
-    start: float
-    """When it begins [s]."""
-    plan: Plan
-    notes: Notes
-
-
 class Passer:
-    """One command that passes the end of another; times are those of its pace, as if at 1."""
+    """One command that passes the end of another; times are those of its pace, as if at 1.
+
+    What it makes is when the move begins [s], its plan, and what must be said of it.
+    """
 
     def __init__(
         self,
@@ -266,7 +260,7 @@ class Passer:
         slow, _, notes = self.planner(again, limits)(self.timeline.state_before(begin))
         return self.at_full_pace(slow), notes
 
-    def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> _Way:
+    def rounded(self, first: Plan, begin: float, onward: MotionCommand) -> tuple[float, Plan, Notes]:
         """Overlap as far as the deviation and the limits allow."""
         command = self.command
         quick = self.at_full_pace(first)
@@ -281,18 +275,18 @@ class Passer:
         model = tooled(self.model, command.tool)
         way = rounding.rounded(plans, command.deviation, model, self.limits, command.profile)
         if way.first is not quick:
-            return _Way(begin, self.at_pace(way.whole), way.notes)
+            return begin, self.at_pace(way.whole), way.notes
         start = max(self._before(way.delta), begin)
         rest = rounding.later(way.whole, way.first.duration - way.delta)
-        return _Way(start, self.at_pace(rest), way.notes)
+        return start, self.at_pace(rest), way.notes
 
-    def continuous(self, first: Plan, second: Plan, begin: float, notes: Notes) -> _Way:
+    def continuous(self, first: Plan, second: Plan, begin: float, notes: Notes) -> tuple[float, Plan, Notes]:
         """Begin where the move before begins to brake; where both can't have their acceleration, it gets half."""
         t, command, pace, limits = self.t, self.command, self.command.pace, self.limits
         quick, onward = self.at_full_pace(first), self.at_full_pace(second)
         notes += self.mixed
         if not len(second):
-            return _Way(t, second, notes)
+            return t, second, notes
         ready = starting(onward, limits, _straight(command, self.model))
         known = _straight(self.before, self.model)
         most = inf if self.now is None else (t - self.now) * pace
@@ -311,7 +305,7 @@ class Passer:
             if delta > 0.0:
                 lead = _until(slow, slow.duration - delta)
                 return self._at(begin, lead.then(plan), delta, more + notes)
-        return _Way(t, second, (*notes, Note(NoteCode.STOPS_AT_VIA)))
+        return t, second, (*notes, Note(NoteCode.STOPS_AT_VIA))
 
     def _before(self, delta: float) -> float:
         """The time from which an overlap [s] is left; a knot where one is as near as rounding leaves it."""
@@ -322,9 +316,9 @@ class Passer:
                 return knot
         return start
 
-    def _at(self, start: float, plan: Plan, delta: float, notes: Notes) -> _Way:
+    def _at(self, start: float, plan: Plan, delta: float, notes: Notes) -> tuple[float, Plan, Notes]:
         passed = Note(NoteCode.BEGINS_BEFORE, (delta / self.command.pace, self.passed_by))
-        return _Way(start, self.at_pace(plan), (*notes, passed))
+        return start, self.at_pace(plan), (*notes, passed)
 
 
 def _straight(command: MotionCommand | None, model: RobotModel) -> RobotModel | None:

@@ -288,16 +288,6 @@ class Paused(NamedTuple):
     """When the stop began [s]."""
 
 
-class _Session(NamedTuple):
-    """Steering inputs in a row."""
-
-    command_id: int
-    version: int
-    """Version of the timeline that the newest made."""
-    start: float
-    """When the first began [s]."""
-
-
 class Scheduler(BaseScheduler[Timeline]):
     """What an engine has planned: a timeline, the limits in force, and a ledger of receipts."""
 
@@ -308,7 +298,9 @@ class Scheduler(BaseScheduler[Timeline]):
         self.paused: Paused | None = None
         self.profiles: dict[int, Profile] = {}
         """Of commands that are no motion commands."""
-        self.session: _Session | None = None
+        self.session: tuple[int, int, float] | None = None
+        """Steering inputs in a row: their command, the version of the timeline that the newest made, when the first
+        began [s]."""
 
     def move(self, command: MotionCommand, now: float | None) -> Receipt:
         """Carry out a motion command.
@@ -380,13 +372,13 @@ class Scheduler(BaseScheduler[Timeline]):
             self.model, self.limits, self.timeline, self.planner, command, gap, t, (passed_by, before, smooth), now
         )
         if command.deviation == inf:
-            way = passer.continuous(first, second, begin, notes)
+            start, plan, notes = passer.continuous(first, second, begin, notes)
         else:
-            way = passer.rounded(first, begin, replace(command, target=JointTarget(target)))
-        if way.start < t and dropped is not None:
+            start, plan, notes = passer.rounded(first, begin, replace(command, target=JointTarget(target)))
+        if start < t and dropped is not None:
             dropped = (passed_by, *dropped)
-        gap = gap._replace(cut=way.start, start=way.start)
-        return fill(self.timeline, gap, command_id, lambda _: (way.plan, target, way.notes), joiner, dropped)
+        gap = gap._replace(cut=start, start=start)
+        return fill(self.timeline, gap, command_id, lambda _: (plan, target, notes), joiner, dropped)
 
     def planner(self, command: MotionCommand, limits: Limits | None = None) -> MovePlanner:
         """Plan a command's move, under the limits in force now or others."""
@@ -437,11 +429,9 @@ class Scheduler(BaseScheduler[Timeline]):
             return self.reject(issued, asked, str(error))
         before, session = self.timeline, self.session
         rests = not state.qd.any() and not state.qdd.any()
-        if session is not None and (
-            session.version != before.version or t < session.start or (rests and t < before.end)
-        ):
+        if session is not None and (session[1] != before.version or t < session[2] or (rests and t < before.end)):
             session = None
-        command_id, start = (self.ledger.newest + 1, t) if session is None else (session.command_id, session.start)
+        command_id, _, start = (self.ledger.newest + 1, 0, t) if session is None else session
         after = before
         if len(plan) or t < before.end or session is None:
             after = lengthened(before, t, piece(plan, command_id))
@@ -453,7 +443,7 @@ class Scheduler(BaseScheduler[Timeline]):
             return stands
         target = end_position(plan) if len(plan) else state.q
         self.note_profile(command_id, Profile.JERK_LIMITED)
-        self.session = _Session(command_id, after.version, start)
+        self.session = command_id, after.version, start
         notes = moment.notes + notes
         receipt = Receipt(
             command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
@@ -476,14 +466,14 @@ class Scheduler(BaseScheduler[Timeline]):
     @property
     def steered(self) -> tuple[int, float] | None:
         """The command that the next steering input may go on with, and when it began [s]."""
-        session = self.session
-        if session is None or session.version != self.timeline.version:
+        if self.session is None or self.session[1] != self.timeline.version:
             return None
-        return session.command_id, session.start
+        command_id, _, start = self.session
+        return command_id, start
 
     def go_on_steering(self, command_id: int, start: float) -> None:
         """Let the next steering input go on with a command that began at a time [s]."""
-        self.session = _Session(command_id, self.timeline.version, start)
+        self.session = command_id, self.timeline.version, start
 
     def edit(self, command: PlanEdit, now: float | None) -> Receipt:
         """Carry out an edit of what is scheduled.

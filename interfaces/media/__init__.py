@@ -6,7 +6,7 @@ from interfaces.media.camera import CameraConfig, CameraError, LiveCamera
 from interfaces.media.door import MediaDoor
 from interfaces.media.live import LiveMedia
 from interfaces.media.presenter import Presenter
-from interfaces.media.speech import Aloud, SpeechConfig, SpeechError
+from interfaces.media.speech import Aloud, SpeechError
 
 __all__ = [
     "Aloud",
@@ -16,6 +16,5 @@ __all__ = [
     "LiveMedia",
     "MediaDoor",
     "Presenter",
-    "SpeechConfig",
     "SpeechError",
 ]

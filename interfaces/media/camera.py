@@ -6,11 +6,11 @@ import asyncio
 import contextlib
 import socket
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.media.messages import HEAD, News, Order, Ready, Setup, Shot, Taken, decode_news, encode, size_of
+from interfaces.media.messages import HEAD, NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.system import module_process
 from robots.bullet.rooms import Room
 from robots.ipr.camera import Lens, PanTilt, PanTiltConfig
@@ -35,6 +35,8 @@ _COUNTED: Final = 2.0
 
 Stand: TypeAlias = Callable[[float], tuple[tuple[float, float, float], float]]
 """Where the robot is at a session time [s], x, y [m], θ [rad], and the time in its room [s]."""
+Ask: TypeAlias = Callable[[Order, float], Awaitable[News]]
+"""Sends a message to the camera's process and waits for the answer, at most so long [s]."""
 
 
 class CameraError(VrsError):
@@ -62,57 +64,12 @@ class CameraConfig:
         number_in("camera", self.rate, 1.0, 30.0, unit=" pictures a second")
 
 
-class CameraProcess:
-    """The process, seen from its parent: a question at a time."""
-
-    def __init__(
-        self,
-        process: asyncio.subprocess.Process,
-        reader: asyncio.StreamReader,
-        writer: asyncio.StreamWriter,
-    ) -> None:
-        self._process, self._reader, self._writer = process, reader, writer
-
-    async def ask(self, order: Order, *, within: float) -> News:
-        """Send a message and wait for the answer.
-
-        Args:
-            order: The message.
-            within: How long it may take [s].
-
-        Raises:
-            CameraError: If there's none.
-        """
-        try:
-            async with asyncio.timeout(within):
-                self._writer.write(encode(order))
-                await self._writer.drain()
-                head = await self._reader.readexactly(HEAD)
-                return decode_news(await self._reader.readexactly(size_of(head)))
-        except TimeoutError:
-            raise CameraError(f"it took longer than {within:g} s") from None
-        except (OSError, EOFError):
-            raise CameraError("its process ended") from None
-        except FormatError as error:
-            raise CameraError(str(error)) from None
-
-    async def close(self) -> None:
-        """Let it end."""
-        self._writer.close()
-        try:
-            async with asyncio.timeout(1.0):
-                await self._process.wait()
-        except TimeoutError:
-            self._process.kill()
-            await self._process.wait()
-
-
 @contextlib.asynccontextmanager
-async def camera_process(setup: Setup) -> AsyncIterator[CameraProcess]:
-    """Run a camera's process meanwhile.
+async def camera_process(setup: Setup) -> AsyncIterator[Ask]:
+    """Run a camera's process meanwhile, and yield what asks it, a question at a time.
 
     Raises:
-        CameraError: If it doesn't start.
+        CameraError: If it doesn't start; of what is asked, if there's no answer.
     """
     ours, theirs = socket.socketpair()
     with theirs:
@@ -121,13 +78,33 @@ async def camera_process(setup: Setup) -> AsyncIterator[CameraProcess]:
             *command, stdin=asyncio.subprocess.DEVNULL, pass_fds=(theirs.fileno(),), env=environment
         )
     reader, writer = await asyncio.open_connection(sock=ours)
-    camera = CameraProcess(process, reader, writer)
+
+    async def ask(order: Order, within: float) -> News:
+        try:
+            async with asyncio.timeout(within):
+                writer.write(encode(order))
+                await writer.drain()
+                head = await reader.readexactly(HEAD)
+                return decode(await reader.readexactly(size_of(head)), NEWS)
+        except TimeoutError:
+            raise CameraError(f"it took longer than {within:g} s") from None
+        except (OSError, EOFError):
+            raise CameraError("its process ended") from None
+        except FormatError as error:
+            raise CameraError(str(error)) from None
+
     try:
-        if not isinstance(await camera.ask(setup, within=START_TIME), Ready):
+        if await ask(setup, START_TIME) is not None:
             raise CameraError("it doesn't get ready")
-        yield camera
+        yield ask
     finally:
-        await camera.close()
+        writer.close()
+        try:
+            async with asyncio.timeout(1.0):
+                await process.wait()
+        except TimeoutError:
+            process.kill()
+            await process.wait()
 
 
 class LiveCamera:
@@ -210,14 +187,14 @@ class LiveCamera:
                 await asyncio.sleep(_LOOK)
             config = self.config
             try:
-                async with camera_process(Setup(self._room, config.lens, config.rate, config.video)) as process:
+                async with camera_process(Setup(self._room, config.lens, config.rate, config.video)) as ask:
                     self.problem = ""
-                    await self._shoot(process)
+                    await self._shoot(ask)
             except (CameraError, OSError) as error:
                 self.problem = str(error)
                 await asyncio.sleep(AGAIN)
 
-    async def _shoot(self, process: CameraProcess) -> None:
+    async def _shoot(self, ask: Ask) -> None:
         """Ask for a picture as often as it's said; those for which there's no time are left out."""
         due = self._clock.now()
         while True:
@@ -230,8 +207,8 @@ class LiveCamera:
             posture, world = self._stand(now)
             look = self.axes.look(now)
             shot = Shot(self.taken + 1, posture, (look.pan, look.tilt), world, key, bool(stills))
-            taken = await process.ask(shot, within=SHOT_TIME)
-            if not isinstance(taken, Taken):
+            taken = await ask(shot, SHOT_TIME)
+            if taken is None:
                 raise CameraError("it answers something else")
             self._give(taken, now)
 

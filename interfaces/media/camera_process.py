@@ -10,8 +10,8 @@ import os
 import socket
 import sys
 
-from interfaces.media.coding import VideoEncoder, encode_still
-from interfaces.media.messages import HEAD, Order, Ready, Setup, Shot, Taken, decode_order, encode, size_of
+from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
+from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
 from robots.ipr.camera import Look, Sight
 from vrs.clock import WallClock
 from vrs.errors import FormatError
@@ -36,8 +36,8 @@ def run(connection: socket.socket) -> int:
         if not isinstance(setup, Setup):
             return 0 if setup is None else 2
         sight, lens = Sight(setup.room, setup.lens), setup.lens
-        video = VideoEncoder(lens.width, lens.height, setup.rate) if setup.video else None
-        connection.sendall(encode(Ready()))
+        video = video_encoder(lens.width, lens.height, setup.rate) if setup.video else None
+        connection.sendall(encode(None))
         clock = WallClock()
         while isinstance(shot := _order(connection), Shot):
             connection.sendall(encode(take(shot, sight, video, clock)))
@@ -52,7 +52,7 @@ def take(shot: Shot, sight: Sight, video: VideoEncoder | None, clock: WallClock)
     """Draw a picture, and encode it as it's wanted."""
     began = clock.now()
     picture = sight.draw(shot.posture, Look(*shot.look), shot.t)
-    frame, key = (b"", False) if video is None else video.encode(picture, key=shot.key)
+    frame, key = (b"", False) if video is None else video(picture, shot.key)
     still = encode_still(picture) if shot.still else b""
     return Taken(shot.number, frame, key, still, clock.now() - began)
 
@@ -64,7 +64,7 @@ def _order(connection: socket.socket) -> Order | None:
         FormatError: If it's none.
     """
     head = _read(connection, HEAD)
-    return None if head is None else decode_order(_read(connection, size_of(head)) or b"")
+    return None if head is None else decode(_read(connection, size_of(head)) or b"", ORDERS)
 
 
 def _read(connection: socket.socket, size: int) -> bytes | None:

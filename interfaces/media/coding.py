@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import io
+import itertools
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from importlib.util import find_spec
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,47 +34,42 @@ def missing() -> str:
     return ", ".join(name for name in ("aiortc", "av") if find_spec(name) is None)
 
 
-class VideoEncoder:
-    """One stream of VP8 for any number of receivers."""
+VideoEncoder: TypeAlias = Callable[[NDArray[np.uint8], bool], tuple[bytes, bool]]
+"""Encodes a picture, red, green, blue, (height, width, 3), whole if asked for; others refer to the one before.
 
-    def __init__(self, width: int, height: int, rate: float) -> None:
-        """Begin a stream.
+It gives the frame, and whether it's whole.
+"""
 
-        Args:
-            width: Pixels across.
-            height: Pixels down.
-            rate: Pictures a second.
-        """
-        import av
 
-        self._av = av
-        codec: Any = av.CodecContext.create("libvpx", "w")
-        codec.width, codec.height, codec.pix_fmt = width, height, "yuv420p"
-        codec.bit_rate = BITS
-        codec.time_base = Fraction(1, VIDEO_CLOCK)
-        codec.framerate = Fraction(rate).limit_denominator(1000)
-        codec.gop_size = max(1, round(KEY_PERIOD * rate))
-        codec.options = {"cpu-used": "-6", "deadline": "realtime", "lag-in-frames": "0"}
-        codec.thread_count = 1
-        self._codec, self._step, self._count = codec, round(VIDEO_CLOCK / rate), 0
+def video_encoder(width: int, height: int, rate: float) -> VideoEncoder:
+    """Begin one stream of VP8 for any number of receivers.
 
-    def encode(self, picture: NDArray[np.uint8], *, key: bool) -> tuple[bytes, bool]:
-        """Encode a picture.
+    Args:
+        width: Pixels across.
+        height: Pixels down.
+        rate: Pictures a second.
+    """
+    import av
 
-        Args:
-            picture: Red, green, blue, (height, width, 3).
-            key: Whether it's to be whole; others refer to the one before.
+    codec: Any = av.CodecContext.create("libvpx", "w")
+    codec.width, codec.height, codec.pix_fmt = width, height, "yuv420p"
+    codec.bit_rate = BITS
+    codec.time_base = Fraction(1, VIDEO_CLOCK)
+    codec.framerate = Fraction(rate).limit_denominator(1000)
+    codec.gop_size = max(1, round(KEY_PERIOD * rate))
+    codec.options = {"cpu-used": "-6", "deadline": "realtime", "lag-in-frames": "0"}
+    codec.thread_count = 1
+    times = itertools.count(0, round(VIDEO_CLOCK / rate))
 
-        Returns:
-            The frame, and whether it's whole.
-        """
-        frame = self._av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p")
-        frame.pts, frame.time_base = self._count * self._step, Fraction(1, VIDEO_CLOCK)
+    def encode(picture: NDArray[np.uint8], key: bool) -> tuple[bytes, bool]:
+        frame = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p")
+        frame.pts, frame.time_base = next(times), Fraction(1, VIDEO_CLOCK)
         if key:
-            frame.pict_type = self._av.video.frame.PictureType.I
-        self._count += 1
-        packets = self._codec.encode(frame)
+            frame.pict_type = av.video.frame.PictureType.I
+        packets = codec.encode(frame)
         return b"".join(bytes(packet) for packet in packets), any(packet.is_keyframe for packet in packets)
+
+    return encode
 
 
 def encode_sound(samples: NDArray[np.int16], rate: int) -> tuple[bytes, ...]:

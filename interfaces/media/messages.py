@@ -43,10 +43,6 @@ class Shot(msgspec.Struct, frozen=True, tag=True):
     """Whether it's also wanted by itself."""
 
 
-class Ready(msgspec.Struct, frozen=True, tag=True):
-    """Process: pictures can be asked for."""
-
-
 class Taken(msgspec.Struct, frozen=True, tag=True):
     """Process: a picture."""
 
@@ -63,11 +59,14 @@ class Taken(msgspec.Struct, frozen=True, tag=True):
 
 
 Order: TypeAlias = Setup | Shot
-News: TypeAlias = Ready | Taken
+News: TypeAlias = Taken | None
+"""Process: a picture; None once, when pictures can be asked for."""
 _Message = TypeVar("_Message")
 _encoder = msgspec.msgpack.Encoder()
-_orders: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
-_news: msgspec.msgpack.Decoder[News] = msgspec.msgpack.Decoder(News)
+ORDERS: Final[msgspec.msgpack.Decoder[Order]] = msgspec.msgpack.Decoder(Order)
+"""Reads what a site says."""
+NEWS: Final[msgspec.msgpack.Decoder[News]] = msgspec.msgpack.Decoder(News)
+"""Reads what the process says."""
 
 
 def encode(message: Order | News) -> bytes:
@@ -88,25 +87,12 @@ def size_of(head: bytes) -> int:
     return size
 
 
-def decode_order(data: bytes) -> Order:
-    """Read what a site says.
+def decode(data: bytes, decoder: msgspec.msgpack.Decoder[_Message]) -> _Message:
+    """Read a message of one side.
 
     Raises:
         FormatError: If it's none of its messages.
     """
-    return _decoded(data, _orders)
-
-
-def decode_news(data: bytes) -> News:
-    """Read what the process says.
-
-    Raises:
-        FormatError: If it's none of its messages.
-    """
-    return _decoded(data, _news)
-
-
-def _decoded(data: bytes, decoder: msgspec.msgpack.Decoder[_Message]) -> _Message:
     try:
         return decoder.decode(data)
     except (msgspec.MsgspecError, ValueError) as error:

@@ -6,7 +6,6 @@ Candidates are left out: the browser finds the server by those of the answer, an
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Final
 
 from vrs.errors import VrsError
@@ -36,30 +35,6 @@ class OfferError(VrsError):
         super().__init__(f"no picture and sound: {problem}")
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """One stream that is asked for."""
-
-    kind: str
-    fields: dict[str, str]
-    payload: int
-    """Type of its packets."""
-    again: int | None
-    """The same of packets that are sent again; None for no such."""
-
-    def lines(self) -> list[str]:
-        """The part as SDP."""
-        again = "" if self.again is None else f" {self.again}"
-        lines = [f"m={self.kind} 9 UDP/TLS/RTP/SAVPF {self.payload}{again}", "c=IN IP4 0.0.0.0", "a=recvonly"]
-        lines += ["a=rtcp-mux", *(f"a={name}:{value}" for name, value in self.fields.items())]
-        lines.append(f"a=rtpmap:{self.payload} {CODECS[self.kind]}")
-        if self.kind == "video":
-            lines += [f"a=rtcp-fb:{self.payload} nack", f"a=rtcp-fb:{self.payload} nack pli"]
-        if self.again is not None:
-            lines += [f"a=rtpmap:{self.again} rtx/90000", f"a=fmtp:{self.again} apt={self.payload}"]
-        return lines
-
-
 def canonical(offer: str) -> str:
     """Write an offer anew that asks for one video and one audio, in VP8 and Opus.
 
@@ -76,17 +51,15 @@ def canonical(offer: str) -> str:
         raise OfferError(f"an offer has 1 to {LONGEST} characters")
     common, *parts = re.split(r"^(?=m=)", offer.replace("\r\n", "\n"), flags=re.MULTILINE)
     found = [_read(part.splitlines(), common.splitlines()) for part in parts[:3]]
-    if (
-        sorted(part.kind for part in found) != ["audio", "video"]
-        or found[0].fields["mid"] == found[1].fields["mid"]
-    ):
+    if sorted(kind for kind, _, _ in found) != ["audio", "video"] or found[0][1] == found[1][1]:
         raise OfferError("one video and one audio can be asked for")
-    mids = " ".join(part.fields["mid"] for part in found)
+    mids = " ".join(mid for _, mid, _ in found)
     head = ["v=0", "o=- 1 1 IN IP4 127.0.0.1", "s=-", "t=0 0", f"a=group:BUNDLE {mids}"]
-    return "\r\n".join([*head, *(line for part in found for line in part.lines()), ""])
+    return "\r\n".join([*head, *(line for _, _, lines in found for line in lines), ""])
 
 
-def _read(lines: list[str], common: list[str]) -> _Part:
+def _read(lines: list[str], common: list[str]) -> tuple[str, str, list[str]]:
+    """One stream that is asked for: its kind, its mid, and its lines as they're written anew."""
     media = _MEDIA.fullmatch(lines[0].removeprefix("m="))
     if media is None:
         raise OfferError("only a video and an audio by DTLS can be asked for")
@@ -98,7 +71,16 @@ def _read(lines: list[str], common: list[str]) -> _Part:
     again = next((int(n) for n, of in _matches(lines, "fmtp", _APT) if int(of) == payload), None)
     if again is not None and (again > 127 or again == payload or kind == "audio"):
         again = None
-    return _Part(kind, {name: _field(name, lines, common) for name in _FIELDS}, payload, again)
+    fields = {name: _field(name, lines, common) for name in _FIELDS}
+    types = f"{payload}" if again is None else f"{payload} {again}"
+    anew = [f"m={kind} 9 UDP/TLS/RTP/SAVPF {types}", "c=IN IP4 0.0.0.0", "a=recvonly", "a=rtcp-mux"]
+    anew += [f"a={name}:{value}" for name, value in fields.items()]
+    anew.append(f"a=rtpmap:{payload} {CODECS[kind]}")
+    if kind == "video":
+        anew += [f"a=rtcp-fb:{payload} nack", f"a=rtcp-fb:{payload} nack pli"]
+    if again is not None:
+        anew += [f"a=rtpmap:{again} rtx/90000", f"a=fmtp:{again} apt={payload}"]
+    return kind, fields["mid"], anew
 
 
 def _matches(lines: list[str], name: str, form: re.Pattern[str]) -> list[tuple[str, ...]]:

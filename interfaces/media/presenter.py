@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from interfaces.media.coding import VoicePlayout, encode_sound
-from interfaces.media.speech import SpeechConfig, SpeechError, cleaned, reading_time, shortened, spoken
+from interfaces.media.speech import SpeechError, cleaned, reading_time, shortened, spoken
 from vrs.clock import Clock
 
 MOST_WAITING: Final = 8
@@ -26,7 +26,6 @@ class Presenter:
         playout: VoicePlayout,
         *,
         screen: Callable[[str], None] = lambda _: None,
-        speech: SpeechConfig | None = None,
         audible: bool = True,
     ) -> None:
         """Say and show nothing.
@@ -35,11 +34,9 @@ class Presenter:
             clock: Session time.
             playout: Where sound is put.
             screen: Shows a message on the robot; an empty one clears it.
-            speech: How it speaks.
             audible: Whether sound reaches anybody; else words are only shown, as long as reading them takes.
         """
         self._clock, self._playout, self._screen = clock, playout, screen
-        self._speech = SpeechConfig() if speech is None else speech
         self._audible = audible
         self.saying = ""
         """What is being said; empty in silence."""
@@ -91,7 +88,7 @@ class Presenter:
         if not self._audible:
             return reading_time(words)
         try:
-            samples, rate = await spoken(words, self._speech)
+            samples, rate = await spoken(words)
             packets = await asyncio.to_thread(encode_sound, samples, rate)
         except SpeechError as error:
             self.problem = str(error)

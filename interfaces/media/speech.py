@@ -12,16 +12,20 @@ import math
 import shutil
 import unicodedata
 import wave
-from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.checks import validated, within
 from vrs.errors import FormatError, InvalidValueError, VrsError
 
 PROGRAM: Final = "espeak-ng"
+LANGUAGE: Final = "en"
+"""Of the program's voice, as `espeak-ng --voices` lists them."""
+PACE: Final = 150
+"""Words a minute; the program takes 80 to 450."""
+PITCH: Final = 45
+"""Of the voice; the program takes 0 to 99."""
 LONGEST: Final = 300
 """Characters of what is said or shown at most."""
 TIME: Final = 10.0
@@ -38,24 +42,6 @@ class SpeechError(VrsError):
     def __init__(self, problem: str) -> None:
         self.problem = problem
         super().__init__(f"nothing can be said: {problem}")
-
-
-@dataclass(frozen=True, slots=True)
-@validated
-class SpeechConfig:
-    """How the robot speaks."""
-
-    language: str = "en"
-    """Of the program's voice, as `espeak-ng --voices` lists them: letters, digits and hyphens, 1 to 32."""
-    pace: Annotated[int, within(80, 450, "words a minute")] = 150
-    """Words a minute, 80 to 450."""
-    pitch: Annotated[int, within(0, 99)] = 45
-    """0 to 99."""
-
-    def __post_init__(self) -> None:
-        word = self.language.replace("-", "a")
-        if not (word.isascii() and word.isalnum() and 1 <= len(word) <= 32) or self.language.startswith("-"):
-            raise InvalidValueError("language", self.language, "a voice's name, as en or en-us")
 
 
 def cleaned(text: str) -> str:
@@ -92,12 +78,11 @@ def program() -> str | None:
     return shutil.which(PROGRAM)
 
 
-async def spoken(text: str, config: SpeechConfig) -> tuple[NDArray[np.int16], int]:
+async def spoken(text: str) -> tuple[NDArray[np.int16], int]:
     """Let the program say a text.
 
     Args:
         text: From `cleaned`; it goes through standard input, so that none of it's an option.
-        config: How.
 
     Returns:
         Samples, (k,), and their rate [1/s].
@@ -108,7 +93,7 @@ async def spoken(text: str, config: SpeechConfig) -> tuple[NDArray[np.int16], in
     found = program()
     if found is None:
         raise SpeechError(f"the program {PROGRAM} isn't installed")
-    options = ("-v", config.language, "-s", str(config.pace), "-p", str(config.pitch), "--stdin", "--stdout")
+    options = ("-v", LANGUAGE, "-s", str(PACE), "-p", str(PITCH), "--stdin", "--stdout")
     try:
         process = await asyncio.create_subprocess_exec(
             found, *options, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
@@ -154,13 +139,8 @@ def samples_of(data: bytes) -> tuple[NDArray[np.int16], int]:
 class Aloud:
     """Says one text at a time; to be used in a running loop, in which the program is asked for its length."""
 
-    def __init__(self, speech: SpeechConfig | None = None) -> None:
-        """Be silent.
-
-        Args:
-            speech: How it speaks.
-        """
-        self._speech = SpeechConfig() if speech is None else speech
+    def __init__(self) -> None:
+        """Be silent."""
         self.text = ""
         """What is being said; empty in silence."""
         self.until = -math.inf
@@ -183,7 +163,7 @@ class Aloud:
         lasts = reading_time(words)
         try:
             if words:
-                samples, rate = await spoken(words, self._speech)
+                samples, rate = await spoken(words)
                 lasts = len(samples) / rate
         except SpeechError:
             pass

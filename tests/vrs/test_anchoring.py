@@ -9,7 +9,7 @@ from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Status, Timeline
 from vrs.anchoring import anchored
 from vrs.errors import InvalidValueError
-from vrs.testing.laws import Figures, check_run, columns
+from vrs.testing import Figures, check_run, columns
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

@@ -177,7 +177,8 @@ class VirtualEnvironment:
         self._gamma = gamma
         self.per_neighbour = gamma * math.log(1.0 / threshold)
         """Seconds that a cell lives for each occupied neighbour."""
-        self._now = -math.inf
+        self.now = -math.inf
+        """The latest time that it was asked about [s]."""
         self._cells = known.copy()
         self._born: dict[_Index, float] = {}
         self._ends: list[tuple[float, _Index]] = []
@@ -187,11 +188,6 @@ class VirtualEnvironment:
     def longest(self) -> float:
         """The longest that a cell lives after it was last seen [s]."""
         return 8 * self.per_neighbour
-
-    @property
-    def now(self) -> float:
-        """The latest time that it was asked about [s]."""
-        return self._now
 
     def occupied(self, t: float) -> Bools:
         """C at a time, (m, n), read-only; a value that later calls don't change.
@@ -318,9 +314,9 @@ class VirtualEnvironment:
 
     def _advance(self, t: float, *, before: bool = False) -> None:
         """Let die what dies by a time; with `before`, what dies at that very time may still be seen anew."""
-        if finite("t", t, "finite seconds") < self._now:
-            raise InvalidValueError("t", t, f"not before {self._now:.9g} s: time doesn't run back")
-        self._now = t
+        if finite("t", t, "finite seconds") < self.now:
+            raise InvalidValueError("t", t, f"not before {self.now:.9g} s: time doesn't run back")
+        self.now = t
         ends = self._ends
         while ends and (ends[0][0] < t or (not before and ends[0][0] == t)):
             moment = ends[0][0]

@@ -88,7 +88,8 @@ class PostureEstimator:
         self._period = _duration(period)
         self._entries: deque[_Entry] = deque([_Entry((x, y, theta))])
         self._history = history
-        self._oldest = 0
+        self.oldest = 0
+        """The lowest j of which feedback still counts."""
         self._known = 0
         """Up to this index estimates stand in the entries; beyond it there's no feedback."""
         self._newest = -1
@@ -101,12 +102,7 @@ class PostureEstimator:
     @property
     def count(self) -> int:
         """i: commands given so far; the next one has this index."""
-        return self._oldest + len(self._entries) - 1
-
-    @property
-    def oldest(self) -> int:
-        """The lowest j of which feedback still counts."""
-        return self._oldest
+        return self.oldest + len(self._entries) - 1
 
     @property
     def posture(self) -> Array:
@@ -119,14 +115,14 @@ class PostureEstimator:
         Raises:
             InvalidValueError: If it's not kept.
         """
-        if not self._oldest <= index <= self.count:
-            raise InvalidValueError("index", index, f"from {self._oldest} to {self.count}")
+        if not self.oldest <= index <= self.count:
+            raise InvalidValueError("index", index, f"from {self.oldest} to {self.count}")
         self._settle()
         if index <= self._known:
-            return frozen_array(self._corrected(self._entries[index - self._oldest])[0])
-        posture = self._entries[self._known - self._oldest].estimate
+            return frozen_array(self._corrected(self._entries[index - self.oldest])[0])
+        posture = self._entries[self._known - self.oldest].estimate
         for k in range(self._known, index):
-            entry = self._entries[k - self._oldest]
+            entry = self._entries[k - self.oldest]
             posture = advanced(posture, entry.v, entry.w, entry.duration)
         return frozen_array(posture)
 
@@ -157,9 +153,9 @@ class PostureEstimator:
             self._ahead = advanced(self._ahead, v, w, lasting)
         if len(self._entries) > self._history + 1:
             self._settle()
-            self._move_on(self._oldest + 1)
+            self._move_on(self.oldest + 1)
             self._entries.popleft()
-            self._oldest += 1
+            self.oldest += 1
         return index
 
     def feedback(self, index: int, posture: ArrayLike, number: float | None = None) -> Feedback:
@@ -179,9 +175,9 @@ class PostureEstimator:
             raise InvalidValueError("index", index, "an integer from 0")
         if index > self.count or index < 0:
             return Feedback.UNKNOWN
-        if index < self._oldest:
+        if index < self.oldest:
             return Feedback.FORGOTTEN
-        place = index - self._oldest
+        place = index - self.oldest
         entry = self._entries[place]
         measured = x, y, theta
         if number is None:
@@ -216,14 +212,14 @@ class PostureEstimator:
         if stale is None:
             return
         self._move_on(min(self._newest + 1, self.count))
-        for index in range(max(stale, self._oldest), self._known):
-            place = index - self._oldest
+        for index in range(max(stale, self.oldest), self._known):
+            place = index - self.oldest
             self._entries[place + 1].estimate = self._after(self._entries[place])
 
     def _move_on(self, index: int) -> None:
         """Let estimates stand in the entries up to an index, if it's further than before."""
         while self._known < index:
-            place = self._known - self._oldest
+            place = self._known - self.oldest
             entry = self._entries[place]
             self._entries[place + 1].estimate = self._after(entry)
             self._ahead = _without(self._ahead, entry)
@@ -238,7 +234,7 @@ class PostureEstimator:
         entry.samples = newest
         for _ in range(place):
             self._entries.popleft()
-        self._oldest += place
+        self.oldest += place
 
     def _corrected(self, entry: _Entry) -> tuple[_Posture, float]:
         """The estimate with what was fed back, and the heading from which the next arc starts [rad]."""

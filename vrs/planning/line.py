@@ -53,16 +53,6 @@ _LENIENT: Final = 2.0
 """Of jerk limits at the beginning of a blend, where bending is left out."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _TaskSpaceStart:
-    """A moving start in the task space of a goal: y and its derivatives by time, (6,) each."""
-
-    y: Array
-    rate: Array
-    growth: Array
-    goal: Array
-
-
 def blend_courses(
     state: State, goal: Array, speed: float, model: RobotModel, limits: Limits, *, smooth: bool = False
 ) -> Iterator[tuple[Course, float]]:
@@ -83,19 +73,20 @@ def blend_courses(
     Yields:
         The course, and the blend time [s].
     """
-    task = _moving(state, goal, model)
+    start = _moving(state, goal, model)
+    y, rate, growth = start
     options: list[tuple[float, float, Course]] = []
     for b, share in product(_times(state, limits, smooth=smooth), _RATES):
-        corner = task.y + 0.5 * b * task.rate
+        corner = y + 0.5 * b * rate
         if smooth:
-            corner = corner + b * b / 12.0 * task.growth
+            corner = corner + b * b / 12.0 * growth
         nominal = _nominal(corner, goal, speed, model)
         x = share * nominal * b / 2.0
         if 1e-6 < x < _MEET_MAX:
             # The time of the rest at nominal speed, as if it stopped at once; good enough to sort by.
             cost = b + (1.0 - x) / nominal + (1.0 - share) * b
-            options.append((cost, b, _blend(task, corner, x, b, smooth=smooth)))
-    for _, b, course in _promising(options, state, task, model, limits, smooth=smooth)[:_LOOKS]:
+            options.append((cost, b, _blend(start, corner, goal, x, b, smooth=smooth)))
+    for _, b, course in _promising(options, state, start, model, limits, smooth=smooth)[:_LOOKS]:
         if _fits(course, b, state, model, limits, smooth=smooth):
             yield course, b
 
@@ -110,21 +101,21 @@ def _times(state: State, limits: Limits, *, smooth: bool) -> list[float]:
     return [k * unit for k in _TIMES for unit in (stopping, reaching)]
 
 
-def _blend(task: _TaskSpaceStart, corner: Array, x: float, b: float, *, smooth: bool) -> Course:
+def _blend(start: Array, corner: Array, goal: Array, x: float, b: float, *, smooth: bool) -> Course:
     """The course of a blend of b seconds that meets the line at x."""
-    line = np.concatenate([task.goal[:3, 3] - corner[:3], -corner[3:]])
-    before, after, growth = b * task.rate, 2.0 * x * line, b * b * task.growth
+    line = np.concatenate([goal[:3, 3] - corner[:3], -corner[3:]])
+    y, before, after, growth = start[0], b * start[1], 2.0 * x * line, b * b * start[2]
     step = after - before
-    rows = [task.y, before, 0.5 * step]
+    rows = [y, before, 0.5 * step]
     if smooth:
-        rows = [task.y, before, 0.5 * growth, step - 2.0 / 3.0 * growth, 0.25 * growth - 0.5 * step]
-    return Course(task.y, corner, task.goal, meet=x, bend=np.array(rows))
+        rows = [y, before, 0.5 * growth, step - 2.0 / 3.0 * growth, 0.25 * growth - 0.5 * step]
+    return Course(y, corner, goal, meet=x, bend=np.array(rows))
 
 
 def _promising(
     options: list[tuple[float, float, Course]],
     state: State,
-    task: _TaskSpaceStart,
+    start: Array,
     model: RobotModel,
     limits: Limits,
     *,
@@ -136,28 +127,28 @@ def _promising(
     bends = [(course.bend, b) for _, b, course in options if course.bend is not None]
     if smooth:
         change = np.array([6.0 * bend[3] / b**3 for bend, b in bends])
-        change[:, 3:] = change[:, 3:] @ _rates(task.y[3:]).T
+        change[:, 3:] = change[:, 3:] @ _rates(start[0, 3:]).T
         J = model.jacobian(state.q)
         load = np.abs(np.linalg.lstsq(J, change.T, rcond=None)[0].T) / (_LENIENT * limits.qddd_max)
     else:
         growth = np.array([2.0 * bend[2] / (b * b) for bend, b in bends])
-        load = np.abs(_accelerations(state, task, growth, model)) / limits.qdd_max
+        load = np.abs(_accelerations(state, start, growth, model)) / limits.qdd_max
     kept = [option for option, one in zip(options, load.max(axis=1).tolist(), strict=True) if one <= 1.0]
     return sorted(kept, key=lambda option: option[0])
 
 
-def _moving(state: State, goal: Array, model: RobotModel) -> _TaskSpaceStart:
-    """The start in task space."""
+def _moving(state: State, goal: Array, model: RobotModel) -> Array:
+    """The start in the task space of a goal: y and its first two derivatives by time, (3, 6)."""
     X = model.forward(state.q)
     J = model.jacobian(state.q)
     twist = J @ state.qd
     r = rotation_vector(X[:3, :3] @ goal[:3, :3].T)
     rates = _rates(r)
     rate = np.concatenate([twist[:3], np.linalg.solve(rates, twist[3:])])
-    task = _TaskSpaceStart(np.concatenate([X[:3, 3], r]), rate, np.zeros(6), goal)
-    growth = J @ state.qdd - _drift(state, task, model)
+    y = np.concatenate([X[:3, 3], r])
+    growth = J @ state.qdd - _drift(state, y, rate, model)
     growth[3:] = np.linalg.solve(rates, growth[3:])
-    return _TaskSpaceStart(task.y, rate, growth, goal)
+    return np.array([y, rate, growth])
 
 
 def _rates(r: Array) -> Array:
@@ -165,22 +156,21 @@ def _rates(r: Array) -> Array:
     return turning(np.tile(r, (3, 1)), np.eye(3)).T
 
 
-def _drift(state: State, task: _TaskSpaceStart, model: RobotModel) -> Array:
+def _drift(state: State, y: Array, rate: Array, model: RobotModel) -> Array:
     """What bending alone makes of the accelerations: J qdd = (growth, by _rates) + drift, (6,)."""
     step = np.array([[-1e-5], [1e-5]])
     J = model.jacobian(state.q + step * state.qd)
     drift: Array = ((J[0] - J[1]) / 2e-5) @ state.qd
-    r, rate = task.y[3:], task.rate[3:]
-    velocity = turning(r + step * rate, np.tile(rate, (2, 1)))
+    velocity = turning(y[3:] + step * rate[3:], np.tile(rate[3:], (2, 1)))
     drift[3:] += (velocity[1] - velocity[0]) / 2e-5
     return drift
 
 
-def _accelerations(state: State, task: _TaskSpaceStart, growth: Array, model: RobotModel) -> Array:
+def _accelerations(state: State, start: Array, growth: Array, model: RobotModel) -> Array:
     """Joint accelerations of blends at their beginning, (k, n) [rad/s²], of second derivatives of y, (k, 6)."""
     wanted = growth.copy()
-    wanted[:, 3:] = growth[:, 3:] @ _rates(task.y[3:]).T
-    wanted += _drift(state, task, model)
+    wanted[:, 3:] = growth[:, 3:] @ _rates(start[0, 3:]).T
+    wanted += _drift(state, start[0], start[1], model)
     return np.asarray(np.linalg.lstsq(model.jacobian(state.q), wanted.T, rcond=None)[0].T, dtype=np.float64)
 
 

@@ -43,10 +43,10 @@ class Cubics(NamedTuple):
 
     def keeps(self, limits: Limits) -> bool:
         """Whether every piece lies within the limits at every instant, with the certificate's tolerance."""
-        box = _box(limits, len(self.h))
-        distance = self.points - box.middle
+        middle, half = _box(limits, len(self.h))
+        distance = self.points - middle
         np.abs(distance, distance)
-        inside = distance <= box.half
+        inside = distance <= half
         # Counting is several times quicker than `all`, and NaN isn't inside.
         return np.count_nonzero(inside) == inside.size or self._keeps(~inside, bounds(limits))
 
@@ -121,15 +121,9 @@ def _roots(a: float, b: float, c: float) -> list[float]:
     return [over / under for over, under in ((stable, a), (c, stable)) if under]
 
 
-class _Box(NamedTuple):
-    """Limits with their tolerances, for each of `Cubics.points`."""
-
-    middle: Array
-    half: Array
-
-
 @lru_cache(maxsize=128)
-def _box(limits: Limits, m: int) -> _Box:
+def _box(limits: Limits, m: int) -> tuple[Array, Array]:
+    """Middle and half of the ranges that limits allow with their tolerances, for each of `Cubics.points`."""
     bound = bounds(limits)
     low, high = np.array(bound.lowest), np.array(bound.highest)
     qd, qdd, qddd = (rate * (1.0 + TOLERANCE) for rate in (limits.qd_max, limits.qdd_max, limits.qddd_max))
@@ -137,7 +131,7 @@ def _box(limits: Limits, m: int) -> _Box:
     half = np.array([q, qd, qdd, qddd, qd, q, q])
     middle = np.zeros_like(half)
     middle[[0, 5, 6]] = 0.5 * (low + high)
-    return _Box(*(np.repeat(rows[:, None], m + 1, axis=1) for rows in (middle, half)))
+    return np.repeat(middle[:, None], m + 1, axis=1), np.repeat(half[:, None], m + 1, axis=1)
 
 
 _idle: dict[tuple[int, int], list[tuple[Any, Any, Any]]] = {}

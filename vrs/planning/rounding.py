@@ -124,7 +124,7 @@ class Rounded:
     """Two plans, joined at a via."""
 
     first: Plan
-    second: Plan
+    """The first of them."""
     delta: float
     """How long they overlap [s]; 0 where they don't."""
     whole: Plan
@@ -146,7 +146,7 @@ def rounded(plans: Pair, deviation: float, model: RobotModel, limits: Limits, pr
         profile: Whether jerk limits bind.
     """
     first, second, notes = plans(limits)
-    stopping = Rounded(first, second, 0.0, first.then(second), notes)
+    stopping = Rounded(first, 0.0, first.then(second), notes)
     if deviation <= 0 or min(len(first), len(second)) == 0:
         return stopping
     best = _overlapped(first, second, deviation, model, limits, profile)
@@ -173,7 +173,7 @@ def _overlapped(
             return None
         away = _distance(whole, first.duration - delta, first.duration, via, model)
         notes = (Note(NoteCode.PASSES_VIA, (away,)),)
-        return Rounded(first, second, delta, whole, notes) if away <= deviation else None
+        return Rounded(first, delta, whole, notes) if away <= deviation else None
 
     longest = min(first.duration, second.duration)
     high = longest

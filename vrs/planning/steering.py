@@ -548,25 +548,21 @@ _STOP = 0.8
 _FOUR = np.arange(4.0)
 
 
-class Transient(NamedTuple):
-    """A motion that dies away: its acceleration runs straight between four knots."""
+def transient(dv: Array, da: Array, T: float) -> Array:
+    """Bring a rate dv and an acceleration da to nothing in T, with the least squared jerk.
 
-    duration: float
-    """[s]."""
-    a: Array
-    """Accelerations at the knots, the last one 0, (4, n)."""
-
-    def aside(self, dv: Array) -> Array:
-        """Where it ends, from where it began at the rate dv [rad], (n,)."""
-        h = self.duration / 3.0
-        return np.asarray(3.0 * h * dv + h * h * (self.a[0] * (4.0 / 3.0) + self.a[1] * 2.0 + self.a[2]))
-
-
-def transient(dv: Array, da: Array, T: float) -> Transient:
-    """Bring a rate dv and an acceleration da to nothing in T, with the least squared jerk."""
+    Returns:
+        Accelerations at four knots, the last one 0, (4, n); they run straight between them.
+    """
     half = -1.5 / T * dv - 0.25 * da
     bend = da / 6.0
-    return Transient(T, np.array([da, half + bend, half - bend, np.zeros_like(da)]))
+    return np.array([da, half + bend, half - bend, np.zeros_like(da)])
+
+
+def displacement(dv: Array, a: Array, T: float) -> Array:
+    """Where a transient ends, from where it began at the rate dv [rad], (n,)."""
+    h = T / 3.0
+    return np.asarray(3.0 * h * dv + h * h * (a[0] * (4.0 / 3.0) + a[1] * 2.0 + a[2]))
 
 
 def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
@@ -697,8 +693,9 @@ def along(
     s = float(state.qd @ onto_u)
     dv = state.qd - (goal if abs(s - goal) < _CLOSE else s) * u
     still = np.zeros_like(u)
-    rough = transient(dv, still, shortest(dv, still, limits, _BUDGETS[0][1]))
-    way = course(model, state.q, u, rough.aside(dv), twist, hold + _AHEAD, limits)
+    T = shortest(dv, still, limits, _BUDGETS[0][1])
+    aside = displacement(dv, transient(dv, still, T), T)
+    way = course(model, state.q, u, aside, twist, hold + _AHEAD, limits)
     bent = state.qdd - s * s * way.slope
     ds = float(bent @ onto_u)
     target = min(goal, float(way.caps[0]))
@@ -737,7 +734,7 @@ def _composed(state: State, way: TwistCourse, law: SpeedLaw, s: float, ds: float
     u = way.u + (1.0 - left * left) * way.offset + x * (way.slope + 0.5 * x * way.curve)
     du = (2.0 / T * left) * way.offset + v * (way.slope + x * way.curve)
     hats = np.maximum(1.0 - np.abs((3.0 / T) * t[:, None] - _FOUR), 0.0)
-    accelerations = a * u + v * du + hats @ beside.a
+    accelerations = a * u + v * du + hats @ beside
     accelerations[-1] = 0.0
     h = t[1:] - t[:-1]
     # What straight lines between the knots left over of the rate goes where the arm is about to stop.
@@ -768,17 +765,6 @@ _TRIED = 0.1
 """How far each joint is moved to see whether that leads away from a singularity [rad]."""
 
 
-class Steered(NamedTuple):
-    """What comes of a hand's input."""
-
-    plan: Plan
-    """Certified, ends at rest; empty where the arm stands and stays."""
-    notes: Notes
-    """What the user must know of it."""
-    hindrance: str
-    """What keeps the arm from going as asked, and what leads away from it; empty if nothing does."""
-
-
 def steer(
     state: State,
     rates: ArrayLike | None,
@@ -787,7 +773,7 @@ def steer(
     hold: float,
     model: RobotModel,
     limits: Limits,
-) -> Steered:
+) -> tuple[Plan, Notes, str]:
     """Plan what a hand asks for now, for as long as the input is fresh, and the stop after that.
 
     Args:
@@ -800,6 +786,10 @@ def steer(
         model: The arm.
         limits: Limits that hold at every instant.
 
+    Returns:
+        A certified plan that ends at rest, empty where the arm stands and stays; what the user must know of it;
+        what keeps the arm from going as asked, and what leads away from it, empty if nothing does.
+
     Raises:
         InvalidValueError: If not exactly one of rates and twist is given, or something is of the wrong form.
         PlanningError: If the state can't be brought to rest within the limits.
@@ -810,7 +800,7 @@ def steer(
         raise InvalidValueError("frame", frame, "base or tool")
     if rates is not None and twist is None:
         u = finite_array("rates", rates, (n,), f"finite joint rates [rad/s], shape ({n},)")
-        return Steered(*_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits))
+        return *_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits)
     if twist is None or rates is not None:
         raise InvalidValueError("rates and twist", (rates, twist), "one of the two, the other None")
     given = finite_array("twist", twist, (6,), "a finite twist (v [m/s], w [rad/s]), shape (6,)")
@@ -842,13 +832,15 @@ def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twis
     return Twist(v / scale_linear, w / scale, frame is Frame.TOOL)
 
 
-def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits) -> Steered:
+def _by_twist(
+    state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits
+) -> tuple[Plan, Notes, str]:
     J = weighted_jacobian(model, state.q[None])
     asked = np.concatenate([twist.linear, twist.angular])
     u = damped_rates(J, asked[None])[0][0]
     if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
         stuck = hold > 0.0 and bool(asked.any())
-        return Steered(*_released(state, J[0], hold, model, limits), _singular(state.q, model) if stuck else "")
+        return *_released(state, J[0], hold, model, limits), _singular(state.q, model) if stuck else ""
     low, high = rates_to_limits(state.q, limits)
     blocked = bool((u < low).any() or (u > high).any())
     plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
@@ -858,9 +850,9 @@ def _by_twist(state: State, twist: Twist, hold: float, model: RobotModel, limits
     if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
         hindrance = _singular(state.q, model)
     if plan is not None:
-        return Steered(plan, (), hindrance)
+        return plan, (), hindrance
     u = share * sliding_rates(J[0], asked, low, high)
-    return Steered(*_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance)
+    return *_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance
 
 
 def _at_limit(q: Array, u: Array, limits: Limits) -> str:

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.media import Aloud, Presenter, SpeechConfig, SpeechError
+from interfaces.media import Aloud, Presenter, SpeechError
 from interfaces.media.coding import LEAD, SILENCE, SOUND_PERIOD, VoicePlayout, encode_sound
 from interfaces.media.presenter import MOST_WAITING
 from interfaces.media.speech import LONGEST, cleaned, reading_time, samples_of, shortened, spoken
@@ -47,12 +47,6 @@ def test_a_text_is_printable_or_refused(text: str) -> None:
 def test_what_cannot_be_said_is_refused(text: str) -> None:
     with pytest.raises(InvalidValueError, match="1 to 300 characters"):
         cleaned(text)
-
-
-@pytest.mark.parametrize("given", [{"language": "-x"}, {"language": "en; ls"}, {"pace": 10}, {"pitch": 200}])
-def test_a_voice_keeps_its_bounds(given: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValueError):
-        SpeechConfig(**given)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +90,7 @@ def levels(packets: list[bytes]) -> list[float]:
 @needs_program
 def test_words_become_sound_as_long_as_they_take_and_options_are_words() -> None:
     async def said(text: str) -> tuple[np.ndarray[Any, np.dtype[np.int16]], int]:
-        return await spoken(text, SpeechConfig())
+        return await spoken(text)
 
     short, rate = asyncio.run(said("Hello!"))
     long, _ = asyncio.run(said("--version -f /etc/passwd, please put the book on my top side!"))
@@ -118,10 +112,10 @@ def test_a_program_that_fails_or_hangs_says_so(tmp_path: Path, monkeypatch: pyte
         program.chmod(0o755)
         monkeypatch.setattr("interfaces.media.speech.program", lambda: str(program))
         with pytest.raises(SpeechError, match=words):
-            asyncio.run(spoken("Hello!", SpeechConfig()))
+            asyncio.run(spoken("Hello!"))
     monkeypatch.setattr("interfaces.media.speech.program", lambda: None)
     with pytest.raises(SpeechError, match="isn't installed"):
-        asyncio.run(spoken("Hello!", SpeechConfig()))
+        asyncio.run(spoken("Hello!"))
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.integers(1, 80)), min_size=1, max_size=6))
@@ -253,7 +247,7 @@ def test_a_loudspeaker_on_board_is_done_when_its_words_are(monkeypatch: pytest.M
         assert aloud.is_speaking(now=1e6)
         while aloud.until == math.inf:
             await asyncio.sleep(0.005)
-        samples, rate = await spoken("Hello!", SpeechConfig())
+        samples, rate = await spoken("Hello!")
         assert aloud.is_speaking(now=4.9 + len(samples) / rate)
         assert not aloud.is_speaking(now=5.1 + len(samples) / rate)
         aloud.speak("Hello!", now=5.0)

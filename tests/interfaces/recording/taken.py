@@ -19,10 +19,10 @@ from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.system import software
 from interfaces.teleop import OperatorSite
 from robots import puma560
+from tests.vrs.sessions import Draws, Generator
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 from vrs.errors import VrsError
 from vrs.model import frozen_array
-from vrs.testing import Draws, Generator
 
 MODEL = puma560.model()
 NOMINAL = MODEL.poses["nominal"]

@@ -13,6 +13,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from tests.vrs.watch import Watch
 from vrs.clock import ManualClock
 from vrs.commands import (
     Cancel,
@@ -39,11 +40,10 @@ from vrs.engine import Engine
 from vrs.errors import VrsError
 from vrs.ledger import Receipt
 from vrs.model import Array, RobotModel, frozen_array
-from vrs.testing.laws import Columns, Figures, LawBrokenError, check_run, check_same, columns
-from vrs.testing.watch import Watch
+from vrs.testing import Columns, Figures, LawBrokenError, check_run, check_same, columns
 from vrs.timeline import Timeline
 
-_Item = TypeVar("_Item")
+Item = TypeVar("Item")
 
 KINDS = {
     "move": 34, "steer": 15, "retime": 12, "cancel": 8, "via": 8, "scale": 5, "stop": 5, "resume": 2, "undo": 7,
@@ -97,7 +97,7 @@ class Draws:
         self._last = 0.0
         self._before = ""
 
-    def one_of(self, *items: _Item) -> _Item:
+    def one_of(self, *items: Item) -> Item:
         """One of some things."""
         return items[self._source.pick(len(items))]
 

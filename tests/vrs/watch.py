@@ -35,7 +35,7 @@ from vrs.errors import VrsError
 from vrs.ledger import Receipt, Status
 from vrs.notes import NoteCode, is_rough
 from vrs.segment import HOLD
-from vrs.testing.laws import (
+from vrs.testing import (
     Columns,
     Figures,
     LawBrokenError,
