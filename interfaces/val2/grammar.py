@@ -8,18 +8,16 @@ from functools import cache
 from importlib import resources
 from typing import Any, Final, TypeAlias
 
-from interfaces.val2 import forms
+from interfaces.val2 import forms, functions
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import Form, nearest
+from interfaces.val2.rows import Form, nearest
 from interfaces.val2.syntax import (
     Apply,
-    Binary,
     Compound,
     Expression,
     Format,
     Number,
     Text,
-    Unary,
     Variable,
 )
 
@@ -185,7 +183,8 @@ class _OperatorRow:
             if own < level:
                 break
             self._next += 1
-            left = Binary(operator, left, self.expression(own + 1), TextPosition(self._line, token.column))
+            at = TextPosition(self._line, token.column)
+            left = Apply(operator, (left, self.expression(own + 1)), at)
         return left
 
     def _operand(self, level: int) -> Expression:
@@ -193,10 +192,11 @@ class _OperatorRow:
         self._next += 1
         if getattr(node, "type", "") not in _PREFIXES:
             return expression(node, self._line, self._depth)
-        operand = self.expression(max(level, forms.LEVEL_OF_NOT if node.type == "NOT" else forms.LEVEL_OF_SIGN))
+        row = functions.NEGATION if node.type == "PLUS" else functions.row_of(Apply(node.upper(), (None,)))
+        operand = self.expression(max(level, row.level))
         if node.type == "PLUS":
             return operand
-        return Unary(node.upper(), operand, TextPosition(self._line, node.column))
+        return Apply(node.upper(), (operand,), TextPosition(self._line, node.column))
 
 
 def _compound(children: list[Node], line: int, depth: int) -> Expression:

@@ -9,8 +9,8 @@ from typing import Final, TypeAlias, TypeVar
 
 from interfaces.val2 import forms, grammar, statements
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import nearest
 from interfaces.val2.printer import print_step
+from interfaces.val2.rows import nearest
 from interfaces.val2.statements import HIGHEST_LABEL, OperandText
 from interfaces.val2.syntax import (
     BLANK,

@@ -15,7 +15,6 @@ from typing import Final
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import nearest_word
 from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import (
     Reading,
@@ -28,8 +27,9 @@ from interfaces.val2.parser import (
     whole,
 )
 from interfaces.val2.printer import number, print_expression, print_program
+from interfaces.val2.rows import nearest_word
 from interfaces.val2.signals import SignalRule
-from interfaces.val2.syntax import Apply, Binary, Expression, Number, Program, Text, Variable
+from interfaces.val2.syntax import Apply, Expression, Number, Program, Text, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, from_oat, to_oat
 
 DECIMALS: Final = 9
@@ -224,8 +224,8 @@ def _constant(expression: Expression) -> str:
             return value
         case Apply("$CHR", (Number(code),)) if code.is_integer() and 0 <= code <= 0x10FFFF:
             return chr(int(code))
-        case Binary("+", left, right):
-            return _constant(left) + _constant(right)
+        case Apply("+", (left, right)):
+            return _constant(left) + _constant(right)  # type: ignore[arg-type]
     raise ValError("Syntax error", "allowed: strings and $CHR(code) with + between them", place=expression.at)
 
 

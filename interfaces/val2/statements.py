@@ -9,8 +9,9 @@ from typing import Any, Final
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import MISSING, TOO_MANY, Form, nearest
+from interfaces.val2.functions import row_of
 from interfaces.val2.grammar import Node, Worded
+from interfaces.val2.rows import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.syntax import (
     Apply,
     Compound,
@@ -20,8 +21,8 @@ from interfaces.val2.syntax import (
     Number,
     Statement,
     Text,
-    Unary,
     Variable,
+    literal,
 )
 
 HIGHEST_LABEL: Final = 65535
@@ -89,7 +90,7 @@ class OperandText:
             at = TextPosition(self.line, plain.start(2) + found.start() + 1)
             if found[1]:
                 magnitude = Number(float(found[2]), TextPosition(self.line, at.column + 1))
-                arguments.append(Unary("-", magnitude, at))
+                arguments.append(Apply("-", (magnitude,), at))
             else:
                 arguments.append(Number(float(found[2]), at))
         if row is None or len(arguments) != len(row.slots):
@@ -262,7 +263,7 @@ def assignment(rest: OperandText) -> Statement:
 
 def _is_location(value: Expression) -> bool:
     if isinstance(value, Apply):
-        return forms.FUNCTIONS[value.function].gives in ("frame", "location")
+        return row_of(value).gives in ("frame", "location")
     return isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
 
 
@@ -289,11 +290,13 @@ def _open_channel(row: Form, rest: OperandText) -> None:
 
 def _channel_wait(condition: Expression | None) -> Expression | None:
     """`WAIT 3` and `WAIT -3` of VAL wait for an input."""
-    inner = condition.operand if isinstance(condition, Unary) and condition.operator == "-" else condition
-    if not isinstance(inner, Number) or not inner.value.is_integer() or inner.value < 1:
+    value = literal(condition)
+    if value is None or condition is None or not value.is_integer() or abs(value) < 1:
         return condition
+    inner = condition.arguments[0] if isinstance(condition, Apply) else condition
+    assert isinstance(inner, Number)
     channel = Number(inner.value + 1000 if inner.value <= 32 else inner.value, inner.at)
-    signed = channel if inner is condition else Unary("-", channel, inner.at)
+    signed = channel if inner is condition else Apply("-", (channel,), inner.at)
     return Apply("SIG", (signed,), inner.at)
 
 
