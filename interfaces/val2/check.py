@@ -161,9 +161,9 @@ class _Checker:
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
-        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement, read)]
+        errors = [*self._calls(statement), *_set_parameter(statement)]
         for expression, asked in read:
-            errors += mistakes(expression, asked, known)
+            errors += [*_misused(expression, asked), *mistakes(expression, asked, known)]
         match statement:
             case Instruction("FOR", (variable, *_)) if variable.prefix:
                 errors.append(mismatch(variable))
@@ -245,67 +245,22 @@ def _passed(argument: Expression, parameter: Variable) -> Iterator[ValError]:
         yield ValError("Mixed types", f"an argument for {parameter.name}", place=argument.at)
 
 
-_RANGES: Final[dict[tuple[str, int], tuple[float, float, str]]] = {
-    ("DRIVE", 0): (1, 6, "a joint, 1 to 6"),
-    ("DELAY", 0): (0, 1e6, "seconds, not negative"),
-    ("DURATION", 0): (0, 1e6, "seconds, not negative"),
-    ("WAIT.EVENT", 1): (0, 1e6, "seconds, not negative"),
-    ("SPEED", 0): (1e-3, 1e6, "a speed above 0"),
-    ("AT", 0): (0, 1e9, "seconds, not negative"),
-    ("ALTER", 1): (0, 3, "a mode, 0 to 3"),
-    ("ALTON", 1): (0, 3, "a mode, 0 to 3"),
-    ("TIMER", 0): (TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
-}
-
-
-def _numbers(statement: Statement) -> Iterator[ValError]:
-    """Numbers that are written down and can't be."""
-    if not isinstance(statement, Instruction):
-        return
-    for i, operand in enumerate(statement.operands):
-        value = literal(operand)
-        if value is None or operand is None:
-            continue
-        low, high, allowed = _RANGES.get((statement.keyword, i), (-1e300, 1e300, ""))
-        if not low <= value <= high:
-            yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
-        if statement.keyword == "PARAMETER":
-            row = forms.PARAMETERS[statement.words[0]]
+def _set_parameter(statement: Statement) -> Iterator[ValError]:
+    """A number that a parameter can't be."""
+    match statement:
+        case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
+            row = forms.PARAMETERS[name]
             if not row.low <= value <= row.high:
                 allowed = f"{row.low:g} to {row.high:g} {row.unit}"
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
-def _signals(statement: Statement, reads: list[tuple[Expression, Kind]]) -> Iterator[ValError]:
-    """Signals that are written down and that there aren't."""
-    named: list[tuple[Expression | Format | None, Callable[[float], int]]] = []
-    match statement:
-        case Instruction("SIGNAL", operands):
-            named += [(operand, settable) for operand in operands]
-        case Instruction("IGNORE" | "REACT" | "REACTI", operands):
-            named += [(operand, legal) for operand in operands]
-    for expression, _ in reads:
-        for part in parts(expression):
-            if isinstance(part, Apply) and part.function == "SIG":
-                named += [(argument, legal) for argument in part.arguments]
-    for number, check_number in named:
-        value = literal(number)
-        if value is None or isinstance(number, Format) or number is None:
-            continue
-        try:
-            check_number(value)
-        except ValError as error:
-            yield error.at(place=number.at)
-
-
 def _capped(statement: Statement) -> Iterator[ValError]:
     """Shares that are written down and count as less."""
-    if not isinstance(statement, Instruction) or statement.keyword not in ("SPEED", "DRIVE", "ACCEL"):
-        return
-    for i, operand in enumerate(statement.operands):
+    shares = ("percent",) if {"MMPS", "IPS"} & set(getattr(statement, "words", ())) else ("percent", "speed")
+    for operand, kind in _operands(statement):
         value = literal(operand)
-        percent = i == 2 if statement.keyword == "DRIVE" else i or not {"MMPS", "IPS"} & set(statement.words)
-        if operand is not None and value is not None and value > MOST_PERCENT and percent:
+        if kind in shares and value is not None and value > MOST_PERCENT:
             detail = f"{statement.keyword} {value:.9g} % counts as {MOST_PERCENT:g} %"
             yield ValError("Value out of range", detail, place=operand.at)
 
@@ -391,19 +346,48 @@ def wanted(expression: Expression) -> Iterator[tuple[Expression, Kind]]:
 
 
 _SHOWN: Final[Mapping[str, str]] = {
-    "real": "a number", "condition": "a number", "string": "a string", "frame": "a transformation",
+    "real": "a number", "string": "a string", "frame": "a transformation",
     "location": "a location", "point": "a precision point",
 }  # fmt: skip
 _FITS: Final[Mapping[str, tuple[str, ...]]] = {
-    "real": ("real",),
-    "condition": ("real",),
-    "string": ("string",),
-    "frame": ("frame",),
-    "point": ("point",),
-    "location": ("frame", "point", "location"),
+    "string": ("string",), "frame": ("frame",), "point": ("point",), "location": ("frame", "point", "location"),
+}  # fmt: skip
+_UNTOLD: Final = ("any", "alike", "variable", "array", "name", "label", "program", "text")
+"""What may be of any kind, or is told elsewhere."""
+
+
+def _range(low: float, high: float, allowed: str) -> Callable[[float], None]:
+    def require_valid(value: float) -> None:
+        if not low <= value <= high:
+            raise ValError("Value out of range", f"allowed: {allowed}")
+
+    return require_valid
+
+
+_CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
+    "signal": legal,
+    "output": settable,
+    "joint": _range(1, 6, "a joint, 1 to 6"),
+    "seconds": _range(0, 1e6, "seconds, not negative"),
+    "time": _range(0, 1e9, "seconds, not negative"),
+    "speed": _range(1e-3, 1e6, "a speed above 0"),
+    "mode": _range(0, 3, "a mode, 0 to 3"),
+    "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
 }
+"""What numbers that are written down have to be."""
 _STANDING: Final = ("HERE", "DEST")
 """Functions that give joints where a precision point is wanted."""
+
+
+def _misused(expression: Expression, asked: Kind) -> Iterator[ValError]:
+    """What is wrong with the numbers that are written down."""
+    if (value := literal(expression)) is not None and asked in _CHECKS:
+        try:
+            _CHECKS[asked](value)
+        except ValError as error:
+            yield error.at(place=expression.at)
+    for part, kind in wanted(expression):
+        yield from _misused(part, kind)
 
 
 def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
@@ -417,8 +401,9 @@ def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> I
     kind = kind_of(expression, known)
     if asked == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
         kind = "point"
-    if kind and asked in _FITS and kind not in _FITS[asked]:
-        yield ValError("Mixed types", f"{_SHOWN[kind]} where {_SHOWN[asked]} is wanted", place=expression.at)
+    if kind and asked not in _UNTOLD and kind not in _FITS.get(asked, ("real",)):
+        detail = f"{_SHOWN[kind]} where {_SHOWN.get(asked, _SHOWN['real'])} is wanted"
+        yield ValError("Mixed types", detail, place=expression.at)
         return
     if isinstance(expression, Apply) and row_of(expression).alike:
         yield from _alike(expression, known)

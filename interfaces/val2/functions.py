@@ -199,7 +199,7 @@ _REAL_FUNCTIONS: Final = (
          lambda text, part, first: float(text.find(part, max(0, whole(first) - 1)) + 1)),
     Form("RANDOM", "-> real", "A random number from 0 to 1.", "V+", lambda c: c.rng.random(),
          tags="constant context"),
-    Form("SIG", "number* -> truth", "Whether all these signals are on, or off where negative.", "VAL-II",
+    Form("SIG", "number:signal* -> truth", "Whether all these signals are on, or off where negative.", "VAL-II",
          lambda c, *numbers: all(c.signals.on(n) for n in numbers), tags="context"),
     Form("SIGN", "x -> real", "-1 or 1.", "VAL-II", lambda x: 1.0 if x >= 0.0 else -1.0),
     Form("SIN", "angle -> real", "Sine of an angle [deg].", "VAL-II", sine),

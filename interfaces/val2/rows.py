@@ -14,11 +14,12 @@ from typing import Any, Final, Literal, TypeAlias
 from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
-    "real", "condition", "string", "alike", "location", "frame", "point", "any", "label", "program", "variable",
-    "array", "name", "text",
+    "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "signal", "output",
+    "string", "alike", "location", "frame", "point", "any", "label", "program", "variable", "array", "name", "text",
 ]  # fmt: skip
 """What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
-what isn't read, and operands that are `alike` are numbers or strings, all of them."""
+what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are
+numbers."""
 Origin: TypeAlias = Literal["VAL", "VAL-II", "V+", "ours"]
 """Where a word is known from; VAL-II took over what VAL has, and V+ what VAL-II has."""
 
