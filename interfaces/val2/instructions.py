@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from typing import Any, Final, Protocol, TypeAlias, TypeVar
+from functools import partial
+from typing import Any, Final, Protocol, TypeAlias
 
 from interfaces.val2 import formats
 from interfaces.val2.context import (
@@ -54,13 +55,10 @@ from interfaces.val2.syntax import (
 )
 from interfaces.val2.values import NULL, Location, Transformation, about_z, to_oat
 
+Do: TypeAlias = Callable[..., object]
+"""Does what an instruction wants, of the context, the instruction, and the values of its operands."""
 Ask: TypeAlias = Callable[[], object]
-"""Asks for what an instruction wants; its operands have been evaluated."""
-Preparation: TypeAlias = Callable[..., Ask]
-"""Of the context, the instruction, and the values of its operands: what asks."""
-
-
-_Asked = TypeVar("_Asked", Ask, Ask | None)
+"""Does it with operands that have been evaluated."""
 
 
 class ProgramCompiler(Expressions):
@@ -92,13 +90,20 @@ class ProgramCompiler(Expressions):
         """Number of the slot in which the FOR at a step keeps its limits."""
         return self.kept.setdefault(n, self.names + len(self.kept))
 
-    def prepared(self, i: Instruction, make: Callable[..., _Asked]) -> Callable[[Slots], _Asked]:
-        """What evaluates an instruction's operands, and gives what then asks."""
+    def prepared(self, i: Instruction, do: Do, check: Do | None = None) -> Callable[[Slots], Ask]:
+        """What evaluates an instruction's operands, and checks them, and gives what then does it."""
         slots, c = STATEMENTS[i.keyword].slots, self.context
         if i.keyword == "BASE" and stands_for_frame(i):
             slots = (OperandSlot("transformation", "frame"),)
         values = self.operands(slots, i.operands, i.keyword, i.at)
-        return lambda s: make(c, i, *[value(s) for value in values])
+
+        def prepare(s: Slots) -> Ask:
+            given = [value(s) for value in values]
+            if check is not None:
+                check(c, i, *given)
+            return lambda: do(c, i, *given)
+
+        return prepare
 
     def special(self, action: Callable[[Slots], Action]) -> StepFunction:
         """A step that wants something done."""
@@ -125,111 +130,90 @@ def stands_for_frame(i: Instruction) -> bool:
     return len(i.operands) == 1
 
 
-# Motions.
+# What is done, of values.
 
 
-def _move(c: Context, i: Instruction, location: Location, hand: float | None = None) -> Ask:
+def _move(c: Context, i: Instruction, location: Location, hand: float | None = None) -> None:
     """MOVET's opening [mm] is over 0; TRUE opens, 0 closes."""
     opening = hand if hand is None or hand > 0.0 else hand != 0.0
-    straight = i.keyword in ("MOVES", "MOVEST")
-    return lambda: c.arm.move(location, straight=straight, hand=opening, now=c.now)
+    c.arm.move(location, straight=i.keyword in ("MOVES", "MOVEST"), hand=opening, now=c.now)
 
 
-def _approach(c: Context, i: Instruction, location: Location, height: float) -> Ask:
-    return lambda: c.arm.approach(location, height, straight=i.keyword == "APPROS", now=c.now)
+def _approach(c: Context, i: Instruction, location: Location, height: float) -> None:
+    c.arm.approach(location, height, straight=i.keyword == "APPROS", now=c.now)
 
 
-def _depart(c: Context, i: Instruction, distance: float) -> Ask:
-    return lambda: c.arm.depart(distance, straight=i.keyword == "DEPARTS", now=c.now)
+def _depart(c: Context, i: Instruction, distance: float) -> None:
+    c.arm.depart(distance, straight=i.keyword == "DEPARTS", now=c.now)
 
 
-def _drive(c: Context, _: Instruction, joint: float, angle: float, percent: float) -> Ask:
+def _check_drive(c: Context, _: Instruction, joint: float, _angle: float, percent: float) -> None:
     if joint not in range(1, 7):
         raise ValError("Illegal joint number", f"{joint:.9g}: 1 to 6")
     c.capped("DRIVE at", percent)
-    return lambda: c.arm.drive(int(joint), angle, percent, now=c.now)
 
 
-def _speed(c: Context, i: Instruction, speed: float, turn: float | None) -> Ask:
+def _speed(c: Context, i: Instruction, speed: float, turn: float | None) -> None:
     c.capped("SPEED of turning", turn or 0.0)
     if "MONITOR" in i.words:
         c.capped("Monitor SPEED", speed)
-        return lambda: c.arm.set_monitor_speed(speed, now=c.now)
+        c.arm.set_monitor_speed(speed, now=c.now)
+        return
     unit = next((u for u in ("MMPS", "IPS") if u in i.words), "%")
     c.capped("SPEED", speed, c.arm.fastest(unit), unit)
-    return lambda: c.arm.set_speed(speed, turn=turn, unit=unit, always=_always(i))
+    c.arm.set_speed(speed, turn=turn, unit=unit, always=_always(i))
 
 
 def _always(i: Instruction) -> bool:
     return "ALWAYS" in i.words
 
 
-def _accelerate(c: Context, _: Instruction, up: float, down: float | None) -> Ask:
+def _accelerate(c: Context, _: Instruction, up: float, down: float | None) -> None:
     values = up, up if down is None else down
     c.capped("ACCEL", max(values))
-    return lambda: c.arm.set_acceleration(*values)
+    c.arm.set_acceleration(*values)
 
 
-def _tolerance(c: Context, i: Instruction, percent: float | None) -> Ask:
-    return lambda: c.arm.set_tolerance(percent, fine=i.keyword == "FINE", always=_always(i))
+def _tolerance(c: Context, i: Instruction, percent: float | None) -> None:
+    c.arm.set_tolerance(percent, fine=i.keyword == "FINE", always=_always(i))
 
 
-def _configure(c: Context, i: Instruction) -> Ask:
-    def ask() -> None:
-        c.arm.set_configuration(i.keyword)
-        c.stop_first = True
-
-    return ask
+def _configure(c: Context, i: Instruction) -> None:
+    c.arm.set_configuration(i.keyword)
+    c.stop_first = True
 
 
-def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> Ask:
-    index = c.timer(number)
-
-    def ask() -> None:
-        c.timers[index] = c.now - seconds
-
-    return ask
+def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> None:
+    c.timers[c.timer(number)] = c.now - seconds
 
 
-def _switch(c: Context, i: Instruction) -> Ask:
-    def ask() -> None:
-        for name in i.words:
-            c.switch(name, i.keyword == "ENABLE")
-
-    return ask
+def _switch(c: Context, i: Instruction) -> None:
+    for name in i.words:
+        c.switch(name, i.keyword == "ENABLE")
 
 
-def _alter(c: Context, i: Instruction, _channel: float, mode: float, *correction: float) -> Ask:
+def _alter(c: Context, i: Instruction, _channel: float, mode: float, *correction: float) -> None:
     """ALTER; what is given behind the mode is the first correction."""
-    bits, corrects = whole(mode), any(operand is not None for operand in i.operands[2:])
-
-    def ask() -> None:
-        c.arm.set_alter(bits, now=c.now)
-        if corrects:
-            _correct(c, i, *correction)()
-
-    return ask
+    c.arm.set_alter(whole(mode), now=c.now)
+    if any(operand is not None for operand in i.operands[2:]):
+        _correct(c, i, *correction)
 
 
-def _correct(c: Context, _: Instruction, *values: float) -> Ask:
-    def ask() -> None:
-        c.powered()
-        c.arm.alter(values, now=c.now)
-
-    return ask
+def _correct(c: Context, _: Instruction, *values: float) -> None:
+    c.powered()
+    c.arm.alter(values, now=c.now)
 
 
-def _unalter(c: Context, _: Instruction) -> Ask:
-    return lambda: c.arm.set_alter(None, now=c.now)
+def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> None:
+    if not isinstance(first, Transformation):
+        *way, turn = others
+        X = about_z(turn).X.copy()
+        X[:3, 3] = first, *way
+        first = Transformation(X)
+    c.arm.set_base(first)
 
 
-def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> Ask:
-    if isinstance(first, Transformation):
-        return lambda: c.arm.set_base(first)
-    *way, turn = others
-    X = about_z(turn).X.copy()
-    X[:3, 3] = first, *way
-    return lambda: c.arm.set_base(Transformation(X))
+# How it's waited for.
 
 
 Pause: TypeAlias = Generator[float, None, None]
@@ -270,12 +254,11 @@ def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None
             return following
 
 
-def _standing(context: Context, ask: Ask | None, following: Any) -> Generator[float, None, Any]:
+def _standing(context: Context, ask: Ask, following: Any) -> Generator[float, None, Any]:
     """Wait for the arm to stand, ask, and wait again."""
     yield from until(context, context.arm.settled)
-    if ask is not None:
-        ask()
-        yield from until(context, context.arm.settled)
+    ask()
+    yield from until(context, context.arm.settled)
     return following
 
 
@@ -318,37 +301,47 @@ def _timed(c: Context, time: Callable[[Slots], float], prepare: Callable[[Slots]
     return timed
 
 
-def _motion(make: Preparation) -> Act:
-    """What is asked for as a motion."""
+def _nothing(_c: Context, _i: Instruction) -> None:
+    """Wait alone."""
+
+
+def _asked(
+    wait: Callable[[Context, Ask, Any], Generator[float, None, Any]], do: Do, check: Do | None = None
+) -> Act:
+    """What is asked for, and waited for."""
 
     def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        c, prepare = x.context, x.prepared(i, make)
+        c, prepare = x.context, x.prepared(i, do, check)
         asks = prepare if i.begins is None else _timed(c, x.of_kind("real", i.begins), prepare)
-        return x.special(lambda s: Waiting(_moving(c, asks(s), n + 1)))
+        return x.special(lambda s: Waiting(wait(c, asks(s), n + 1)))
 
     return act
 
 
-def _now(make: Preparation) -> Act:
+_motion: Final = partial(_asked, _moving)
+_at_rest: Final = partial(_asked, _standing)
+
+
+def _now(do: Do) -> Act:
     """What is done at once, and takes no time."""
 
     def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        prepare = x.prepared(i, make)
+        prepare = x.prepared(i, do)
 
-        def do(s: Slots) -> int:
+        def done(s: Slots) -> int:
             prepare(s)()
             return n + 1
 
-        return x.special(do)
+        return x.special(done)
 
     return act
 
 
-def _alteration(make: Preparation) -> Act:
+def _alteration(do: Do) -> Act:
     """What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
 
     def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        prepare, ends = x.prepared(i, make), i.keyword != "ALTOUT" and len(i.operands) <= 2
+        prepare, ends = x.prepared(i, do), i.keyword != "ALTOUT" and len(i.operands) <= 2
 
         def alter(s: Slots) -> Waiting:
             ask = prepare(s)
@@ -360,19 +353,9 @@ def _alteration(make: Preparation) -> Act:
     return act
 
 
-def _at_rest(make: Callable[..., Ask | None]) -> Act:
-    """What is done when the arm stands."""
-
-    def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        prepare = x.prepared(i, make)
-        return x.special(lambda s: Waiting(_standing(x.context, prepare(s), n + 1)))
-
-    return act
-
-
 def _ending(end: Callable[[Instruction, int], Finished | Suspend]) -> Act:
     """What ends or pauses a program when the arm stands."""
-    return lambda x, i, n: x.special(lambda _: Waiting(_standing(x.context, None, end(i, n))))
+    return lambda x, i, n: x.special(lambda _: Waiting(_standing(x.context, lambda: None, end(i, n))))
 
 
 def _here(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -716,28 +699,29 @@ _MOTION: Final = (
     Form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL",
          _motion(_move)),
     Form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL", _motion(_move)),
-    Form("APPRO", "location:location, distance",
-         "Move to a distance [mm] behind a location, along its tool axis.", "VAL", _motion(_approach)),
+    Form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
+         "VAL", _motion(_approach)),
     Form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL", _motion(_approach)),
     Form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.", "VAL",
          _motion(_depart)),
     Form("DEPARTS", "distance", "DEPART on a straight line.", "VAL", _motion(_depart)),
     Form("DRIVE", "joint:joint, change, speed:percent", "Turn one joint by a change [deg] at a speed [%].", "VAL",
-         _motion(_drive)),
+         _motion(lambda c, _, joint, *how: c.arm.drive(int(joint), *how, now=c.now), _check_drive)),
     Form("DRAW", "dx?=0, dy?=0, dz?=0", "Move straight by a way in world axes [mm].", "VAL",
-         _motion(lambda c, _, *way: lambda: c.arm.draw(*way, now=c.now))),
+         _motion(lambda c, _, *way: c.arm.draw(*way, now=c.now))),
     Form("READY", "", "Move to the ready position: the arm straight up.", "VAL",
-         _motion(lambda c, _: lambda: c.arm.go_ready(now=c.now))),
+         _motion(lambda c, _: c.arm.go_ready(now=c.now))),
     Form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II",
-         _motion(lambda c, _: lambda: c.arm.nest(now=c.now))),
+         _motion(lambda c, _: c.arm.nest(now=c.now))),
     Form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL",
-         _motion(lambda c, _: lambda: c.arm.align(now=c.now))),
+         _motion(lambda c, _: c.arm.align(now=c.now))),
     Form("DELAY", "seconds:seconds", "Stand still for a time, as a motion.", "VAL",
-         _motion(lambda c, _, seconds: lambda: c.arm.delay(seconds, now=c.now))),
-    Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", _at_rest(lambda _c, _i: None)),
-    Form("BRAKE", "", "Stop the present motion at once.", "V+", _at_rest(lambda c, _: c.arm.brake(now=c.now))),
+         _motion(lambda c, _, seconds: c.arm.delay(seconds, now=c.now))),
+    Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", _at_rest(_nothing)),
+    Form("BRAKE", "", "Stop the present motion at once.", "V+",
+         _at_rest(_nothing, lambda c, _: c.arm.brake(now=c.now))),
     Form("AT", "time:time", "The next motion begins at a time of the session [s].", "ours",
-         _now(lambda c, _, t: lambda: c.arm.at(t)), usage="AT time [motion]"),
+         _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]"),
 )  # fmt: skip
 
 _SETTINGS: Final = (
@@ -746,15 +730,15 @@ _SETTINGS: Final = (
          words="MMPS|IPS|MONITOR ALWAYS", tags="beside"),
     Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _now(_accelerate)),
     Form("DURATION", "seconds:seconds", "Shortest time of the next motion; ALWAYS: each.", "V+",
-         _now(lambda c, i, t: lambda: c.arm.set_duration(t, always=_always(i))), words="ALWAYS"),
+         _now(lambda c, i, t: c.arm.set_duration(t, always=_always(i))), words="ALWAYS"),
     Form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", _now(_tolerance),
          words="ALWAYS"),
     Form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", _now(_tolerance),
          words="ALWAYS"),
     Form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL",
-         _now(lambda c, i: lambda: c.arm.set_nulling(True, always=_always(i))), words="ALWAYS"),
+         _now(lambda c, i: c.arm.set_nulling(True, always=_always(i))), words="ALWAYS"),
     Form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL",
-         _now(lambda c, i: lambda: c.arm.set_nulling(False, always=_always(i))), words="ALWAYS"),
+         _now(lambda c, i: c.arm.set_nulling(False, always=_always(i))), words="ALWAYS"),
     Form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", _now(_configure)),
     Form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", _now(_configure)),
     Form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", _now(_configure)),
@@ -762,40 +746,38 @@ _SETTINGS: Final = (
     Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", _now(_configure)),
     Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", _now(_configure)),
     Form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
-         _at_rest(lambda c, _, tool: lambda: c.arm.set_tool(NULL if tool is None else tool))),
+         _at_rest(lambda c, _, tool: c.arm.set_tool(NULL if tool is None else tool))),
     Form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
          "Where the robot stands in the world: shifted [mm], turned about z [deg].", "VAL", _at_rest(_base)),
     Form("ENABLE", "", "Turn switches on.", "VAL", _now(_switch), usage="ENABLE switch, ..", tags="beside"),
     Form("DISABLE", "", "Turn switches off.", "VAL", _now(_switch), usage="DISABLE switch, ..", tags="beside"),
     Form("PARAMETER", "value", "Set a parameter.", "VAL-II",
-         _now(lambda c, i, value: lambda: c.parameter(i.words[0], value)), usage="PARAMETER name = value",
-         tags="beside"),
+         _now(lambda c, i, value: c.parameter(i.words[0], value)), usage="PARAMETER name = value", tags="beside"),
     Form("ALTER", "channel?=0, mode:mode?=0, dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
          "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", _alteration(_alter),
          usage="ALTER (channel) mode", tags="beside"),
     Form("ALTOUT", "dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
          "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II",
          _alteration(_correct), tags="beside"),
-    Form("NOALTER", "", "Corrections of the path end.", "VAL-II", _alteration(_unalter), tags="beside"),
+    Form("NOALTER", "", "Corrections of the path end.", "VAL-II",
+         _alteration(lambda c, _: c.arm.set_alter(None, now=c.now)), tags="beside"),
     Form("ALTON", "channel?=0, mode:mode?=0", "As ALTER.", "V+", _alteration(_alter), usage="ALTON (channel) mode"),
-    Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(_unalter)),
+    Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
 )  # fmt: skip
 
 _HAND: Final = (
-    Form("OPEN", "", "Open the hand with the next motion.", "VAL",
-         _now(lambda c, _: lambda: c.arm.set_hand(True))),
-    Form("CLOSE", "", "Close the hand with the next motion.", "VAL",
-         _now(lambda c, _: lambda: c.arm.set_hand(False))),
+    Form("OPEN", "", "Open the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(True))),
+    Form("CLOSE", "", "Close the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(False))),
     Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL",
-         _now(lambda c, _: lambda: c.arm.set_hand(None))),
+         _now(lambda c, _: c.arm.set_hand(None))),
     Form("OPENI", "", "Open the hand now, where the arm stands.", "VAL",
-         _at_rest(lambda c, _: lambda: c.arm.actuate(True, now=c.now))),
+         _at_rest(lambda c, _: c.arm.actuate(True, now=c.now))),
     Form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL",
-         _at_rest(lambda c, _: lambda: c.arm.actuate(False, now=c.now))),
+         _at_rest(lambda c, _: c.arm.actuate(False, now=c.now))),
     Form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL",
-         _at_rest(lambda c, _: lambda: c.arm.actuate(None, now=c.now))),
-    Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].",
-         "VAL", _grasp),
+         _at_rest(lambda c, _: c.arm.actuate(None, now=c.now))),
+    Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
+         _grasp),
 )  # fmt: skip
 
 _LOCATIONS: Final = (
@@ -811,8 +793,8 @@ _LOCATIONS: Final = (
 
 _SIGNALS: Final = (
     Form("SIGNAL", "number:output*", "Turn outputs on, or off where negative.", "VAL",
-         _now(lambda c, _, *numbers: lambda: c.signals.set(numbers)), tags="beside"),
-    Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset), tags="beside"),
+         _now(lambda c, _, *numbers: c.signals.set(numbers)), tags="beside"),
+    Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
     Form("WAIT", "condition?", "Wait until a condition holds.", "VAL", _wait),
     Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
     Form("TIMER", "number:timer, seconds", "Set a timer.", "VAL-II", _now(_set_timer),
@@ -822,7 +804,7 @@ _SIGNALS: Final = (
     Form("REACTI", "signal:signal, program:program?", "REACT, stopping the present motion at once.", "VAL", _react,
          words="ALWAYS"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
-         _now(lambda c, _, signal: lambda: c.reactions.ignore(signal))),
+         _now(lambda c, _, signal: c.reactions.ignore(signal))),
 )  # fmt: skip
 
 _CONTROL: Final = (
@@ -842,8 +824,7 @@ _CONTROL: Final = (
          usage="CASE value OF .. END", tags="opens program"),
     Form("VALUE", "value:any*", "What of a CASE is done for these values.", "VAL-II", _divide,
          usage="VALUE value, ..:", tags="opens closes program"),
-    Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", _divide,
-         tags="opens closes program"),
+    Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", _divide, tags="opens closes program"),
     Form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", _jump, tags="program"),
     Form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", _jump, tags="program"),
     Form("GOTO", "label:label", "Go on at a label.", "VAL", _jump, tags="program"),
