@@ -4,33 +4,39 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Final
 
-from interfaces.val2 import forms, kinds
-from interfaces.val2.compiler import compiled, refusal
+from interfaces.val2 import forms
+from interfaces.val2.compiler import compiled, refusal, standalone_error
 from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
-from interfaces.val2.forms import Kind, nearest
+from interfaces.val2.expressions import kind_of
+from interfaces.val2.functions import row_of
 from interfaces.val2.grammar import SIGNIFICANT
+from interfaces.val2.instructions import stands_for_frame
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
+from interfaces.val2.rows import Kind, nearest
 from interfaces.val2.signals import legal, settable
 from interfaces.val2.source import SourceFile, read_all, words_of
-from interfaces.val2.structure import standalone_error, survey
+from interfaces.val2.structure import survey
 from interfaces.val2.syntax import (
     Apply,
+    Compound,
     Expression,
     Format,
     Ignored,
     Instruction,
-    Number,
     Program,
     Statement,
     Step,
-    Unary,
+    Text,
     Variable,
+    children,
+    literal,
+    parts,
 )
 from robots import puma560
 from vrs.engine import Engine
@@ -107,7 +113,7 @@ class _Checker:
         for parameter in program.parameters:
             self._set[program.name].add(parameter.name)
         for step in program.steps:
-            for variable in kinds.writes(step.statement):
+            for variable in writes(step.statement):
                 scope = program.name if variable.name in own else ""
                 self._set[scope].add(variable.name)
                 self._known[scope][variable.name].add(_given(step.statement))
@@ -150,14 +156,14 @@ class _Checker:
     def _step(
         self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
-        statement, reads = step.statement, kinds.reads(step.statement)
+        statement, read = step.statement, reads(step.statement)
         if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
             detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
-        errors = [*self._calls(statement), *_numbers(statement), *_signals(statement, reads)]
-        for expression, wanted in reads:
-            errors += kinds.mistakes(expression, wanted, known)
+        errors = [*self._calls(statement), *_set_parameter(statement)]
+        for expression, asked in read:
+            errors += [*_misused(expression, asked), *mistakes(expression, asked, known)]
         match statement:
             case Instruction("FOR", (variable, *_)) if variable.prefix:
                 errors.append(mismatch(variable))
@@ -166,27 +172,25 @@ class _Checker:
             uncompilable = refusal(step, self._context)
             errors += [] if uncompilable is None else [uncompilable]
         yield from (_error(error) for error in errors)
-        for expression, wanted in reads:
-            yield from self._unset(expression, wanted, usable, reported)
+        for expression, asked in read:
+            yield from self._unset(expression, asked, usable, reported)
 
     def _unset(
-        self, expression: Expression, wanted: Kind, usable: set[str], reported: set[str]
+        self, expression: Expression, asked: Kind, usable: set[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
         """Names that nothing in the file sets, each once in a program; functions that do nothing."""
         match expression:
             case Variable(name, _, at) if name not in usable and name not in reported:
                 reported.add(name)
-                located = name[0] == "#" or wanted in ("location", "frame", "point")
+                located = name[0] == "#" or asked in ("location", "frame", "point")
                 what = "Undefined location" if located else "Undefined value"
                 yield _error(ValError(what, f"{name}; nothing in the file sets it", place=at))
-            case Apply("DEFINED" | "SWITCH" | "PARAMETER"):
-                return
-            case Apply(name, _, at) if forms.FUNCTIONS[name].idle:
-                gives = '""' if forms.FUNCTIONS[name].gives == "string" else "0"
+            case Apply(name, _, at) if "idle" in row_of(expression).tags:
+                gives = '""' if row_of(expression).gives == "string" else "0"
                 yield _warning(ValError("No meaning here", f"{name} is {gives}", place=at))
                 return
-        for child, kind in kinds.wanted(expression):
-            yield from self._unset(child, kind, usable, reported)
+        for child, kind in wanted(expression):
+            yield from () if kind == "name" else self._unset(child, kind, usable, reported)
 
     def _calls(self, statement: Statement) -> Iterator[ValError]:
         match statement:
@@ -219,9 +223,9 @@ def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
         return
     (given,) = head.statement.operands
     values = i.operands if isinstance(i, Instruction) and i.keyword in ("VALUE", "CASE") else ()
-    wanted: Kind = "string" if kinds.kind_of(given, known) == "string" else "real"
+    wanted: Kind = "string" if kind_of(given, known) == "string" else "real"
     for value in values:
-        yield from kinds.mistakes(value, wanted, known)
+        yield from mistakes(value, wanted, known)
 
 
 def _given(statement: Statement) -> str:
@@ -235,83 +239,28 @@ def _given(statement: Statement) -> str:
 
 
 def _passed(argument: Expression, parameter: Variable) -> Iterator[ValError]:
-    kind = kinds.kind_of(argument, {})
-    wanted = {"$": "string", "#": kinds.POINT}.get(parameter.prefix)
-    if kind and (kind != wanted if wanted else kind in ("string", kinds.POINT)):
+    kind = kind_of(argument, {})
+    wanted = {"$": "string", "#": "point"}.get(parameter.prefix)
+    if kind and (kind != wanted if wanted else kind in ("string", "point")):
         yield ValError("Mixed types", f"an argument for {parameter.name}", place=argument.at)
 
 
-def _constant(expression: Expression | None) -> float | None:
-    """The value of a number that is written down."""
-    match expression:
-        case Number(value):
-            return value
-        case Unary("-", Number(value)):
-            return -value
-    return None
-
-
-_RANGES: Final[dict[tuple[str, int], tuple[float, float, str]]] = {
-    ("DRIVE", 0): (1, 6, "a joint, 1 to 6"),
-    ("DELAY", 0): (0, 1e6, "seconds, not negative"),
-    ("DURATION", 0): (0, 1e6, "seconds, not negative"),
-    ("WAIT.EVENT", 1): (0, 1e6, "seconds, not negative"),
-    ("SPEED", 0): (1e-3, 1e6, "a speed above 0"),
-    ("AT", 0): (0, 1e9, "seconds, not negative"),
-    ("ALTER", 1): (0, 3, "a mode, 0 to 3"),
-    ("ALTON", 1): (0, 3, "a mode, 0 to 3"),
-    ("TIMER", 0): (TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
-}
-
-
-def _numbers(statement: Statement) -> Iterator[ValError]:
-    """Numbers that are written down and can't be."""
-    if not isinstance(statement, Instruction):
-        return
-    for i, operand in enumerate(statement.operands):
-        value = _constant(operand)
-        if value is None or operand is None:
-            continue
-        low, high, allowed = _RANGES.get((statement.keyword, i), (-1e300, 1e300, ""))
-        if not low <= value <= high:
-            yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
-        if statement.keyword == "PARAMETER":
-            row = forms.PARAMETERS[statement.words[0]]
+def _set_parameter(statement: Statement) -> Iterator[ValError]:
+    """A number that a parameter can't be."""
+    match statement:
+        case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
+            row = forms.PARAMETERS[name]
             if not row.low <= value <= row.high:
                 allowed = f"{row.low:g} to {row.high:g} {row.unit}"
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
-def _signals(statement: Statement, reads: list[tuple[Expression, Kind]]) -> Iterator[ValError]:
-    """Signals that are written down and that there aren't."""
-    named: list[tuple[Expression | Format | None, Callable[[float], int]]] = []
-    match statement:
-        case Instruction("SIGNAL", operands):
-            named += [(operand, settable) for operand in operands]
-        case Instruction("IGNORE" | "REACT" | "REACTI", operands):
-            named += [(operand, legal) for operand in operands]
-    for expression, _ in reads:
-        for part in kinds.parts(expression):
-            if isinstance(part, Apply) and part.function == "SIG":
-                named += [(argument, legal) for argument in part.arguments]
-    for number, check_number in named:
-        value = None if isinstance(number, Format) else _constant(number)
-        if value is None or isinstance(number, Format) or number is None:
-            continue
-        try:
-            check_number(value)
-        except ValError as error:
-            yield error.at(place=number.at)
-
-
 def _capped(statement: Statement) -> Iterator[ValError]:
     """Shares that are written down and count as less."""
-    if not isinstance(statement, Instruction) or statement.keyword not in ("SPEED", "DRIVE", "ACCEL"):
-        return
-    for i, operand in enumerate(statement.operands):
-        value = _constant(operand)
-        percent = i == 2 if statement.keyword == "DRIVE" else i or not {"MMPS", "IPS"} & set(statement.words)
-        if operand is not None and value is not None and value > MOST_PERCENT and percent:
+    shares = ("percent",) if {"MMPS", "IPS"} & set(getattr(statement, "words", ())) else ("percent", "speed")
+    for operand, kind in _operands(statement):
+        value = literal(operand)
+        if kind in shares and value is not None and value > MOST_PERCENT:
             detail = f"{statement.keyword} {value:.9g} % counts as {MOST_PERCENT:g} %"
             yield ValError("Value out of range", detail, place=operand.at)
 
@@ -338,3 +287,137 @@ def _alike_names(text: str) -> Iterator[CheckFinding]:
                 detail = f"{name} is the same as {other}: {SIGNIFICANT} characters count"
                 first[counted] = name
                 yield _warning(ValError("Long names", detail, place=TextPosition(number, found.start() + 1)))
+
+
+def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
+    """The operands of an instruction, and what kind each has to be of: `variable` for what it may set."""
+    match i:
+        case Instruction("=" | "SET", (target, value)):
+            yield target, "variable"
+            if i.keyword == "=":
+                yield value, "string" if target.prefix == "$" else "real"
+            else:
+                yield value, "point" if target.prefix == "#" else "frame"
+        case Instruction("HERE", (target,)):
+            *others, last = target.parts if isinstance(target, Compound) else (target,)
+            yield from ((other, "frame") for other in others)
+            if isinstance(last, Variable):
+                yield last, "variable"
+        case Instruction("BASE", (only,)) if not isinstance(only, Text) and stands_for_frame(i):
+            yield only, "any"
+        case Instruction("CALL" | "GOSUB", given):
+            yield from ((a, "variable" if isinstance(a, Variable) else "any") for a in given if a is not None)
+        case Instruction(keyword, operands) if keyword not in ("", "AUTO", "LOCAL", "GLOBAL"):
+            row = forms.INSTRUCTIONS[keyword]
+            for n, operand in enumerate(operands if row.slots else ()):
+                if operand is not None and not isinstance(operand, Format):
+                    yield operand, row.slot(n).kind
+
+
+def reads(statement: Statement) -> list[tuple[Expression, Kind]]:
+    """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
+    found = [one for one in _operands(statement) if one[1] != "variable"]
+    if isinstance(statement, Instruction) and statement.begins is not None:
+        found.append((statement.begins, "real"))
+    return found + [(index, "real") for target in writes(statement) for index in target.indices]
+
+
+def writes(statement: Statement) -> Iterator[Variable]:
+    """The variables that a statement may set; `$DECODE` shortens its first argument."""
+    for operand, kind in _operands(statement):
+        if kind == "variable" and isinstance(operand, Variable):
+            yield operand
+        elif statement.keyword in ("=", "TYPE"):
+            for part in parts(operand):
+                match part:
+                    case Apply("$DECODE", (Variable() as target, *_)):
+                        yield target
+
+
+def wanted(expression: Expression) -> Iterator[tuple[Expression, Kind]]:
+    """The parts of an expression, and what kind each has to be of; those of `+` and relations have to be alike."""
+    if isinstance(expression, Apply):
+        for n, argument in enumerate(expression.arguments):
+            if argument is not None and not isinstance(argument, Format):
+                yield argument, row_of(expression).slot(n).kind
+    else:
+        kind: Kind = "frame" if isinstance(expression, Compound) else "real"
+        yield from ((child, kind) for child in children(expression))
+
+
+_SHOWN: Final[Mapping[str, str]] = {
+    "real": "a number", "string": "a string", "frame": "a transformation",
+    "location": "a location", "point": "a precision point",
+}  # fmt: skip
+_FITS: Final[Mapping[str, tuple[str, ...]]] = {
+    "string": ("string",), "frame": ("frame",), "point": ("point",), "location": ("frame", "point", "location"),
+}  # fmt: skip
+_UNTOLD: Final = ("any", "alike", "variable", "array", "name", "label", "program", "text")
+"""What may be of any kind, or is told elsewhere."""
+
+
+def _range(low: float, high: float, allowed: str) -> Callable[[float], None]:
+    def require_valid(value: float) -> None:
+        if not low <= value <= high:
+            raise ValError("Value out of range", f"allowed: {allowed}")
+
+    return require_valid
+
+
+_CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
+    "signal": legal,
+    "output": settable,
+    "joint": _range(1, 6, "a joint, 1 to 6"),
+    "seconds": _range(0, 1e6, "seconds, not negative"),
+    "time": _range(0, 1e9, "seconds, not negative"),
+    "speed": _range(1e-3, 1e6, "a speed above 0"),
+    "mode": _range(0, 3, "a mode, 0 to 3"),
+    "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
+}
+"""What numbers that are written down have to be."""
+_STANDING: Final = ("HERE", "DEST")
+"""Functions that give joints where a precision point is wanted."""
+
+
+def _misused(expression: Expression, asked: Kind) -> Iterator[ValError]:
+    """What is wrong with the numbers that are written down."""
+    if (value := literal(expression)) is not None and asked in _CHECKS:
+        try:
+            _CHECKS[asked](value)
+        except ValError as error:
+            yield error.at(place=expression.at)
+    for part, kind in wanted(expression):
+        yield from _misused(part, kind)
+
+
+def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
+    """What in an expression can't be of the kind that it has to be of.
+
+    Args:
+        expression: The expression.
+        asked: What it has to be.
+        known: What is known of names without a prefix.
+    """
+    kind = kind_of(expression, known)
+    if asked == "point" and isinstance(expression, Apply) and expression.function in _STANDING:
+        kind = "point"
+    if kind and asked not in _UNTOLD and kind not in _FITS.get(asked, ("real",)):
+        detail = f"{_SHOWN[kind]} where {_SHOWN.get(asked, _SHOWN['real'])} is wanted"
+        yield ValError("Mixed types", detail, place=expression.at)
+        return
+    if isinstance(expression, Apply) and row_of(expression).alike:
+        yield from _alike(expression, known)
+    else:
+        for part, kind_of_part in wanted(expression):
+            yield from mistakes(part, kind_of_part, known)
+
+
+def _alike(whole: Apply, known: Mapping[str, str]) -> Iterable[ValError]:
+    """`+` and relations take two numbers or two strings."""
+    kinds = {kind_of(part, known) for part in children(whole)} - {""}
+    if kinds == {"real", "string"}:
+        yield ValError("Mixed types", f"a number and a string with {whole.function} between them", place=whole.at)
+        return
+    if kinds:
+        for part in children(whole):
+            yield from mistakes(part, "string" if kinds == {"string"} else "real", known)

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2.errors import NOWHERE, TextPosition, ValError
-from interfaces.val2.forms import PARAMETERS, SWITCHES
 from interfaces.val2.memory import Memory, Slots, VariableSlot
 from interfaces.val2.motion.arm import Arm
+from interfaces.val2.rows import PARAMETERS, SWITCHES
 from interfaces.val2.signals import Reactions, Signals
 from interfaces.val2.syntax import Program
 
@@ -171,7 +171,7 @@ class Context:
     memory: Memory = field(default_factory=Memory)
     signals: Signals = field(default_factory=Signals)
     reactions: Reactions = field(default_factory=Reactions)
-    switches: dict[str, bool] = field(default_factory=lambda: {s.name: s.default for s in SWITCHES.values()})
+    switches: dict[str, bool] = field(default_factory=lambda: {s.name: bool(s.default) for s in SWITCHES.values()})
     parameters: MutableMapping[str, float] = field(
         default_factory=lambda: {p.name: p.default for p in PARAMETERS.values()}
     )

@@ -12,7 +12,7 @@ from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from interfaces.val2.compiler import compiled
+from interfaces.val2.compiler import compiled, runs_beside_program, standalone_error
 from interfaces.val2.context import Context, Event, ProgramFailed
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
@@ -20,7 +20,6 @@ from interfaces.val2.interpreter import ProgramState, Task
 from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
 from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import SignalRule
-from interfaces.val2.structure import runs_beside_program, standalone_error
 from interfaces.val2.syntax import (
     Expression,
     Program,

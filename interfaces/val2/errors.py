@@ -75,6 +75,18 @@ class ValError(VrsError):
         )
 
 
+def syntax_error(detail: str, line: int, column: int, what: str = "Syntax error") -> ValError:
+    """The error of a text that can't be read.
+
+    Args:
+        detail: What is wrong with it, or what is allowed.
+        line: Line, from 1.
+        column: Column, from 1.
+        what: The words between the stars.
+    """
+    return ValError(what, detail, place=TextPosition(line, column))
+
+
 @dataclass(frozen=True, slots=True)
 class CheckFinding:
     """Something that a check of a file, or its rehearsal, found."""

@@ -12,25 +12,48 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from interfaces.val2 import formats, forms, functions, kinds
+from interfaces.val2 import formats
 from interfaces.val2.context import Context, Warned
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import OperandSlot
-from interfaces.val2.functions import truth
+from interfaces.val2.functions import FUNCTIONS, TRUE, row_of
 from interfaces.val2.memory import MOST_DIMENSIONS, Key, Slots, VariableSlot, index, mismatch, undefined
-from interfaces.val2.syntax import Apply, Binary, Compound, Expression, Format, Number, Text, Unary, Variable
-from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
+from interfaces.val2.rows import Kind, OperandSlot
+from interfaces.val2.syntax import Apply, Compound, Expression, Format, Number, Text, Variable
+from interfaces.val2.values import Transformation, Value
 
 Closure: TypeAlias = Callable[[Slots], Any]
 Real: TypeAlias = Callable[[Slots], float]
-String: TypeAlias = Callable[[Slots], str]
-Frame: TypeAlias = Callable[[Slots], Transformation]
 Test: TypeAlias = Callable[[Slots], bool]
-
-RELATIONS: Final[dict[str, Callable[[Any, Any], bool]]] = {
-    "==": operator.eq, "<>": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+_GIVEN: Final = {"location": "point", "truth": "real"}
+"""Of what kind is what functions give, where they say it otherwise."""
+_WANTED: Final = {
+    "real": "a number", "string": "a string", "frame": "a transformation", "point": "a precision point",
 }  # fmt: skip
-_LOGICAL: Final = ("AND", "OR", "XOR")
+_PREFIXES: Final = {"real": "", "string": "$", "frame": "", "point": "#"}
+"""Of names of values of a kind."""
+
+
+def kind_of(expression: Expression, known: Mapping[str, str] = {}) -> str:
+    """`real`, `string`, `frame`, `point`, or nothing if it can't be told by the text.
+
+    Args:
+        expression: The expression.
+        known: What is known of names without a prefix.
+    """
+    match expression:
+        case Number():
+            return "real"
+        case Text():
+            return "string"
+        case Compound():
+            return "frame"
+        case Variable(name):
+            return {"$": "string", "#": "point"}.get(name[0]) or known.get(name, "")
+        case Apply(arguments=arguments):
+            gives = row_of(expression).gives
+            if gives == "alike":
+                return "string" if "string" in (kind_of(a, known) for a in arguments) else "real"  # type: ignore[arg-type]
+            return _GIVEN.get(gives, gives)
 
 
 class Expressions:
@@ -46,11 +69,6 @@ class Expressions:
         self.context = context
         self._scope = scope or {}
 
-    @staticmethod
-    def kind(e: Expression) -> str:
-        """What an expression is by its text; nothing for a name without a prefix: a real or a transformation."""
-        return kinds.kind_of(e, {})
-
     # Names.
 
     def slot(self, name: str) -> int | VariableSlot:
@@ -64,7 +82,7 @@ class Expressions:
         Raises:
             ValError: If there are too many; the closure, if one is out of range.
         """
-        parts, at = [self.real(i) for i in variable.indices], variable.at
+        parts, at = [self.of_kind("real", i) for i in variable.indices], variable.at
         if len(parts) > MOST_DIMENSIONS:
             raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=at)
         if len(parts) == 1:
@@ -113,205 +131,87 @@ class Expressions:
 
         return value
 
-    # Reals.
-
-    def real(self, e: Expression) -> Real:
-        """A closure of a real expression.
-
-        Raises:
-            ValError: If it's of another type by its text; the closure, for what comes out at run time.
-        """
-        match e:
-            case Number(value):
-                return lambda _: value
-            case Variable():
-                return self._real_variable(e)
-            case Unary():
-                return self._unary(e)
-            case Binary(operator) if operator in RELATIONS or operator in _LOGICAL:
-                test = self.condition(e)
-                return lambda s: -1.0 if test(s) else 0.0
-            case Binary() if self.kind(e) == "real":
-                return _joined(e.operator, self.real(e.left), self.real(e.right), e.at)
-            case Apply() if self.kind(e) == "real":
-                return self.function(e)
-            case Apply():
-                raise ValError("Invalid expression", e.function, place=e.at)
-            case _:
-                raise ValError("Invalid expression", "a number was expected", place=e.at)
-
-    def _real_variable(self, e: Variable) -> Real:
-        if e.prefix:
-            raise mismatch(e)
-        read = self.read(e)
-
-        def slow(s: Slots) -> float:
-            value = read(s)
-            if type(value) is float:
-                return value
-            raise mismatch(e)
-
-        place = self.slot(e.name)
-        if e.indices:
-            return slow
-        if isinstance(place, int):
-
-            def local(s: Slots) -> float:
-                value = s[place].value
-                return value if value.__class__ is float else slow(s)
-
-            return local
-
-        def global_(s: Slots) -> float:
-            value = place.value
-            return value if value.__class__ is float else slow(s)
-
-        return global_
-
-    def _unary(self, e: Unary) -> Real:
-        if isinstance(e.operand, Number) and e.operator == "-":
-            value = -e.operand.value
-            return lambda _: value
-        a = self.real(e.operand)
-        return _placed(functions.UNARY[e.operator], [a], e.at)
-
-    # Conditions.
-
-    def condition(self, e: Expression) -> Test:
-        """A closure of whether an expression isn't 0; both sides of AND and OR are evaluated, as V+ does."""
-        if isinstance(e, Unary) and e.operator == "NOT":
-            inner = self.condition(e.operand)
-            return lambda s: not inner(s)
-        if isinstance(e, Binary) and e.operator in RELATIONS:
-            return self._relation(e)
-        if isinstance(e, Binary) and e.operator in _LOGICAL:
-            left, right = self.condition(e.left), self.condition(e.right)
-            match e.operator:
-                case "AND":
-                    return lambda s: left(s) & right(s)
-                case "OR":
-                    return lambda s: left(s) | right(s)
-                case _:
-                    return lambda s: left(s) ^ right(s)
-        value = self.real(e)
-        return lambda s: value(s) != 0.0
-
-    def _relation(self, e: Binary) -> Test:
-        if "string" in (self.kind(e.left), self.kind(e.right)):
-            relation = RELATIONS[e.operator]
-            left, right = self.string(e.left), self.string(e.right)
-            return lambda s: relation(left(s), right(s))
-        a, b = self.real(e.left), self.real(e.right)
-        tests: dict[str, Test] = {  # Without a call in between, which costs more than the comparison.
-            "==": lambda s: a(s) == b(s),
-            "<>": lambda s: a(s) != b(s),
-            "<": lambda s: a(s) < b(s),
-            "<=": lambda s: a(s) <= b(s),
-            ">": lambda s: a(s) > b(s),
-            ">=": lambda s: a(s) >= b(s),
-        }
-        return tests[e.operator]
-
-    # Strings and locations.
-
-    def string(self, e: Expression) -> String:
-        """A closure of a string expression.
-
-        Raises:
-            ValError: If it's of another type.
-        """
-        match e:
-            case Text(value):
-                return lambda _: value
-            case Variable() if e.prefix == "$":
-                return self.read(e)
-            case Binary() if e.operator == "+":
-                left, right = self.string(e.left), self.string(e.right)
-                return lambda s: left(s) + right(s)
-            case Apply() if self.kind(e) == "string":
-                return self.function(e)
-            case _:
-                raise ValError("Invalid expression", "a string was expected", place=e.at)
-
-    def transformation(self, e: Expression) -> Frame:
-        """A closure of a transformation.
-
-        Raises:
-            ValError: If it's of another type.
-        """
-        match e:
-            case Variable() if not e.prefix:
-                read = self.read(e, location=True)
-
-                def variable(s: Slots) -> Transformation:
-                    value = read(s)
-                    if value.__class__ is Transformation:
-                        return value
-                    raise mismatch(e)
-
-                return variable
-            case Compound(parts):
-                frames = [self.transformation(p) for p in parts]
-
-                def compound(s: Slots) -> Transformation:
-                    X = frames[0](s).X
-                    for frame in frames[1:]:
-                        X = X @ frame(s).X
-                    if not np.isfinite(X).all():
-                        raise ValError("Arithmetic overflow", place=e.at)
-                    return Transformation(X)
-
-                return compound
-            case Apply() if self.kind(e) == "frame":
-                return self.function(e)
-            case _:
-                raise ValError("Invalid expression", "a transformation was expected", place=e.at)
-
-    def point(self, e: Expression) -> Callable[[Slots], PrecisionPoint]:
-        """A closure of a precision point; HERE and DEST give the joints where one is wanted.
-
-        Raises:
-            ValError: If it's of another type.
-        """
-        match e:
-            case Variable() if e.prefix == "#":
-                return self.read(e)
-            case Apply("HERE" | "DEST"):
-                return self.function(Apply(f"#{e.function}", (), e.at))
-            case Apply() if self.kind(e) == "point":
-                return self.function(e)
-            case _:
-                raise ValError("Invalid expression", "a precision point was expected", place=e.at)
-
-    def location(self, e: Expression) -> Callable[[Slots], Location]:
-        """A closure of a transformation or a precision point, as the text tells."""
-        return self.point(e) if self.kind(e) == "point" else self.transformation(e)
+    # Values.
 
     def value(self, e: Expression) -> Closure:
         """A closure of whatever an expression is."""
-        return self.of_kind(self.kind(e) or "any", e)
+        return self.of_kind("any", e)
+
+    def condition(self, e: Expression) -> Test:
+        """A closure of whether an expression isn't 0; both sides of AND and OR are evaluated, as V+ does."""
+        return self.of_kind("condition", e)
 
     def of_kind(self, kind: str, e: Expression) -> Closure:
         """A closure of an expression that has to be of a kind.
 
         Raises:
-            ValError: If it's of another one.
+            ValError: If it's of another one by its text; the closure, for what comes out at run time.
         """
-        match kind:
-            case "string":
-                return self.string(e)
-            case "frame":
-                return self.transformation(e)
-            case "point":
-                return self.point(e)
-            case "location":
-                return self.location(e)
-            case "any":
-                return self.read(e) if isinstance(e, Variable) and not e.prefix else self.value(e)
-            case _:
-                return self.real(e)
+        if kind == "condition":
+            if isinstance(e, Apply) and row_of(e).gives == "truth":
+                return self._function(e)
+            number = self.of_kind("real", e)
+            return lambda s: number(s) != 0.0
+        own = kind_of(e)
+        if kind == "any":
+            if isinstance(e, Variable) and not own:
+                return self.read(e)
+            kind = own
+        elif kind == "location":
+            kind = "point" if own == "point" else "frame"
+        elif kind not in _WANTED:
+            kind = "real"
+        match e:
+            case Number(value) | Text(value) if own == kind:
+                return _constant(value)
+            case Variable(prefix=prefix) if prefix == _PREFIXES[kind]:
+                return self._typed(e, float if kind == "real" else Transformation) if not prefix else self.read(e)
+            case Variable() if kind == "real":
+                raise mismatch(e)
+            case Compound() if kind == "frame":
+                return self._compound(e)
+            case Apply("HERE" | "DEST" as name) if kind == "point":
+                return self._function(Apply(f"#{name}", (), e.at))
+            case Apply("+") if kind == "string":
+                return self._function(e, "string")
+            case Apply() if own == kind:
+                made = self._function(e)
+                return (lambda s: TRUE if made(s) else 0.0) if row_of(e).gives == "truth" else made
+            case Apply(name) if kind == "real" and name in FUNCTIONS:
+                raise ValError("Invalid expression", name, place=e.at)
+        raise ValError("Invalid expression", f"{_WANTED[kind]} was expected", place=e.at)
 
-    # Functions.
+    def _typed(self, e: Variable, type_: type) -> Closure:
+        """A closure of a variable without a prefix."""
+        read, place = self.read(e, location=type_ is Transformation), self.slot(e.name)
+
+        def checked(s: Slots) -> Any:
+            value = read(s)
+            if value.__class__ is type_:
+                return value
+            raise mismatch(e)
+
+        if e.indices or isinstance(place, int):
+            return checked
+
+        def quick(s: Slots) -> Any:
+            value = place.value
+            return value if value.__class__ is type_ else checked(s)
+
+        return quick
+
+    def _compound(self, e: Compound) -> Closure:
+        frames = [self.of_kind("frame", p) for p in e.parts]
+
+        def compound(s: Slots) -> Transformation:
+            X = frames[0](s).X
+            for frame in frames[1:]:
+                X = X @ frame(s).X
+            if not np.isfinite(X).all():
+                raise ValError("Arithmetic overflow", place=e.at)
+            return Transformation(X)
+
+        return compound
 
     def operands(
         self, slots: Sequence[OperandSlot], given: Sequence[Expression | Format | None], word: str, at: TextPosition
@@ -329,24 +229,24 @@ class Expressions:
             made.append(_constant(slot.default) if operand is None else self.of_kind(slot.kind, operand))  # type: ignore[arg-type]
         return made
 
-    def function(self, e: Apply) -> Closure:
-        """A closure of a function.
-
-        Raises:
-            ValError: If its arguments aren't what it takes.
-        """
-        row, given = forms.FUNCTIONS[e.function], e.arguments
-        if row.idle:
+    def _function(self, e: Apply, alike: Kind | None = None) -> Closure:
+        """A closure of a function or an operator, of the kind that its row gives; its operands are of a kind."""
+        row, given = row_of(e), e.arguments
+        if "idle" in row.tags:
             return self._idle(e, "" if row.gives == "string" else 0.0)
-        if e.function in _OF_NAMES:
-            return _placed(_OF_NAMES[e.function](self, e), [lambda s: s], e.at)
+        if row.act is None:
+            return _placed(OF_NAMES[row.name](self, e), [lambda s: s], e.at)
         if row.repeats and row.slots[-1].default is None:
             given = tuple(a for a in given if a is not None)
-        parts = self.operands(row.slots, given, e.function, e.at)
-        if e.function in functions.OF_CONTEXT:
-            return _placed(partial(functions.OF_CONTEXT[e.function], self.context), parts, e.at)
-        function = functions.OF_VALUES[e.function]
-        return _placed(function, parts, e.at) if parts else _constant(function())
+        slots, act = row.slots, row.act
+        if row.alike:
+            texts = alike or "string" in map(kind_of, given)  # type: ignore[arg-type]
+            slots = (OperandSlot("", "string" if texts else "real"),)
+            act = operator.add if texts and row.name == "+" else act
+        parts = self.operands(slots, given, row.name, e.at)
+        if "context" in row.tags:
+            return _placed(partial(act, self.context), parts, e.at)
+        return _placed(act, parts, e.at) if parts else _constant(act())
 
     def _idle(self, e: Apply, value: float | str) -> Closure:
         """Of files and other tasks: 0 or an empty string, with a warning."""
@@ -365,16 +265,6 @@ def _constant(value: Any) -> Closure:
 
 def _placed(function: Callable[..., Any], parts: Sequence[Closure], at: TextPosition) -> Closure:
     """A closure of a function of values, whose errors stand at a place."""
-    if len(parts) == 1:
-        (a,) = parts
-
-        def one(s: Slots) -> Any:
-            try:
-                return function(a(s))
-            except ValError as error:
-                raise error.at(place=at) from None
-
-        return one
 
     def several(s: Slots) -> Any:
         try:
@@ -382,45 +272,22 @@ def _placed(function: Callable[..., Any], parts: Sequence[Closure], at: TextPosi
         except ValError as error:
             raise error.at(place=at) from None
 
-    return several
-
-
-def _joined(symbol: str, a: Real, b: Real, at: TextPosition) -> Real:
-    """A closure of two reals with an operator between them; the frequent ones without a call in between."""
-
-    def overflow() -> ValError:
-        return ValError("Arithmetic overflow", place=at)
-
-    def add(s: Slots) -> float:
-        value = a(s) + b(s)
-        if value - value == 0.0:
-            return value
-        raise overflow()
-
-    def subtract(s: Slots) -> float:
-        value = a(s) - b(s)
-        if value - value == 0.0:
-            return value
-        raise overflow()
-
-    def multiply(s: Slots) -> float:
-        value = a(s) * b(s)
-        if value - value == 0.0:
-            return value
-        raise overflow()
-
-    quick = {"+": add, "-": subtract, "*": multiply}
-    if symbol in quick:
-        return quick[symbol]
-    function = functions.BINARY[symbol]
-
-    def binary(s: Slots) -> float:
+    def two(s: Slots) -> Any:
         try:
             return function(a(s), b(s))
         except ValError as error:
             raise error.at(place=at) from None
 
-    return binary
+    def one(s: Slots) -> Any:
+        try:
+            return function(a(s))
+        except ValError as error:
+            raise error.at(place=at) from None
+
+    if len(parts) > 2 or not parts:
+        return several
+    a, b = parts[0], parts[-1]
+    return one if len(parts) == 1 else two
 
 
 # Functions of names.
@@ -434,7 +301,7 @@ def _defined(x: Expressions, e: Apply) -> Callable[[Slots], float]:
 
     def defined(s: Slots) -> float:
         slot = found(s)
-        return truth(slot is not None and slot.defined())
+        return TRUE if slot is not None and slot.defined() else 0.0
 
     return defined
 
@@ -461,7 +328,7 @@ def _setting(x: Expressions, e: Apply) -> Callable[[Slots], float]:
     name, values = variable.name.upper(), x.context.switches if kind == "switch" else x.context.parameters
     if name not in values:
         raise ValError(f"Unknown {kind}", name, place=e.at)
-    return lambda _: truth(bool(values[name])) if kind == "switch" else values[name]
+    return lambda _: (TRUE if values[name] else 0.0) if kind == "switch" else values[name]
 
 
 def _encode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
@@ -473,10 +340,11 @@ def _decode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
     source = e.arguments[0]
     if not isinstance(source, Variable):
         raise ValError("Invalid expression", "$DECODE takes a string variable first", place=e.at)
-    read, slot = x.string(source), x.reference(source)
-    marks, skip = x.operands(forms.FUNCTIONS["$DECODE"].slots[1:], e.arguments[1:], e.function, e.at)
+    read, slot = x.of_kind("string", source), x.reference(source)
+    marks, skip = x.operands(FUNCTIONS["$DECODE"].slots[1:], e.arguments[1:], e.function, e.at)
 
     def decode(s: Slots) -> str:
+        text: str
         text, ends, marked = read(s), marks(s), skip(s) > 0.0
         n = next((i for i, c in enumerate(text) if (c in ends) != marked), len(text))
         slot(s).value = text[n:]
@@ -485,9 +353,8 @@ def _decode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
     return decode
 
 
-_OF_NAMES: Final[dict[str, Callable[[Expressions, Apply], Closure]]] = {
+OF_NAMES: Final[dict[str, Callable[[Expressions, Apply], Closure]]] = {
     "DEFINED": _defined, "LAST": _last, "PARAMETER": _setting, "SWITCH": _setting, "$DECODE": _decode,
     "$ENCODE": _encode,
 }  # fmt: skip
-FUNCTIONS: Final = {*_OF_NAMES, *functions.OF_VALUES, *functions.OF_CONTEXT}
-"""What functions closures are made of, beside those without meaning here."""
+"""Functions of names, not values."""

@@ -1,23 +1,25 @@
-"""What the operators and functions of VAL come to, of values.
+"""The functions, constants and operators of VAL: how they're written, and what they come to, of values.
 
-Reals are floats, angles degrees, TRUE is -1; what can't be is an error, not a NaN. How functions are written is in
-`forms.py`; those that take names, not values, are in `expressions.py`.
+Reals are floats, angles degrees, TRUE is -1; what can't be is an error, not a NaN. Those that take names, not
+values, are carried out in `expressions.py`.
 """
 
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.formats import checked, leading_number
+from interfaces.val2.rows import Form
+from interfaces.val2.syntax import Apply
 from interfaces.val2.values import (
     NULL,
-    Location,
     PrecisionPoint,
     Transformation,
     about_x,
@@ -27,17 +29,11 @@ from interfaces.val2.values import (
 )
 
 TRUE: Final = -1.0
-FALSE: Final = 0.0
 _WIDEST_WHOLE: Final = 2.0**53
 _SINES: Final = {0.0: 0.0, 30.0: 0.5, 90.0: 1.0, 150.0: 0.5, 180.0: 0.0}
 _COSINES: Final = {60.0: 0.5, 90.0: 0.0, 120.0: -0.5}
 _STRAIGHT: Final = 1e-6
 """Shortest distance of FRAME's points [mm], and of the third from the axis."""
-
-
-def truth(value: bool) -> float:
-    """TRUE or FALSE."""
-    return TRUE if value else FALSE
 
 
 def whole(value: float) -> int:
@@ -98,22 +94,6 @@ def root(value: float) -> float:
     return math.sqrt(value)
 
 
-BINARY: Final[dict[str, Callable[[float, float], float]]] = {
-    "/": divide,
-    "MOD": modulo,
-    "^": power,
-    "BAND": lambda a, b: float(whole(a) & whole(b)),
-    "BOR": lambda a, b: float(whole(a) | whole(b)),
-    "BXOR": lambda a, b: float(whole(a) ^ whole(b)),
-}
-"""Operators between reals, but for the frequent ones, relations and logic, which `expressions.py` has."""
-UNARY: Final[dict[str, Callable[[float], float]]] = {
-    "-": lambda a: -a,
-    "NOT": lambda a: truth(a == 0.0),
-    "COM": lambda a: float(~whole(a)),
-}
-
-
 def _bmask(*bits: float) -> float:
     value = 0
     for bit in map(whole, bits):
@@ -171,48 +151,8 @@ def _ppoint(*joints: float) -> PrecisionPoint:
     return PrecisionPoint(joints)
 
 
-OF_VALUES: Final[dict[str, Callable[..., Any]]] = {
-    "ABS": abs,
-    "ASC": _asc,
-    "ATAN2": lambda y, x: math.degrees(math.atan2(y, x)),
-    "BMASK": _bmask,
-    "COS": cosine,
-    "DISTANCE": lambda a, b: float(np.linalg.norm(a.X[:3, 3] - b.X[:3, 3])),
-    "DX": lambda a: float(a.X[0, 3]),
-    "DY": lambda a: float(a.X[1, 3]),
-    "DZ": lambda a: float(a.X[2, 3]),
-    "FALSE": lambda: FALSE,
-    "FRACT": lambda a: math.fmod(a, 1.0),
-    "FRAME": _frame,
-    "INT": lambda a: float(math.trunc(a)),
-    "INVERSE": Transformation.inverse,
-    "LEN": lambda text: float(len(text)),
-    "MAX": max,
-    "MIN": min,
-    "NULL": lambda: NULL,
-    "OFF": lambda: FALSE,
-    "ON": lambda: TRUE,
-    "OUTSIDE": lambda low, value, high: truth(not low <= value <= high),
-    "PI": lambda: math.pi,
-    "POS": lambda text, part, first: float(text.find(part, max(0, whole(first) - 1)) + 1),
-    "RX": about_x,
-    "RY": about_y,
-    "RZ": about_z,
-    "SHIFT": _shift,
-    "SIGN": lambda a: 1.0 if a >= 0.0 else -1.0,
-    "SIN": sine,
-    "SQR": lambda a: checked(a * a),
-    "SQRT": root,
-    "TAN": lambda angle: divide(sine(angle), cosine(angle)),
-    "TRANS": from_oat,
-    "TRUE": lambda: TRUE,
-    "VAL": leading_number,
-    "#PPOINT": _ppoint,
-    "$CHR": _chr,
-    "$MID": _mid,
-    "$TRUNCATE": lambda text: text.partition("\0")[0],
-}
-"""Functions of their arguments' values alone."""
+def _of_bits(act: Callable[[int, int], int]) -> Callable[[float, float], float]:
+    return lambda a, b: float(act(whole(a), whole(b)))
 
 
 def _bits(c: Context, first: float, count: float) -> float:
@@ -228,20 +168,144 @@ def _speed(c: Context, which: float) -> float:
     return c.arm.monitor_speed()
 
 
-def _inrange(c: Context, location: Location) -> float:
-    return 0.0 if c.arm.reaches(location, now=c.now) else 1.0
+_REAL_FUNCTIONS: Final = (
+    Form("ABS", "x -> real", "Absolute value.", "VAL-II", abs),
+    Form("ASC", "text:string, index?=1 -> real", "Code of a character.", "VAL-II", _asc),
+    Form("ATAN2", "y, x -> real", "Angle of a direction [deg].", "VAL-II",
+         lambda y, x: math.degrees(math.atan2(y, x))),
+    Form("BMASK", "bit*=0 -> real", "A number with these bits set, from 1.", "V+", _bmask),
+    Form("BITS", "first, count?=1 -> real", "Signals from a first one on, as a number.", "V+", _bits,
+         tags="context"),
+    Form("COS", "angle -> real", "Cosine of an angle [deg].", "VAL-II", cosine),
+    Form("DEFINED", "variable:name -> real", "Whether a variable has a value.", "V+"),
+    Form("DISTANCE", "a:frame, b:frame -> real", "Distance of two locations [mm].", "VAL-II",
+         lambda a, b: float(np.linalg.norm(a.X[:3, 3] - b.X[:3, 3]))),
+    Form("DX", "a:frame -> real", "X of a location [mm].", "VAL-II", lambda a: float(a.X[0, 3])),
+    Form("DY", "a:frame -> real", "Y of a location [mm].", "VAL-II", lambda a: float(a.X[1, 3])),
+    Form("DZ", "a:frame -> real", "Z of a location [mm].", "VAL-II", lambda a: float(a.X[2, 3])),
+    Form("FRACT", "x -> real", "Fractional part.", "VAL-II", lambda x: math.fmod(x, 1.0)),
+    Form("INRANGE", "a:location -> real", "0 if a location can be reached.", "V+",
+         lambda c, location: 0.0 if c.arm.reaches(location, now=c.now) else 1.0, tags="context"),
+    Form("INT", "x -> real", "Integer part.", "VAL-II", lambda x: float(math.trunc(x))),
+    Form("LAST", "array:array -> real", "Largest index of an array.", "V+"),
+    Form("LEN", "text:string -> real", "Length of a string.", "VAL-II", lambda text: float(len(text))),
+    Form("MAX", "x* -> real", "Largest of values.", "V+", max),
+    Form("MIN", "x* -> real", "Smallest of values.", "V+", min),
+    Form("OUTSIDE", "low, x, high -> truth", "Whether a value is outside a range.", "V+",
+         lambda low, x, high: not low <= x <= high),
+    Form("PARAMETER", "name:name -> real", "Value of a parameter.", "V+"),
+    Form("PI", "-> real", "3.14159..", "VAL-II", lambda: math.pi, tags="constant"),
+    Form("POS", "text:string, part:string, from?=1 -> real", "Where a string has another; 0 for nowhere.", "V+",
+         lambda text, part, first: float(text.find(part, max(0, whole(first) - 1)) + 1)),
+    Form("RANDOM", "-> real", "A random number from 0 to 1.", "V+", lambda c: c.rng.random(),
+         tags="constant context"),
+    Form("SIG", "number:signal* -> truth", "Whether all these signals are on, or off where negative.", "VAL-II",
+         lambda c, *numbers: all(c.signals.on(n) for n in numbers), tags="context"),
+    Form("SIGN", "x -> real", "-1 or 1.", "VAL-II", lambda x: 1.0 if x >= 0.0 else -1.0),
+    Form("SIN", "angle -> real", "Sine of an angle [deg].", "VAL-II", sine),
+    Form("SPEED", "which -> real", "1: the monitor speed [%].", "V+", _speed, tags="context"),
+    Form("SQR", "x -> real", "Square.", "V+", lambda x: checked(x * x)),
+    Form("SQRT", "x -> real", "Square root.", "VAL-II", root),
+    Form("SWITCH", "name:name -> real", "Whether a switch is on.", "V+"),
+    Form("TAN", "angle -> real", "Tangent of an angle [deg].", "V+",
+         lambda angle: divide(sine(angle), cosine(angle))),
+    Form("TIMER", "number -> real", "Seconds since a timer was set to 0.", "VAL-II",
+         lambda c, number: c.now - c.timers[c.timer(number)], tags="context"),
+    Form("VAL", "text:string -> real", "The number that a string begins with.", "VAL-II", leading_number),
+    Form("TRUE", "-> real", "-1.", "VAL-II", lambda: TRUE, tags="constant"),
+    Form("FALSE", "-> real", "0.", "VAL-II", lambda: 0.0, tags="constant"),
+    Form("ON", "-> real", "-1.", "VAL-II", lambda: TRUE, tags="constant"),
+    Form("OFF", "-> real", "0.", "VAL-II", lambda: 0.0, tags="constant"),
+)  # fmt: skip
 
+_STRING_FUNCTIONS: Final = (
+    Form("$CHR", "code -> string", "The character of a code.", "VAL-II", _chr),
+    Form("$DECODE", "$variable:variable, separators:string, mode?=0 -> string",
+         "What stands before, or with mode 1 the run of, separators; it's taken out of the variable.", "V+"),
+    Form("$ENCODE", "item:any?* -> string", "What TYPE would print.", "VAL-II"),
+    Form("$MID", "text:string, from, length -> string", "Part of a string.", "VAL-II", _mid),
+    Form("$TRUNCATE", "text:string -> string", "A string up to its first character of code 0.", "V+",
+         lambda text: text.partition("\0")[0]),
+)  # fmt: skip
 
-OF_CONTEXT: Final[dict[str, Callable[..., Any]]] = {
-    "BITS": _bits,
-    "DEST": lambda c: c.arm.destination(now=c.now).tool,
-    "HERE": lambda c: c.arm.here(now=c.now).tool,
-    "INRANGE": _inrange,
-    "RANDOM": lambda c: c.rng.random(),
-    "SIG": lambda c, *numbers: truth(all(c.signals.on(n) for n in numbers)),
-    "SPEED": _speed,
-    "TIMER": lambda c, number: c.now - c.timers[c.timer(number)],
-    "#DEST": lambda c: c.arm.destination(now=c.now).joints,
-    "#HERE": lambda c: c.arm.here(now=c.now).joints,
+_LOCATION_FUNCTIONS: Final = (
+    Form("TRANS", "x?=0, y?=0, z?=0, o?=90, a?=-90, t?=0 -> frame",
+         "A transformation [mm, deg]; without angles, no turn.", "VAL-II", from_oat),
+    Form("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0 -> frame", "A location shifted in world axes [mm].", "VAL-II",
+         _shift, usage="SHIFT(a BY dx, dy, dz)"),
+    Form("INVERSE", "a:frame -> frame", "The transformation back.", "VAL", Transformation.inverse),
+    Form("FRAME", "a:frame, b:frame, c:frame, d:frame -> frame", "A frame at d: x from a to b, c on the side of y.",
+         "VAL", _frame),
+    Form("RX", "angle -> frame", "A turn about x [deg].", "V+", about_x),
+    Form("RY", "angle -> frame", "A turn about y [deg].", "V+", about_y),
+    Form("RZ", "angle -> frame", "A turn about z [deg].", "V+", about_z),
+    Form("NULL", "-> frame", "No way and no turn.", "VAL", lambda: NULL, tags="constant"),
+    Form("HERE", "-> frame", "Where the tool is.", "VAL", lambda c: c.arm.here(now=c.now).tool,
+         tags="constant context"),
+    Form("DEST", "-> frame", "Where the tool goes.", "VAL-II", lambda c: c.arm.destination(now=c.now).tool,
+         tags="constant context"),
+    Form("#PPOINT", "j1?=0, j2?=0, j3?=0, j4?=0, j5?=0, j6?=0 -> location", "A precision point [deg].", "VAL-II",
+         _ppoint),
+    Form("#HERE", "-> location", "Where the arm is, as a precision point.", "ours",
+         lambda c: c.arm.here(now=c.now).joints, tags="constant context"),
+    Form("#DEST", "-> location", "Where the arm goes, as a precision point.", "V+",
+         lambda c: c.arm.destination(now=c.now).joints, tags="constant context"),
+)  # fmt: skip
+
+_IDLE_FUNCTIONS: Final = (
+    Form("IOSTAT", "lun:any, mode:any? -> real", "State of a file.", "V+", tags="idle"),
+    Form("GETC", "lun:any, mode:any? -> real", "A character of a file.", "V+", tags="idle"),
+    Form("LNGB", "text:string, from:any? -> real", "An integer of bytes.", "V+", tags="idle"),
+    Form("FLTB", "text:string, from:any? -> real", "A number of bytes.", "V+", tags="idle"),
+    Form("TASK", "mode:any?, number:any? -> real", "State of a task.", "V+", tags="idle"),
+    Form("$ERROR", "code:any -> string", "Text of an error.", "V+", tags="idle"),
+    Form("$LNGB", "value:any -> string", "Bytes of an integer.", "V+", tags="idle"),
+    Form("$FLTB", "value:any -> string", "Bytes of a number.", "V+", tags="idle"),
+)  # fmt: skip
+
+FUNCTIONS: Final[dict[str, Form]] = {
+    row.name: row for row in (*_REAL_FUNCTIONS, *_STRING_FUNCTIONS, *_LOCATION_FUNCTIONS, *_IDLE_FUNCTIONS)
 }
-"""Functions of signals, time and the arm, too."""
+"""Functions and constants, with their prefixes."""
+
+ALIASES: Final = {"PPOINT": "#PPOINT", "#PDEST": "#DEST", "#PHERE": "#HERE"}
+"""Other spellings of functions, and what they become."""
+
+CONSTANTS: Final = frozenset(
+    [*(row.name for row in FUNCTIONS.values() if "constant" in row.tags), "#PDEST", "#PHERE"]
+)
+"""What may be written without parentheses, and so can't be a variable's name."""
+
+_OPERATORS: Final = (
+    Form("OR", "a:condition, b:condition -> truth", "One holds, or both.", "VAL-II", operator.or_, level=1),
+    Form("XOR", "a:condition, b:condition -> truth", "One holds, not both.", "VAL-II", operator.xor, level=1),
+    Form("AND", "a:condition, b:condition -> truth", "Both hold.", "VAL-II", operator.and_, level=2),
+    Form("NOT", "a:condition -> truth", "It doesn't hold.", "VAL-II", operator.not_, level=3),
+    Form("==", "a:alike, b:alike -> truth", "Equal.", "VAL-II", operator.eq, level=4),
+    Form("<>", "a:alike, b:alike -> truth", "Not equal.", "VAL-II", operator.ne, level=4),
+    Form("<", "a:alike, b:alike -> truth", "Less.", "VAL-II", operator.lt, level=4),
+    Form("<=", "a:alike, b:alike -> truth", "Less or equal.", "VAL-II", operator.le, level=4),
+    Form(">", "a:alike, b:alike -> truth", "Greater.", "VAL-II", operator.gt, level=4),
+    Form(">=", "a:alike, b:alike -> truth", "Greater or equal.", "VAL-II", operator.ge, level=4),
+    Form("+", "a:alike, b:alike -> alike", "Sum; strings one behind the other.", "VAL-II",
+         lambda a, b: checked(a + b), level=5),
+    Form("-", "a, b -> real", "Difference.", "VAL-II", lambda a, b: checked(a - b), level=5),
+    Form("BOR", "a, b -> real", "Bits of either.", "VAL-II", _of_bits(operator.or_), level=5),
+    Form("BXOR", "a, b -> real", "Bits that differ.", "VAL-II", _of_bits(operator.xor), level=5),
+    Form("*", "a, b -> real", "Product.", "VAL-II", lambda a, b: checked(a * b), level=6),
+    Form("/", "a, b -> real", "Quotient.", "VAL-II", divide, level=6),
+    Form("MOD", "a, b -> real", "Rest of a division.", "VAL-II", modulo, level=6),
+    Form("BAND", "a, b -> real", "Bits of both.", "VAL-II", _of_bits(operator.and_), level=6),
+    Form("COM", "a -> real", "All bits turned.", "VAL-II", lambda a: float(~whole(a)), level=7),
+    Form("^", "a, b -> real", "Power.", "VAL-II", power, level=8),
+)  # fmt: skip
+OPERATORS: Final = {row.name: row for row in _OPERATORS}
+"""Operators; of those that bind as tightly, the first one comes first."""
+NEGATION: Final = Form("-", "a -> real", "The other sign.", "VAL-II", operator.neg, level=7)
+
+
+def row_of(e: Apply) -> Form:
+    """The row of a function or an operator."""
+    if e.function in FUNCTIONS:
+        return FUNCTIONS[e.function]
+    return NEGATION if e.function == "-" and len(e.arguments) == 1 else OPERATORS[e.function]

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Collection
 from functools import cache
 from importlib import resources
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2 import forms
-from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import Form, nearest
-from interfaces.val2.syntax import (
-    Apply,
-    Binary,
-    Compound,
-    Expression,
-    Format,
-    Number,
-    Text,
-    Unary,
-    Variable,
-)
+from interfaces.val2.errors import TextPosition, ValError, syntax_error
+from interfaces.val2.functions import NEGATION, OPERATORS, row_of
+from interfaces.val2.rows import nearest
+from interfaces.val2.syntax import Apply, Compound, Expression, Format, Number, Text, Variable
 
 SIGNIFICANT: Final = 15
 """Characters of a name that count, beside its prefix."""
@@ -38,23 +30,25 @@ _SPELLINGS: Final = {
 _BASES: Final = {"B": 2, "O": 8, "H": 16}
 _VALUE: Final = frozenset({"NUMBER", "STRING", "NAME", "LPAR", "MINUS", "PLUS", "NOT", "COM"})
 _PREFIXES: Final = ("NOT", "COM", "MINUS", "PLUS")
-_OPERATORS: Final = frozenset({"BINARY", "EQUALS", "PLUS", "MINUS", "OVER"})
+_INFIXES: Final = frozenset({"BINARY", "EQUALS", "PLUS", "MINUS", "OVER"})
+_END: Final = "the end of the line"
 _SHOWN: Final = {
     "NUMBER": "a number", "STRING": "a string", "NAME": "a name", "FORMAT": "a format such as /F8.2",
     "LPAR": "'('", "RPAR": "')'", "LSQB": "'['", "RSQB": "']'", "COMMA": "','", "COLON": "':'", "EQUALS": "'='",
-    "$END": "the end of the line",
 }  # fmt: skip
 
 Node: TypeAlias = Any
 """A tree or a token of Lark's, whose own types say nothing of what they hold."""
-Worded: TypeAlias = tuple[Expression | None, tuple[tuple[str, TextPosition], ...]]
-"""An operand, and the words behind it."""
 
 
 def name_of(text: str) -> str:
     """A name as trees have it: lower case, and as much of it as counts."""
-    prefix = text[0] if text[0] in "#$" else ""
-    return prefix + text[len(prefix) : len(prefix) + SIGNIFICANT].lower()
+    return text[: SIGNIFICANT + (text[0] in "#$")].lower()
+
+
+def type_of(node: Node) -> str:
+    """What kind of token a node is; empty of a tree, and of nothing."""
+    return getattr(node, "type", "")
 
 
 def read(text: str, start: str, line: int) -> Node:
@@ -68,26 +62,20 @@ def read(text: str, start: str, line: int) -> Node:
     Raises:
         ValError: If the grammar doesn't take it.
     """
-    from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
+    from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
     try:
         return _lark().parse(text, start=start)
     except UnexpectedToken as error:
         if error.token.type == "$END":
-            raise _unexpected(
-                "the end of the line", error.accepts, TextPosition(line, len(text.rstrip()) + 1)
-            ) from None
-        shown = f"'{error.token}'"
+            raise _unexpected(_END, error.accepts, line, len(text.rstrip()) + 1) from None
         allowed = error.accepts or _accepted_behind(text[: error.column - 1], start)
-        raise _unexpected(shown, allowed, TextPosition(line, error.column)) from None
+        raise _unexpected(f"'{error.token}'", allowed, line, error.column) from None
     except UnexpectedCharacters as error:
-        place = TextPosition(line, error.column)
-        if text[error.column - 1] == '"':
-            raise ValError("Syntax error", "the string has no closing quote", place=place) from None
-        shown = repr(text[error.column - 1])
-        raise _unexpected(shown, error.allowed or frozenset(), place) from None
-    except UnexpectedInput:
-        raise ValError("Syntax error", place=TextPosition(line, 1)) from None
+        character = text[error.column - 1]
+        if character == '"':
+            raise syntax_error("the string has no closing quote", line, error.column) from None
+        raise _unexpected(repr(character), error.allowed or (), line, error.column) from None
 
 
 def _accepted_behind(text: str, start: str) -> set[str]:
@@ -98,21 +86,16 @@ def _accepted_behind(text: str, start: str) -> set[str]:
     return accepted
 
 
-def _unexpected(what: str, allowed: Sequence[str] | frozenset[str] | set[str], place: TextPosition) -> ValError:
-    left = set(allowed) - {"IGNORE"}
-    shown = []
-    if left.issuperset(_VALUE):
-        left -= _VALUE
-        shown.append("a value")
-    if left.issuperset(_OPERATORS):
-        left -= _OPERATORS
-        shown.append("an operator")
-    last = "$END" in left
-    shown += sorted(_SHOWN.get(name, name) for name in left - {"$END"} if not name.startswith("__"))
-    if last:
-        shown.append(_SHOWN["$END"])
+def _unexpected(what: str, allowed: Collection[str], line: int, column: int) -> ValError:
+    left, shown = set(allowed) - {"IGNORE", "$END"}, []
+    for several, name in ((_VALUE, "a value"), (_INFIXES, "an operator")):
+        if left.issuperset(several):
+            left -= several
+            shown.append(name)
+    shown += sorted(_SHOWN.get(name, name) for name in left if not name.startswith("__"))
+    shown += [_END] if "$END" in allowed else []
     allowed_here = f"; allowed: {', '.join(shown)}" if shown else ""
-    return ValError("Syntax error", f"unexpected {what}{allowed_here}", place=place)
+    return syntax_error(f"unexpected {what}{allowed_here}", line, column)
 
 
 @cache
@@ -123,28 +106,6 @@ def _lark() -> Node:
     return Lark(grammar, parser="lalr", lexer="contextual", start=list(_STARTS), maybe_placeholders=True)
 
 
-def expression(node: Node, line: int, depth: int = 0) -> Expression:
-    """The expression of Lark's tree.
-
-    Raises:
-        ValError: If it holds what can't be: an unknown function, a number too large, too many levels.
-    """
-    if hasattr(node, "type"):
-        return _token(node, line)
-    if node.data == "expression":
-        depth += len(node.children) // 2
-    if depth > DEEPEST:
-        raise ValError("Expression too complex", f"more than {DEEPEST} levels", place=_first(node, line))
-    return _BUILDERS[node.data](node.children, line, depth + 1)
-
-
-def _token(token: Node, line: int) -> Expression:
-    at = TextPosition(line, token.column)
-    if token.type == "NUMBER":
-        return Number(number(token, line), at)
-    return Text(str(token[1:-1]), at)
-
-
 def number(token: Node, line: int) -> float:
     """The value of a number's token.
 
@@ -153,73 +114,76 @@ def number(token: Node, line: int) -> float:
     """
     value = float(int(token[2:], _BASES[token[1].upper()])) if token[0] == "^" else float(token)
     if not math.isfinite(value):
-        raise ValError("Number too large", str(token), place=TextPosition(line, token.column))
+        raise syntax_error(str(token), line, token.column, "Number too large")
     return value
 
 
-def _first(node: Node, line: int) -> TextPosition:
-    """Where a tree begins."""
-    token = next(node.scan_values(lambda _: True), None)
-    return TextPosition(line, 1 if token is None else token.column)
+def expression(node: Node, line: int, depth: int = 0) -> Expression:
+    """The expression of Lark's tree.
+
+    Raises:
+        ValError: If it holds what can't be: an unknown function, a number too large, too many levels.
+    """
+    kind = type_of(node)
+    if kind:
+        at = TextPosition(line, node.column)
+        return Number(number(node, line), at) if kind == "NUMBER" else Text(str(node[1:-1]), at)
+    if node.data == "expression":
+        depth += len(node.children) // 2
+    if depth > DEEPEST:
+        first = next(node.scan_values(lambda _: True), None)
+        detail = f"more than {DEEPEST} levels"
+        raise syntax_error(detail, line, 1 if first is None else first.column, "Expression too complex")
+    match node.data:
+        case "expression":
+            return _operation(node.children, line, depth + 1)
+        case "compound":
+            parts = [expression(child, line, depth + 1) for child in node.children]
+            flat = [inner for part in parts for inner in (part.parts if isinstance(part, Compound) else (part,))]
+            return Compound(tuple(flat), flat[0].at)
+        case "variable":
+            return _variable(node, line, depth + 1)
+        case _:
+            return _apply(node, line, depth + 1)
 
 
 def _operation(children: list[Node], line: int, depth: int) -> Expression:
-    return _OperatorRow(children, line, depth).expression(0)
+    """Operators and operands in a row: what binds more tightly comes first, else the left one does."""
+    left_over = deque(children)
 
-
-class _OperatorRow:
-    """Operators and operands in a row."""
-
-    def __init__(self, children: list[Node], line: int, depth: int) -> None:
-        self._children, self._line, self._depth = children, line, depth
-        self._next = 0
-
-    def expression(self, level: int) -> Expression:
+    def row(level: int) -> Expression:
         """What stands from here on, as far as operators bind as tightly as a level or more."""
-        left = self._operand(level)
-        while self._next < len(self._children):
-            token = self._children[self._next]
-            spelled = token.upper()
-            operator = _SPELLINGS.get(spelled, spelled)
-            own = forms.LEVELS[operator]
-            if own < level:
+        node = left_over.popleft()
+        if type_of(node) in _PREFIXES:
+            own = NEGATION if node.type == "PLUS" else row_of(Apply(node.upper(), (None,)))
+            left = row(max(level, own.level))
+            if node.type != "PLUS":
+                left = Apply(own.name, (left,), TextPosition(line, node.column))
+        else:
+            left = expression(node, line, depth)
+        while left_over:
+            token = left_over[0]
+            own = OPERATORS[_SPELLINGS.get(token.upper(), token.upper())]
+            if own.level < level:
                 break
-            self._next += 1
-            left = Binary(operator, left, self.expression(own + 1), TextPosition(self._line, token.column))
+            left_over.popleft()
+            left = Apply(own.name, (left, row(own.level + 1)), TextPosition(line, token.column))
         return left
 
-    def _operand(self, level: int) -> Expression:
-        node = self._children[self._next]
-        self._next += 1
-        if getattr(node, "type", "") not in _PREFIXES:
-            return expression(node, self._line, self._depth)
-        operand = self.expression(max(level, forms.LEVEL_OF_NOT if node.type == "NOT" else forms.LEVEL_OF_SIGN))
-        if node.type == "PLUS":
-            return operand
-        return Unary(node.upper(), operand, TextPosition(self._line, node.column))
+    return row(0)
 
 
-def _compound(children: list[Node], line: int, depth: int) -> Expression:
-    parts: list[Expression] = []
-    for child in children:
-        part = expression(child, line, depth)
-        parts += part.parts if isinstance(part, Compound) else (part,)
-    return Compound(tuple(parts), parts[0].at)
-
-
-def _variable(children: list[Node], line: int, depth: int) -> Expression:
-    token, indices = children
-    at = TextPosition(line, token.column)
-    upper = token.upper()
+def _variable(node: Node, line: int, depth: int) -> Expression:
+    token, indices = node.children
+    at, upper = TextPosition(line, token.column), token.upper()
     if indices is None:
         if upper in forms.CONSTANTS:
             return Apply(forms.ALIASES.get(upper, upper), (), at)
         if upper in forms.OPERATORS:
             raise _misplaced(upper, at)
         return Variable(name_of(token), (), at)
-    if not indices.children:
-        return Variable(name_of(token), (), at, array=True)
-    return Variable(name_of(token), tuple(expression(i, line, depth) for i in indices.children), at)
+    inner = tuple(expression(i, line, depth) for i in indices.children)
+    return Variable(name_of(token), inner, at, array=not inner)
 
 
 def variable(node: Node, line: int) -> Variable:
@@ -235,8 +199,8 @@ def variable(node: Node, line: int) -> Variable:
     raise ValError("Reserved name", f"{name} is a function", place=built.at)
 
 
-def _apply(children: list[Node], line: int, depth: int) -> Expression:
-    token, rest = children
+def _apply(node: Node, line: int, depth: int) -> Expression:
+    token, rest = node.children
     at = TextPosition(line, token.column)
     name = forms.ALIASES.get(token.upper(), token.upper())
     function = forms.FUNCTIONS.get(name)
@@ -245,33 +209,28 @@ def _apply(children: list[Node], line: int, depth: int) -> Expression:
             raise _misplaced(name, at)
         near = nearest(name, forms.FUNCTIONS)
         raise ValError("Undefined function", f"{token.upper()}{near}; an array has brackets", place=at)
-    return Apply(name, _arguments(rest, function, at, depth), at)
+    arguments: list[Expression | Format | None] = []
+    for child in rest.children:
+        match type_of(child):
+            case "BY" if name != "SHIFT":
+                raise syntax_error("BY belongs in SHIFT", line, child.column)
+            case "BY":
+                pass
+            case "FORMAT" if name != "$ENCODE":
+                detail = f"a format such as {child} belongs in TYPE and $ENCODE"
+                raise syntax_error(detail, line, child.column)
+            case "FORMAT":
+                arguments.append(form_of(child, line))
+            case _:
+                arguments.append(None if child is None else expression(child, line, depth))
+    if arguments == [None]:
+        arguments = []
+    function.expect(arguments, at)
+    return Apply(name, tuple(arguments), at)
 
 
 def _misplaced(operator: str, at: TextPosition) -> ValError:
     return ValError("Syntax error", f"{operator} can't stand here; parentheses may be missing", place=at)
-
-
-def _arguments(node: Node, function: Form, at: TextPosition, depth: int) -> tuple[Expression | Format | None, ...]:
-    line = at.line
-    arguments: list[Expression | Format | None] = []
-    for child in node.children:
-        kind = getattr(child, "type", "")
-        if kind == "BY":
-            if function.name != "SHIFT":
-                detail = "BY belongs in SHIFT"
-                raise ValError("Syntax error", detail, place=TextPosition(line, child.column))
-        elif kind == "FORMAT":
-            if function.name != "$ENCODE":
-                detail = f"a format such as {child} belongs in TYPE and $ENCODE"
-                raise ValError("Syntax error", detail, place=TextPosition(line, child.column))
-            arguments.append(form_of(child, line))
-        else:
-            arguments.append(None if child is None else expression(child, line, depth))
-    if arguments == [None]:
-        arguments = []
-    function.expect(arguments, at)
-    return tuple(arguments)
 
 
 def form_of(token: Node, line: int) -> Format:
@@ -283,26 +242,8 @@ def form_of(token: Node, line: int) -> Format:
     code = token[1].upper()
     if code not in forms.FORMATS:
         allowed = ", ".join(f"/{c}" for c in forms.FORMATS)
-        raise ValError("Invalid format", f"{token}; allowed: {allowed}", place=TextPosition(line, token.column))
+        raise syntax_error(f"{token}; allowed: {allowed}", line, token.column, "Invalid format")
     width, _, decimals = token[2:].partition(".")
     if len(width) > 3 or len(decimals) > 2:
-        raise ValError("Invalid format", f"{token} is too wide", place=TextPosition(line, token.column))
+        raise syntax_error(f"{token} is too wide", line, token.column, "Invalid format")
     return Format(code, int(width) if width else None, int(decimals) if decimals else None)
-
-
-def operand(node: Node, line: int) -> Worded:
-    """An operand, which may be left out, and the words behind it."""
-    if node is None:
-        return None, ()
-    if getattr(node, "data", "") != "worded":
-        return expression(node, line), ()
-    first, *words = node.children
-    return expression(first, line), tuple((w.upper(), TextPosition(line, w.column)) for w in words)
-
-
-_BUILDERS: Final[dict[str, Callable[[list[Node], int, int], Expression]]] = {
-    "expression": _operation,
-    "compound": _compound,
-    "variable": _variable,
-    "apply": _apply,
-}

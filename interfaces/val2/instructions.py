@@ -1,19 +1,23 @@
-"""Instructions, a keyword with operands each, as closures: what moves the arm, and what sets or asks something.
+"""The instructions of VAL: how they're written, and the closures that carry them out, a step each.
 
-One concept: each row says what one keyword does.
+One concept: each row of the table at the end says what one keyword is and does.
 
-Operands are evaluated before anything is asked. A motion waits until the one before it has begun, is asked for, and
-the program goes on when it has begun: it's then on its way while the next one is asked for, which may go round its
-destination. RIGHTY and its like let the next motion begin at rest.
+A closure returns the index of the next step. Operands are evaluated before anything is asked. A motion waits until
+the one before it has begun, is asked for, and the program goes on when it has begun: it's then on its way while the
+next one is asked for, which may go round its destination. RIGHTY and its like let the next motion begin at rest.
+
+GOTO may lead anywhere in a program, into structures too: a FOR whose head was jumped over is an error at its END,
+and a CASE whose head was jumped over ends where the next VALUE comes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from functools import partial
 from typing import Any, Final, Protocol, TypeAlias
 
-from interfaces.val2 import formats, forms, kinds
+from interfaces.val2 import formats
 from interfaces.val2.context import (
     ARM,
     SLICE,
@@ -22,218 +26,194 @@ from interfaces.val2.context import (
     Asked,
     Context,
     Finished,
+    Invoke,
+    Leave,
     StepFunction,
     Suspend,
     Typed,
     Waiting,
 )
 from interfaces.val2.errors import ValError
-from interfaces.val2.expressions import Expressions
-from interfaces.val2.forms import OperandSlot
-from interfaces.val2.functions import whole
-from interfaces.val2.memory import Slots, VariableSlot, mismatch
+from interfaces.val2.expressions import Expressions, kind_of
+from interfaces.val2.functions import OPERATORS, whole
+from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.motion.places import ALTER_PERIOD
+from interfaces.val2.rows import Form, OperandSlot
+from interfaces.val2.signals import reaction_to
+from interfaces.val2.structure import structure
 from interfaces.val2.syntax import (
     Apply,
-    Binary,
     Compound,
     Expression,
     Format,
     Instruction,
     Number,
-    Unary,
+    Program,
     Variable,
+    literal,
+    parts,
 )
-from interfaces.val2.values import NULL, Location, Transformation, about_z
+from interfaces.val2.values import NULL, Location, Transformation, about_z, to_oat
 
+Do: TypeAlias = Callable[..., object]
+"""Does what an instruction wants, of the context, the instruction, and the values of its operands."""
 Ask: TypeAlias = Callable[[], object]
-"""Asks for what an instruction wants; its operands have been evaluated."""
-Preparation: TypeAlias = Callable[..., Ask]
-"""Of the context, the instruction, and the values of its operands: what asks."""
+"""Does it with operands that have been evaluated."""
 
 
-def _move(c: Context, i: Instruction, location: Location, hand: float | None = None) -> Ask:
+class ProgramCompiler(Expressions):
+    """Makes closures of the steps of a program."""
+
+    def __init__(self, program: Program, context: Context) -> None:
+        """Find out what belongs together, and where the program's own names are.
+
+        Raises:
+            ValError: If its structures don't match, or a label is missing.
+        """
+        self.program, self.structure = program, structure(program)
+        self.jumps, self.blocks = self.structure.jumps, self.structure.blocks
+        scope: dict[str, int | VariableSlot] = {p.name: i for i, p in enumerate(program.parameters)}
+        self.names = len(program.parameters)
+        self.kept: dict[int, int] = {}
+        for i in (step.statement for step in program.steps):
+            if not isinstance(i, Instruction) or i.keyword not in ("AUTO", "LOCAL"):
+                continue
+            for name in (v.name for v in i.operands if v.name not in scope):
+                if i.keyword == "AUTO":
+                    scope[name] = self.names
+                    self.names += 1
+                else:
+                    scope[name] = context.memory.own(program.name, name)
+        super().__init__(context, scope)
+
+    def keep(self, n: int) -> int:
+        """Number of the slot in which the FOR at a step keeps its limits."""
+        return self.kept.setdefault(n, self.names + len(self.kept))
+
+    def prepared(self, i: Instruction, do: Do, check: Do | None = None) -> Callable[[Slots], Ask]:
+        """What evaluates an instruction's operands, and checks them, and gives what then does it."""
+        slots, c = STATEMENTS[i.keyword].slots, self.context
+        if i.keyword == "BASE" and stands_for_frame(i):
+            slots = (OperandSlot("transformation", "frame"),)
+        values = self.operands(slots, i.operands, i.keyword, i.at)
+
+        def prepare(s: Slots) -> Ask:
+            given = [value(s) for value in values]
+            if check is not None:
+                check(c, i, *given)
+            return lambda: do(c, i, *given)
+
+        return prepare
+
+    def special(self, action: Callable[[Slots], Action]) -> StepFunction:
+        """A step that wants something done."""
+        context = self.context
+
+        def step(s: Slots) -> int:
+            context.pending = action(s)
+            return SPECIAL
+
+        return step
+
+
+Act: TypeAlias = Callable[[ProgramCompiler, Instruction, int], StepFunction]
+"""Makes the closure of an instruction that is a step, counted from 0."""
+
+
+def stands_for_frame(i: Instruction) -> bool:
+    """Whether the only operand of BASE is a transformation."""
+    match i.operands:
+        case (Number(),):
+            return False
+        case (Apply(name),):
+            return name not in OPERATORS
+    return len(i.operands) == 1
+
+
+# What is done, of values.
+
+
+def _move(c: Context, i: Instruction, location: Location, hand: float | None = None) -> None:
     """MOVET's opening [mm] is over 0; TRUE opens, 0 closes."""
     opening = hand if hand is None or hand > 0.0 else hand != 0.0
-    straight = i.keyword in ("MOVES", "MOVEST")
-    return lambda: c.arm.move(location, straight=straight, hand=opening, now=c.now)
+    c.arm.move(location, straight=i.keyword in ("MOVES", "MOVEST"), hand=opening, now=c.now)
 
 
-def _approach(c: Context, i: Instruction, location: Location, height: float) -> Ask:
-    return lambda: c.arm.approach(location, height, straight=i.keyword == "APPROS", now=c.now)
+def _approach(c: Context, i: Instruction, location: Location, height: float) -> None:
+    c.arm.approach(location, height, straight=i.keyword == "APPROS", now=c.now)
 
 
-def _depart(c: Context, i: Instruction, distance: float) -> Ask:
-    return lambda: c.arm.depart(distance, straight=i.keyword == "DEPARTS", now=c.now)
+def _depart(c: Context, i: Instruction, distance: float) -> None:
+    c.arm.depart(distance, straight=i.keyword == "DEPARTS", now=c.now)
 
 
-def _drive(c: Context, _: Instruction, joint: float, angle: float, percent: float) -> Ask:
+def _check_drive(c: Context, _: Instruction, joint: float, _angle: float, percent: float) -> None:
     if joint not in range(1, 7):
         raise ValError("Illegal joint number", f"{joint:.9g}: 1 to 6")
     c.capped("DRIVE at", percent)
-    return lambda: c.arm.drive(int(joint), angle, percent, now=c.now)
 
 
-MOTIONS: Final[dict[str, Preparation]] = {
-    **dict.fromkeys(("MOVE", "MOVES", "MOVET", "MOVEST"), _move),
-    **dict.fromkeys(("APPRO", "APPROS"), _approach),
-    **dict.fromkeys(("DEPART", "DEPARTS"), _depart),
-    "DRIVE": _drive,
-    "DRAW": lambda c, _, *way: lambda: c.arm.draw(*way, now=c.now),
-    "READY": lambda c, _: lambda: c.arm.go_ready(now=c.now),
-    "NEST": lambda c, _: lambda: c.arm.nest(now=c.now),
-    "ALIGN": lambda c, _: lambda: c.arm.align(now=c.now),
-    "DELAY": lambda c, _, seconds: lambda: c.arm.delay(seconds, now=c.now),
-}
-"""What is asked for as a motion."""
-
-
-def _speed(c: Context, i: Instruction, speed: float, turn: float | None) -> Ask:
+def _speed(c: Context, i: Instruction, speed: float, turn: float | None) -> None:
     c.capped("SPEED of turning", turn or 0.0)
     if "MONITOR" in i.words:
         c.capped("Monitor SPEED", speed)
-        return lambda: c.arm.set_monitor_speed(speed, now=c.now)
+        c.arm.set_monitor_speed(speed, now=c.now)
+        return
     unit = next((u for u in ("MMPS", "IPS") if u in i.words), "%")
     c.capped("SPEED", speed, c.arm.fastest(unit), unit)
-    return lambda: c.arm.set_speed(speed, turn=turn, unit=unit, always=_always(i))
+    c.arm.set_speed(speed, turn=turn, unit=unit, always=_always(i))
 
 
 def _always(i: Instruction) -> bool:
     return "ALWAYS" in i.words
 
 
-def _accelerate(c: Context, _: Instruction, up: float, down: float | None) -> Ask:
+def _accelerate(c: Context, _: Instruction, up: float, down: float | None) -> None:
     values = up, up if down is None else down
     c.capped("ACCEL", max(values))
-    return lambda: c.arm.set_acceleration(*values)
+    c.arm.set_acceleration(*values)
 
 
-def _tolerance(c: Context, i: Instruction, percent: float | None) -> Ask:
-    return lambda: c.arm.set_tolerance(percent, fine=i.keyword == "FINE", always=_always(i))
+def _tolerance(c: Context, i: Instruction, percent: float | None) -> None:
+    c.arm.set_tolerance(percent, fine=i.keyword == "FINE", always=_always(i))
 
 
-def _configure(c: Context, i: Instruction) -> Ask:
-    def ask() -> None:
-        c.arm.set_configuration(i.keyword)
-        c.stop_first = True
-
-    return ask
+def _configure(c: Context, i: Instruction) -> None:
+    c.arm.set_configuration(i.keyword)
+    c.stop_first = True
 
 
-def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> Ask:
-    index = c.timer(number)
-
-    def ask() -> None:
-        c.timers[index] = c.now - seconds
-
-    return ask
+def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> None:
+    c.timers[c.timer(number)] = c.now - seconds
 
 
-def _switch(c: Context, i: Instruction) -> Ask:
-    def ask() -> None:
-        for name in i.words:
-            c.switch(name, i.keyword == "ENABLE")
-
-    return ask
+def _switch(c: Context, i: Instruction) -> None:
+    for name in i.words:
+        c.switch(name, i.keyword == "ENABLE")
 
 
-AT_ONCE: Final[dict[str, Preparation]] = {
-    **dict.fromkeys(("RIGHTY", "LEFTY", "ABOVE", "BELOW", "FLIP", "NOFLIP"), _configure),
-    "ACCEL": _accelerate,
-    "AT": lambda c, _, t: lambda: c.arm.at(t),
-    "CLOSE": lambda c, _: lambda: c.arm.set_hand(False),
-    "COARSE": _tolerance,
-    "DISABLE": _switch,
-    "DURATION": lambda c, i, t: lambda: c.arm.set_duration(t, always=_always(i)),
-    "ENABLE": _switch,
-    "FINE": _tolerance,
-    "IGNORE": lambda c, _, signal: lambda: c.reactions.ignore(signal),
-    "NONULL": lambda c, i: lambda: c.arm.set_nulling(False, always=_always(i)),
-    "NULL": lambda c, i: lambda: c.arm.set_nulling(True, always=_always(i)),
-    "OPEN": lambda c, _: lambda: c.arm.set_hand(True),
-    "PARAMETER": lambda c, i, value: lambda: c.parameter(i.words[0], value),
-    "RELAX": lambda c, _: lambda: c.arm.set_hand(None),
-    "RESET": lambda c, _: c.signals.reset,
-    "SIGNAL": lambda c, _, *numbers: lambda: c.signals.set(numbers),
-    "SPEED": _speed,
-    "TIMER": _set_timer,
-}
-"""What is done at once, and takes no time."""
-
-
-def _alter(c: Context, i: Instruction, _channel: float, mode: float, *correction: float) -> Ask:
+def _alter(c: Context, i: Instruction, _channel: float, mode: float, *correction: float) -> None:
     """ALTER; what is given behind the mode is the first correction."""
-    bits, corrects = whole(mode), any(operand is not None for operand in i.operands[2:])
-
-    def ask() -> None:
-        c.arm.set_alter(bits, now=c.now)
-        if corrects:
-            _correct(c, i, *correction)()
-
-    return ask
+    c.arm.set_alter(whole(mode), now=c.now)
+    if any(operand is not None for operand in i.operands[2:]):
+        _correct(c, i, *correction)
 
 
-def _correct(c: Context, _: Instruction, *values: float) -> Ask:
-    def ask() -> None:
-        c.powered()
-        c.arm.alter(values, now=c.now)
-
-    return ask
+def _correct(c: Context, _: Instruction, *values: float) -> None:
+    c.powered()
+    c.arm.alter(values, now=c.now)
 
 
-ALTERING: Final[dict[str, Preparation]] = {
-    **dict.fromkeys(("ALTER", "ALTON"), _alter),
-    **dict.fromkeys(("ALTOFF", "NOALTER"), lambda c, _: lambda: c.arm.set_alter(None, now=c.now)),
-    "ALTOUT": _correct,
-}
-"""What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
+def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> None:
+    if not isinstance(first, Transformation):
+        *way, turn = others
+        X = about_z(turn).X.copy()
+        X[:3, 3] = first, *way
+        first = Transformation(X)
+    c.arm.set_base(first)
 
 
-def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> Ask:
-    if isinstance(first, Transformation):
-        return lambda: c.arm.set_base(first)
-    *way, turn = others
-    X = about_z(turn).X.copy()
-    X[:3, 3] = first, *way
-    return lambda: c.arm.set_base(Transformation(X))
-
-
-AT_REST: Final[dict[str, Preparation]] = {
-    "BASE": _base,
-    "CLOSEI": lambda c, _: lambda: c.arm.actuate(False, now=c.now),
-    "OPENI": lambda c, _: lambda: c.arm.actuate(True, now=c.now),
-    "RELAXI": lambda c, _: lambda: c.arm.actuate(None, now=c.now),
-    "TOOL": lambda c, _, tool: lambda: c.arm.set_tool(NULL if tool is None else tool),
-}
-"""What is done when the arm stands."""
-
-
-def _prepared(x: Expressions, i: Instruction, make: Preparation) -> Callable[[Slots], Ask]:
-    """What evaluates an instruction's operands, and gives what then asks."""
-    slots, c = forms.INSTRUCTIONS[i.keyword].slots, x.context
-    if i.keyword == "BASE" and len(i.operands) == 1 and not isinstance(i.operands[0], Number | Unary | Binary):
-        slots = (OperandSlot("transformation", "frame"),)
-    parts = x.operands(slots, i.operands, i.keyword, i.at)
-    return lambda s: make(c, i, *[p(s) for p in parts])
-
-
-def _here(x: Expressions, i: Instruction) -> Callable[[Slots], Ask]:
-    c, frames, target = x.context, [], i.operands[0]
-    if isinstance(target, Compound):
-        frames, target = [x.transformation(p) for p in target.parts[:-1]], target.parts[-1]
-    if not isinstance(target, Variable) or target.prefix == "$" or (frames and target.prefix):
-        raise ValError("Invalid location", "HERE takes a name, or a compound that ends in one", place=i.at)
-    name, slot = target, x.reference(target)
-
-    def prepare(s: Slots) -> Ask:
-        before = NULL
-        for frame in frames:
-            before = before @ frame(s)
-        stands = c.arm.here(now=c.now)
-        value = stands.joints if name.prefix else before.inverse() @ stands.tool if frames else stands.tool
-        return lambda: c.memory.store(slot(s), value, name)
-
-    return prepare
+# How it's waited for.
 
 
 Pause: TypeAlias = Generator[float, None, None]
@@ -261,11 +241,6 @@ def until(context: Context, look: _Look) -> Pause:
         yield ARM
 
 
-def _special(context: Context, action: Action) -> int:
-    context.pending = action
-    return SPECIAL
-
-
 def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None, int]:
     """Ask for a motion, and wait until it has begun; what a REACTI dropped before it began is asked for again."""
     while True:
@@ -279,12 +254,11 @@ def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None
             return following
 
 
-def _standing(context: Context, ask: Ask | None, following: Any) -> Generator[float, None, Any]:
+def _standing(context: Context, ask: Ask, following: Any) -> Generator[float, None, Any]:
     """Wait for the arm to stand, ask, and wait again."""
     yield from until(context, context.arm.settled)
-    if ask is not None:
-        ask()
-        yield from until(context, context.arm.settled)
+    ask()
+    yield from until(context, context.arm.settled)
     return following
 
 
@@ -308,59 +282,6 @@ def _altering(context: Context, ask: Ask, following: int, *, ends: bool) -> Gene
     return following
 
 
-def _changes(e: Expression) -> bool:
-    """Whether the value of an expression changes with time alone."""
-    return any(isinstance(part, Apply) and part.function in _CHANGING for part in kinds.parts(e))
-
-
-def _wait(x: Expressions, i: Instruction, following: int) -> StepFunction:
-    """WAIT's condition; a bare number is a signal's, as in VAL. WAIT alone: a slice."""
-    if not i.operands:
-        return _sleep(x, i, following)
-    (e,), c = i.operands, x.context
-    number = e.operand if isinstance(e, Unary) and e.operator == "-" else e
-    test = x.condition(Apply("SIG", (e,), e.at) if isinstance(number, Number) else e)
-    polled = _changes(e)
-
-    def waiting(s: Slots) -> Generator[float, None, int]:
-        while not test(s):
-            yield c.now + SLICE if polled else math.inf
-        return following
-
-    return lambda s: _special(c, Waiting(waiting(s), interruptible=True))
-
-
-def _sleep(x: Expressions, i: Instruction, following: int) -> StepFunction:
-    """WAIT.EVENT: a time, or for ever, as there are no other programs to send events."""
-    c, *_, seconds = x.context, *x.operands(forms.INSTRUCTIONS[i.keyword].slots, i.operands, i.keyword, i.at)
-    otherwise = SLICE if i.keyword == "WAIT" else math.inf
-
-    def waiting(until: float) -> Generator[float, None, int]:
-        while c.now < until:
-            yield until
-        return following
-
-    def sleep(s: Slots) -> int:
-        given = seconds(s)
-        return _special(c, Waiting(waiting(c.now + (otherwise if given is None else given)), interruptible=True))
-
-    return sleep
-
-
-def _grasp(x: Expressions, i: Instruction, following: int, label: int | None) -> StepFunction:
-    c, least = x.context, x.real(i.operands[0])
-
-    def grasping(opening: float) -> Generator[float, None, int]:
-        yield from _standing(c, lambda: c.arm.actuate(False, now=c.now), None)
-        if c.arm.here(now=c.now).hand >= opening:
-            return following
-        if label is None:
-            raise ValError("Nothing in the hand", f"it's open by less than {opening:.9g} mm")
-        return label
-
-    return lambda s: _special(c, Waiting(grasping(least(s))))
-
-
 def _timed(c: Context, time: Callable[[Slots], float], prepare: Callable[[Slots], Ask]) -> Callable[[Slots], Ask]:
     """Ask for a motion at a time; where it can't be, the time isn't for the next one."""
 
@@ -380,90 +301,346 @@ def _timed(c: Context, time: Callable[[Slots], float], prepare: Callable[[Slots]
     return timed
 
 
-def instruction(x: Expressions, i: Instruction, index: int, jump: int | None) -> StepFunction:
-    """The closure of an instruction.
+def _nothing(_c: Context, _i: Instruction) -> None:
+    """Wait alone."""
 
-    Args:
-        x: Of the program.
-        i: The instruction.
-        index: Of its step.
-        jump: Index of the step to which its label leads, if it has one.
 
-    Raises:
-        ValError: If there's none of this keyword, or an operand is missing or of a wrong type.
-    """
-    c, following = x.context, index + 1
-    if i.keyword in MOTIONS:
-        motion = _prepared(x, i, MOTIONS[i.keyword])
-        timed = motion if i.begins is None else _timed(c, x.real(i.begins), motion)
-        return lambda s: _special(c, Waiting(_moving(c, timed(s), following)))
-    if i.keyword in AT_ONCE or i.keyword == "HERE":
-        prepare = _here(x, i) if i.keyword == "HERE" else _prepared(x, i, AT_ONCE[i.keyword])
+def _asked(
+    wait: Callable[[Context, Ask, Any], Generator[float, None, Any]], do: Do, check: Do | None = None
+) -> Act:
+    """What is asked for, and waited for."""
 
-        def now(s: Slots) -> int:
+    def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+        c, prepare = x.context, x.prepared(i, do, check)
+        asks = prepare if i.begins is None else _timed(c, x.of_kind("real", i.begins), prepare)
+        return x.special(lambda s: Waiting(wait(c, asks(s), n + 1)))
+
+    return act
+
+
+_motion: Final = partial(_asked, _moving)
+_at_rest: Final = partial(_asked, _standing)
+
+
+def _now(do: Do) -> Act:
+    """What is done at once, and takes no time."""
+
+    def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+        prepare = x.prepared(i, do)
+
+        def done(s: Slots) -> int:
             prepare(s)()
-            return _special(c, following)
+            return n + 1
 
-        return now
-    if i.keyword in ALTERING:
-        altering = _prepared(x, i, ALTERING[i.keyword])
-        corrects = i.keyword == "ALTOUT" or len(i.operands) > 2
+        return x.special(done)
 
-        def alter(s: Slots) -> int:
-            ask = altering(s)
+    return act
+
+
+def _alteration(do: Do) -> Act:
+    """What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
+
+    def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+        prepare, ends = x.prepared(i, do), i.keyword != "ALTOUT" and len(i.operands) <= 2
+
+        def alter(s: Slots) -> Waiting:
+            ask = prepare(s)
             ask()
-            return _special(c, Waiting(_altering(c, ask, following, ends=not corrects)))
+            return Waiting(_altering(x.context, ask, n + 1, ends=ends))
 
-        return alter
-    if i.keyword in AT_REST:
-        at_rest = _prepared(x, i, AT_REST[i.keyword])
-        return lambda s: _special(c, Waiting(_standing(c, at_rest(s), following)))
-    match i.keyword:
-        case "BREAK" | "BRAKE":
+        return x.special(alter)
 
-            def stop(_: Slots) -> int:
-                if i.keyword == "BRAKE":
-                    c.arm.brake(now=c.now)
-                return _special(c, Waiting(_standing(c, None, following)))
+    return act
 
-            return stop
-        case "TYPE":
-            return _type(x, i, following)
-        case "PROMPT":
-            return _prompt(x, i, following)
-        case "WAIT":
-            return _wait(x, i, following)
-        case "WAIT.EVENT":
-            return _sleep(x, i, following)
-        case "GRASP":
-            return _grasp(x, i, following, jump)
-        case "PAUSE":
-            return lambda _: _special(c, Waiting(_standing(c, None, Suspend(following))))
-        case "STOP" | "HALT":
-            return lambda _: _special(c, Waiting(_standing(c, None, Finished(i.keyword))))
-        case _:
-            raise ValError("Unknown instruction", i.keyword, place=i.at)
+
+def _ending(end: Callable[[Instruction, int], Finished | Suspend]) -> Act:
+    """What ends or pauses a program when the arm stands."""
+    return lambda x, i, n: x.special(lambda _: Waiting(_standing(x.context, lambda: None, end(i, n))))
+
+
+def _here(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    c, frames, target = x.context, [], i.operands[0]
+    if isinstance(target, Compound):
+        frames, target = [x.of_kind("frame", p) for p in target.parts[:-1]], target.parts[-1]
+    if not isinstance(target, Variable) or target.prefix == "$" or (frames and target.prefix):
+        raise ValError("Invalid location", "HERE takes a name, or a compound that ends in one", place=i.at)
+    name, slot = target, x.reference(target)
+
+    def record(s: Slots) -> int:
+        before = NULL
+        for frame in frames:
+            before = before @ frame(s)
+        stands = c.arm.here(now=c.now)
+        value = stands.joints if name.prefix else before.inverse() @ stands.tool if frames else stands.tool
+        c.memory.store(slot(s), value, name)
+        return n + 1
+
+    return x.special(record)
+
+
+def _changes(e: Expression) -> bool:
+    """Whether the value of an expression changes with time alone."""
+    return any(isinstance(part, Apply) and part.function in _CHANGING for part in parts(e))
+
+
+def _wait(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """WAIT's condition; a bare number is a signal's, as in VAL. WAIT alone: a slice."""
+    if not i.operands:
+        return _sleep(x, i, n)
+    (e,), c = i.operands, x.context
+    test = x.condition(e if literal(e) is None else Apply("SIG", (e,), e.at))
+    polled = _changes(e)
+
+    def waiting(s: Slots) -> Generator[float, None, int]:
+        while not test(s):
+            yield c.now + SLICE if polled else math.inf
+        return n + 1
+
+    return x.special(lambda s: Waiting(waiting(s), interruptible=True))
+
+
+def _sleep(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """WAIT.EVENT: a time, or for ever, as there are no other programs to send events."""
+    c, *_, seconds = x.context, *x.operands(STATEMENTS[i.keyword].slots, i.operands, i.keyword, i.at)
+    otherwise = SLICE if i.keyword == "WAIT" else math.inf
+
+    def waiting(until: float) -> Generator[float, None, int]:
+        while c.now < until:
+            yield until
+        return n + 1
+
+    def sleep(s: Slots) -> Waiting:
+        given = seconds(s)
+        return Waiting(waiting(c.now + (otherwise if given is None else given)), interruptible=True)
+
+    return x.special(sleep)
+
+
+def _grasp(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    c, least, label = x.context, x.of_kind("real", i.operands[0]), x.jumps.get(n)
+
+    def grasping(opening: float) -> Generator[float, None, int]:
+        yield from _standing(c, lambda: c.arm.actuate(False, now=c.now), None)
+        if c.arm.here(now=c.now).hand >= opening:
+            return n + 1
+        if label is None:
+            raise ValError("Nothing in the hand", f"it's open by less than {opening:.9g} mm")
+        return label
+
+    return x.special(lambda s: Waiting(grasping(least(s))))
+
+
+# What a step does with the program.
+
+
+def _passed(_x: ProgramCompiler, _i: Instruction, n: int) -> StepFunction:
+    return lambda _: n + 1
+
+
+def _jump(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
+    target = x.jumps[n]
+    return lambda _: target
+
+
+def _divide(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
+    """VALUE, ANY and ELSE: what comes from the step before goes on behind the block."""
+    target = x.blocks[n].end + 1
+    return lambda _: target
+
+
+def _leave(x: ProgramCompiler, _i: Instruction, _n: int) -> StepFunction:
+    action = Leave()
+    return x.special(lambda _: action)
+
+
+def _if(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """IF, WHILE, UNTIL; IF condition GOTO label."""
+    test, jump, following = x.condition(i.operands[0]), x.jumps[n], n + 1
+    if len(i.operands) > 1:
+        jump, following = following, jump
+    return lambda s: following if test(s) else jump
+
+
+def _end(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
+    block = x.blocks[n]
+    target = block.start if block.kind == "WHILE" else n + 1
+    if block.kind != "FOR":
+        return lambda _: target
+    k, body, following = x.keep(block.start), block.start + 1, n + 1
+    variable: Variable = x.program.steps[block.start].statement.operands[0]  # type: ignore[union-attr]
+
+    def again(s: Slots) -> int:
+        kept = s[k]
+        if kept is None:
+            raise ValError("Control structure error", "GOTO led into a FOR")
+        slot, limit, by = kept
+        value = slot.value
+        if value.__class__ is not float:
+            raise undefined(variable) if value is None else mismatch(variable)
+        slot.value = value = value + by
+        return body if (value <= limit if by > 0.0 else value >= limit) else following
+
+    return again
+
+
+def _for(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    variable, *limits = i.operands
+    if variable.prefix:
+        raise mismatch(variable)
+    memory = x.context.memory
+    start, stop, step = (x.of_kind("real", e) for e in (*limits, Number(1.0))[:3])
+    slot, k, body, past = x.reference(variable), x.keep(n), n + 1, x.blocks[n].end + 1
+
+    def begin(s: Slots) -> int:
+        value, limit, by = start(s), stop(s), step(s)
+        if by == 0.0:
+            raise ValError("Illegal value", "STEP 0")
+        counter = slot(s)
+        memory.store(counter, value, variable)
+        s[k] = counter, limit, by
+        return body if (value <= limit if by > 0.0 else value >= limit) else past
+
+    return begin
+
+
+def _case(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    (value,), block = i.operands, x.blocks[n]
+    kind = "string" if kind_of(value) == "string" else "real"
+    given, arms, otherwise = x.of_kind(kind, value), [], block.end + 1
+    for arm in block.arms:
+        statement = x.program.steps[arm].statement
+        if statement.keyword == "VALUE":
+            arms.append(([x.of_kind(kind, v) for v in statement.operands], arm + 1))  # type: ignore[union-attr]
+        else:
+            otherwise = arm + 1
+
+    def choose(s: Slots) -> int:
+        it = given(s)
+        for values, target in arms:
+            for one in values:
+                if one(s) == it:
+                    return target
+        return otherwise
+
+    return choose
+
+
+def _call(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """Arguments are by reference where they're names, by value where they're anything else."""
+    context, at = x.context, i.at
+
+    def argument(e: Expression | None) -> Callable[[Slots], VariableSlot]:
+        if e is None:
+            return lambda _: VariableSlot()
+        if isinstance(e, Variable):
+            return x.reference(e)
+        value = x.value(e)
+        return lambda s: VariableSlot(value(s))
+
+    given = [argument(a) for a in i.operands]
+    prefixes = [None if a is None else {"string": "$", "point": "#"}.get(kind_of(a), "") for a in i.operands]
+
+    def invoke(s: Slots) -> Invoke:
+        code = context.code(i.program, at)
+        for prefix, parameter in zip(prefixes, code.program.parameters, strict=False):
+            if prefix is not None and prefix != parameter.prefix:
+                raise ValError("Variable type mismatch", f"argument {parameter.name}", place=at)
+        return Invoke(code, code.slots([slot(s) for slot in given]), n + 1)
+
+    return x.special(invoke)
+
+
+def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    context, signal = x.context, x.of_kind("real", i.operands[0])
+
+    def watch(s: Slots) -> int:
+        if i.program:
+            context.code(i.program, i.at)
+        immediate = i.keyword == "REACTI"
+        context.reactions.add(reaction_to(signal(s), i.program, immediate=immediate, always=_always(i)))
+        return n + 1
+
+    return watch
+
+
+# Names.
+
+
+def _set(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    (name, e), context = i.operands, x.context
+    if name.prefix == "$":
+        raise mismatch(name)
+    slot, read = x.reference(name), x.of_kind("point" if name.prefix else "frame", e)
+
+    def set_(s: Slots) -> int:
+        value = read(s)
+        context.memory.store(slot(s), value, name)
+        return context.go_on(n + 1)
+
+    return set_
+
+
+def _assign(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    (name, e), memory, following = i.operands, x.context.memory, n + 1
+    if name.prefix == "#":
+        raise mismatch(name)
+    slot, read = x.reference(name), x.of_kind("string" if name.prefix else "real", e)
+    type_ = None if name.prefix else float
+
+    def assign(s: Slots) -> int:
+        value = read(s)
+        target = slot(s)
+        if target.value.__class__ is type_:
+            target.value = value
+        else:
+            memory.store(target, value, name)
+        return following
+
+    return assign
+
+
+def _decompose(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """Six numbers, from the element that is named on; from 0 where none is."""
+    (target, e), context, memory = i.operands, x.context, x.context.memory
+    if target.prefix:
+        raise mismatch(target)
+    if len(target.indices) > MOST_DIMENSIONS:
+        raise ValError("Invalid array index", f"{MOST_DIMENSIONS} dimensions at most", place=target.at)
+    read, place = x.of_kind("location", e), x.slot(target.name)
+    first = [x.of_kind("real", k) for k in target.indices] or [lambda _: 0.0]
+
+    def decompose(s: Slots) -> int:
+        location = read(s)
+        values = to_oat(location) if isinstance(location, Transformation) else location.joints
+        *before, start = [index(f(s), target.at) for f in first]
+        array = s[place] if isinstance(place, int) else place
+        for k, value in enumerate(values, start):
+            last = index(float(k), target.at)
+            memory.store(memory.element(array, (*before, last) if before else last), value, target)
+        return context.go_on(n + 1)
+
+    return decompose
 
 
 # Dialogue.
 
 
-def _type(x: Expressions, i: Instruction, following: int) -> StepFunction:
+def _type(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     context = x.context
-    parts = [o if isinstance(o, Format) else x.value(o) for o in i.operands]
+    items = [o if isinstance(o, Format) else x.value(o) for o in i.operands]
 
     def type_(s: Slots) -> int:
-        text, ends = formats.spelled([p if isinstance(p, Format) else p(s) for p in parts])
+        text, ends = formats.spelled([o if isinstance(o, Format) else o(s) for o in items])
         if context.switches["MESSAGES"]:
             context.events.append(Typed(text + "\n" if ends else text))
-        return context.go_on(following)
+        return context.go_on(n + 1)
 
     return type_
 
 
-def _prompt(x: Expressions, i: Instruction, following: int) -> StepFunction:
+def _prompt(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """Ask, and ask again until the answer is what is wanted."""
-    context, text, names = x.context, x.string(i.operands[0]), i.operands[1:]
+    context, text, names = x.context, x.of_kind("string", i.operands[0]), i.operands[1:]
     slots = [x.reference(v) for v in names]
     if any(v.prefix == "#" for v in names):
         raise mismatch(next(v for v in names if v.prefix == "#"))
@@ -484,13 +661,9 @@ def _prompt(x: Expressions, i: Instruction, following: int) -> StepFunction:
             context.asking = False
         for slot, value, name in zip(targets, values, names, strict=True):
             context.memory.store(slot, value, name)
-        return following
+        return n + 1
 
-    def ask(s: Slots) -> int:
-        context.pending = Waiting(asking(text(s), [slot(s) for slot in slots]))
-        return SPECIAL
-
-    return ask
+    return x.special(lambda s: Waiting(asking(text(s), [slot(s) for slot in slots])))
 
 
 def _answers(line: str, names: tuple[Variable, ...]) -> list[float | str] | None:
@@ -516,3 +689,174 @@ def _answers(line: str, names: tuple[Variable, ...]) -> list[float | str] | None
 
 def _wanted(names: tuple[Variable, ...]) -> str:
     return ", ".join(f"{v.name}: {'a string' if v.prefix else 'a number'}" for v in names)
+
+
+# The table.
+
+_MOTION: Final = (
+    Form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", _motion(_move)),
+    Form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", _motion(_move)),
+    Form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL",
+         _motion(_move)),
+    Form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL", _motion(_move)),
+    Form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
+         "VAL", _motion(_approach)),
+    Form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL", _motion(_approach)),
+    Form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.", "VAL",
+         _motion(_depart)),
+    Form("DEPARTS", "distance", "DEPART on a straight line.", "VAL", _motion(_depart)),
+    Form("DRIVE", "joint:joint, change, speed:percent", "Turn one joint by a change [deg] at a speed [%].", "VAL",
+         _motion(lambda c, _, joint, *how: c.arm.drive(int(joint), *how, now=c.now), _check_drive)),
+    Form("DRAW", "dx?=0, dy?=0, dz?=0", "Move straight by a way in world axes [mm].", "VAL",
+         _motion(lambda c, _, *way: c.arm.draw(*way, now=c.now))),
+    Form("READY", "", "Move to the ready position: the arm straight up.", "VAL",
+         _motion(lambda c, _: c.arm.go_ready(now=c.now))),
+    Form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II",
+         _motion(lambda c, _: c.arm.nest(now=c.now))),
+    Form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL",
+         _motion(lambda c, _: c.arm.align(now=c.now))),
+    Form("DELAY", "seconds:seconds", "Stand still for a time, as a motion.", "VAL",
+         _motion(lambda c, _, seconds: c.arm.delay(seconds, now=c.now))),
+    Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", _at_rest(_nothing)),
+    Form("BRAKE", "", "Stop the present motion at once.", "V+",
+         _at_rest(_nothing, lambda c, _: c.arm.brake(now=c.now))),
+    Form("AT", "time:time", "The next motion begins at a time of the session [s].", "ours",
+         _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]"),
+)  # fmt: skip
+
+_SETTINGS: Final = (
+    Form("SPEED", "speed:speed, turning:percent?",
+         "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.", "VAL", _now(_speed),
+         words="MMPS|IPS|MONITOR ALWAYS", tags="beside"),
+    Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _now(_accelerate)),
+    Form("DURATION", "seconds:seconds", "Shortest time of the next motion; ALWAYS: each.", "V+",
+         _now(lambda c, i, t: c.arm.set_duration(t, always=_always(i))), words="ALWAYS"),
+    Form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", _now(_tolerance),
+         words="ALWAYS"),
+    Form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", _now(_tolerance),
+         words="ALWAYS"),
+    Form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL",
+         _now(lambda c, i: c.arm.set_nulling(True, always=_always(i))), words="ALWAYS"),
+    Form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL",
+         _now(lambda c, i: c.arm.set_nulling(False, always=_always(i))), words="ALWAYS"),
+    Form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", _now(_configure)),
+    Form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", _now(_configure)),
+    Form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", _now(_configure)),
+    Form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", _now(_configure)),
+    Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", _now(_configure)),
+    Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", _now(_configure)),
+    Form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
+         _at_rest(lambda c, _, tool: c.arm.set_tool(NULL if tool is None else tool))),
+    Form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
+         "Where the robot stands in the world: shifted [mm], turned about z [deg].", "VAL", _at_rest(_base)),
+    Form("ENABLE", "", "Turn switches on.", "VAL", _now(_switch), usage="ENABLE switch, ..", tags="beside"),
+    Form("DISABLE", "", "Turn switches off.", "VAL", _now(_switch), usage="DISABLE switch, ..", tags="beside"),
+    Form("PARAMETER", "value", "Set a parameter.", "VAL-II",
+         _now(lambda c, i, value: c.parameter(i.words[0], value)), usage="PARAMETER name = value", tags="beside"),
+    Form("ALTER", "channel?=0, mode:mode?=0, dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
+         "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", _alteration(_alter),
+         usage="ALTER (channel) mode", tags="beside"),
+    Form("ALTOUT", "dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
+         "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II",
+         _alteration(_correct), tags="beside"),
+    Form("NOALTER", "", "Corrections of the path end.", "VAL-II",
+         _alteration(lambda c, _: c.arm.set_alter(None, now=c.now)), tags="beside"),
+    Form("ALTON", "channel?=0, mode:mode?=0", "As ALTER.", "V+", _alteration(_alter), usage="ALTON (channel) mode"),
+    Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
+)  # fmt: skip
+
+_HAND: Final = (
+    Form("OPEN", "", "Open the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(True))),
+    Form("CLOSE", "", "Close the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(False))),
+    Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL",
+         _now(lambda c, _: c.arm.set_hand(None))),
+    Form("OPENI", "", "Open the hand now, where the arm stands.", "VAL",
+         _at_rest(lambda c, _: c.arm.actuate(True, now=c.now))),
+    Form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL",
+         _at_rest(lambda c, _: c.arm.actuate(False, now=c.now))),
+    Form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL",
+         _at_rest(lambda c, _: c.arm.actuate(None, now=c.now))),
+    Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
+         _grasp),
+)  # fmt: skip
+
+_LOCATIONS: Final = (
+    Form("SET", "variable:variable, location:location", "Assign a location.", "VAL", _set,
+         usage="SET variable = location", tags="beside"),
+    Form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", _here,
+         tags="beside"),
+    Form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
+         "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside"),
+    Form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", _passed,
+         usage="SHIFT variable BY dx, dy, dz"),
+)  # fmt: skip
+
+_SIGNALS: Final = (
+    Form("SIGNAL", "number:output*", "Turn outputs on, or off where negative.", "VAL",
+         _now(lambda c, _, *numbers: c.signals.set(numbers)), tags="beside"),
+    Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
+    Form("WAIT", "condition?", "Wait until a condition holds.", "VAL", _wait),
+    Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
+    Form("TIMER", "number:timer, seconds", "Set a timer.", "VAL-II", _now(_set_timer),
+         usage="TIMER number = seconds", tags="beside"),
+    Form("REACT", "signal:signal, program:program?",
+         "Call a program after the present step when a signal turns on.", "VAL", _react, words="ALWAYS"),
+    Form("REACTI", "signal:signal, program:program?", "REACT, stopping the present motion at once.", "VAL", _react,
+         words="ALWAYS"),
+    Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
+         _now(lambda c, _, signal: c.reactions.ignore(signal))),
+)  # fmt: skip
+
+_CONTROL: Final = (
+    Form("IF", "condition:condition, label:label?", "Do steps if a condition holds.", "VAL", _if,
+         usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program"),
+    Form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", _divide,
+         tags="opens closes program"),
+    Form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", _end, tags="closes program"),
+    Form("WHILE", "condition:condition", "Repeat steps as long as a condition holds.", "VAL-II", _if,
+         usage="WHILE condition DO .. END", tags="opens program"),
+    Form("DO", "", "Repeat steps until a condition holds.", "VAL-II", _passed, usage="DO .. UNTIL condition",
+         tags="opens program"),
+    Form("UNTIL", "condition:condition", "The end of DO.", "VAL-II", _if, tags="closes program"),
+    Form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", _for,
+         usage="FOR variable = start TO stop [STEP step] .. END", tags="opens program"),
+    Form("CASE", "value:any", "Do the steps of one of several values.", "VAL-II", _case,
+         usage="CASE value OF .. END", tags="opens program"),
+    Form("VALUE", "value:any*", "What of a CASE is done for these values.", "VAL-II", _divide,
+         usage="VALUE value, ..:", tags="opens closes program"),
+    Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", _divide, tags="opens closes program"),
+    Form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", _jump, tags="program"),
+    Form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", _jump, tags="program"),
+    Form("GOTO", "label:label", "Go on at a label.", "VAL", _jump, tags="program"),
+    Form("CALL", "argument:any?*", "Call a program; arguments by reference.", "VAL-II", _call,
+         usage="CALL program(argument, ..)"),
+    Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program"),
+    Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program"),
+    Form("PAUSE", "", "Pause until PROCEED.", "VAL", _ending(lambda _, n: Suspend(n + 1))),
+    Form("STOP", "", "End this cycle of the program.", "VAL", _ending(lambda i, _: Finished(i.keyword))),
+    Form("HALT", "", "End the program, whatever cycles are left.", "VAL",
+         _ending(lambda i, _: Finished(i.keyword))),
+)  # fmt: skip
+
+_DIALOGUE: Final = (
+    Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside"),
+    Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt),
+    Form("REMARK", "text:text?", "A comment.", "VAL", _passed, usage="REMARK text"),
+    Form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", _passed,
+         usage="AUTO [REAL|LOC] name, ..", tags="program"),
+    Form("LOCAL", "name:variable*", "Names of this program alone.", "V+", _passed,
+         usage="LOCAL [REAL|LOC] name, ..", tags="program"),
+    Form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+", _passed,
+         usage="GLOBAL [REAL|LOC] name, ..", tags="program"),
+)  # fmt: skip
+
+INSTRUCTIONS: Final[dict[str, Form]] = {
+    row.name: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
+}
+"""Keywords of a program's lines."""
+STATEMENTS: Final = {
+    **INSTRUCTIONS,
+    "": Form("", "", "Nothing, or a comment alone.", "VAL", _passed),
+    "=": Form("=", "variable:variable, value:alike", "Assign a number or a string.", "VAL", _assign, tags="beside"),
+}
+"""Lines that begin with no keyword among them."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2.errors import NOWHERE, TextPosition, ValError
-from interfaces.val2.syntax import Number, Program, Unary, Variable
+from interfaces.val2.syntax import Number, Program, Variable, literal
 from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
 MOST_VALUES: Final = 100_000
@@ -237,12 +237,9 @@ def _key(variable: Variable) -> Key | None:
         return None
     keys = []
     for part in variable.indices:
-        if isinstance(part, Number):
-            keys.append(index(part.value, variable.at))
-        elif isinstance(part, Unary) and part.operator == "-" and isinstance(part.operand, Number):
-            keys.append(index(-part.operand.value, variable.at))
-        else:
+        if (value := literal(part)) is None:
             raise ValError("Invalid array index", variable.name, place=variable.at)
+        keys.append(index(value, variable.at))
     if len(keys) > MOST_DIMENSIONS:
         raise ValError("Invalid array index", f"{variable.name}: {MOST_DIMENSIONS} dimensions at most")
     return keys[0] if len(keys) == 1 else tuple(keys)

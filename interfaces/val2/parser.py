@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import Final, TypeAlias, TypeVar
 
 from interfaces.val2 import forms, grammar, statements
-from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import nearest
+from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.printer import print_step
+from interfaces.val2.rows import nearest
 from interfaces.val2.statements import HIGHEST_LABEL, OperandText
 from interfaces.val2.syntax import (
     BLANK,
@@ -33,7 +33,7 @@ _SURELY_SHORT: Final = 120
 """Characters of a line that can't come to too many when they're printed."""
 _INDENTED: Final = 250
 """Columns that structures may indent a line by, and a label."""
-_BREAK: Final = re.compile(r"\r\n|\r|\n")
+_BREAK: Final = re.compile(r"[\r\n]")
 _CODE: Final = re.compile(r'(?:[^";]|"[^"]*")*')
 _LABEL: Final = re.compile(r"\s*([0-9]+)(?![A-Za-z0-9_.])\s*")
 _HEAD: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)\s*(\[|=(?!=))?")
@@ -82,12 +82,9 @@ def read_line(text: str, line: int) -> Step:
 
 def _check_one_line(text: str, line: int) -> None:
     if len(text) > LONGEST_LINE:
-        detail = f"{LONGEST_LINE} characters at most"
-        raise ValError("Line too long", detail, place=TextPosition(line, LONGEST_LINE + 1))
-    if "\n" in text or "\r" in text:
-        found = _BREAK.search(text)
-        column = found.start() + 1 if found else 1
-        raise ValError("Syntax error", "one line is allowed", place=TextPosition(line, column))
+        raise syntax_error(f"{LONGEST_LINE} characters at most", line, LONGEST_LINE + 1, "Line too long")
+    if found := _BREAK.search(text):
+        raise syntax_error("one line is allowed", line, found.start() + 1)
 
 
 @lru_cache(maxsize=8192)
@@ -100,10 +97,10 @@ def cached_step(text: str, line: int) -> Step:
     label, begin = _label(code, line)
     found = _HEAD.match(code, begin)
     if found is None:
-        begin += len(code[begin:]) - len(code[begin:].lstrip())
+        begin = indented(code, begin)
         if begin < len(code):
             detail = f"unexpected {code[begin]!r}; allowed: an instruction, or a variable and '='"
-            raise ValError("Syntax error", detail, place=TextPosition(line, begin + 1))
+            raise syntax_error(detail, line, begin + 1)
         return Step(BLANK, label, comment, TextPosition(line, 1))
     at = TextPosition(line, found.start(1) + 1)
     keyword = found[1].upper()
@@ -126,7 +123,7 @@ def split_comment(text: str, line: int) -> tuple[str, str | None]:
         found = _CODE.match(text)
         end = found.end() if found else 0
         if text[end : end + 1] == '"':
-            raise ValError("Syntax error", "the string has no closing quote", place=TextPosition(line, end + 1))
+            raise syntax_error("the string has no closing quote", line, end + 1)
         code, semicolon, comment = text[:end], text[end : end + 1], text[end + 1 :]
     return code, comment.rstrip() if semicolon else None
 
@@ -137,9 +134,7 @@ def _label(code: str, line: int) -> tuple[int | None, int]:
     if found is None:
         return None, 0
     if len(found[1].lstrip("0")) > len(str(HIGHEST_LABEL)) or int(found[1]) > HIGHEST_LABEL:
-        raise ValError(
-            "Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=TextPosition(line, found.start(1) + 1)
-        )
+        raise syntax_error(f"allowed: 0 to {HIGHEST_LABEL}", line, found.start(1) + 1, "Invalid label")
     return int(found[1]), found.end()
 
 
@@ -164,7 +159,7 @@ def parse_program(text: str) -> Program:
     program, end = whole(read_program(lines, begin))
     for i in range(end, len(lines)):
         if lines[i].strip() and not lines[i].lstrip().startswith(";"):
-            raise ValError("Syntax error", "one program is allowed", place=TextPosition(i + 1, 1))
+            raise syntax_error("one program is allowed", i + 1, 1)
     return program
 
 
@@ -225,51 +220,50 @@ def unknown_directive(line: str, number: int) -> ValError:
     """The error of a line that begins with what is no directive."""
     word = line.split(maxsplit=1)[0]
     detail = f"{word}{nearest(word, DIRECTIVES)}; allowed: {', '.join(DIRECTIVES)}"
-    return ValError("Undefined directive", detail, place=TextPosition(number, len(line) - len(line.lstrip()) + 1))
+    return syntax_error(detail, number, indented(line) + 1, "Undefined directive")
 
 
 def _trimmed(steps: list[Step]) -> tuple[Step, ...]:
     """Without the blank lines at the end, where none says that they're the program's."""
-    end = len(steps)
-    while end and steps[end - 1] == Step(BLANK):
-        end -= 1
-    return tuple(steps[:end])
+    while steps and steps[-1] == Step(BLANK):
+        steps.pop()
+    return tuple(steps)
+
+
+def indented(text: str, begin: int = 0) -> int:
+    """Where the first character that isn't blank stands, from a place on, counted from 0."""
+    return len(text) - len(text[begin:].lstrip())
 
 
 def _header(line: str, number: int) -> tuple[str, tuple[Variable, ...], str | None]:
     code, comment = split_comment(line, number)
+    allowed = ".PROGRAM name(arguments)"
     found = _HEADER.match(code)
     if found is None:
-        at = TextPosition(number, len(line) - len(line.lstrip()) + 1)
-        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=at)
+        raise syntax_error(f"allowed: {allowed}", number, indented(line) + 1)
     name = _PROGRAM_NAME.match(code, found.end())
     if name is None:
-        raise ValError(
-            "Syntax error", "allowed: .PROGRAM name(arguments)", place=TextPosition(number, found.end() + 1)
-        )
+        raise syntax_error(f"allowed: {allowed}", number, found.end() + 1)
     parameters, end = _parameters(code, name.end(), number)
     if code[end:].strip():
-        column = end + len(code[end:]) - len(code[end:].lstrip()) + 1
-        raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=TextPosition(number, column))
+        raise syntax_error(f"allowed: {allowed}", number, indented(code, end) + 1)
     return grammar.name_of(name[0]), parameters, comment
 
 
 def _parameters(code: str, begin: int, line: int) -> tuple[tuple[Variable, ...], int]:
-    opening = begin + len(code[begin:]) - len(code[begin:].lstrip())
+    opening = indented(code, begin)
     if code[opening : opening + 1] != "(":
         return (), begin
     closing = code.find(")", opening)
     if closing < 0:
-        raise ValError("Syntax error", "')' is missing", place=TextPosition(line, len(code.rstrip()) + 1))
+        raise syntax_error("')' is missing", line, len(code.rstrip()) + 1)
     parameters: list[Variable] = []
     position = opening + 1
     while code[position:closing].strip():
         found = _PARAMETER.match(code, position, closing)
         if found is None or (found.end() < closing and code[found.end()] != ","):
             column = (found.end() if found else position) + 1
-            raise ValError(
-                "Syntax error", "allowed: names with commas between them", place=TextPosition(line, column)
-            )
+            raise syntax_error("allowed: names with commas between them", line, column)
         at = TextPosition(line, found.start(1) + 1)
         variable = Variable(grammar.name_of(found[1]), (), at, array=bool(found[2]))
         if found[1].upper() in forms.CONSTANTS:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from interfaces.val2 import forms
+from interfaces.val2.functions import NEGATION, OPERATORS, row_of
+from interfaces.val2.instructions import STATEMENTS
+from interfaces.val2.rows import TIGHTEST
 from interfaces.val2.syntax import (
     Apply,
-    Binary,
     Compound,
     Expression,
     Format,
@@ -18,8 +19,8 @@ from interfaces.val2.syntax import (
     Statement,
     Step,
     Text,
-    Unary,
     Variable,
+    children,
 )
 
 INDENT: Final = 2
@@ -27,7 +28,8 @@ INDENT: Final = 2
 MARGIN: Final = 6
 """Columns in which labels stand."""
 
-_NOT, _SIGN, _POWER, _COMPOUND, _ATOM = forms.LEVEL_OF_NOT, forms.LEVEL_OF_SIGN, forms.LEVELS["^"], 9, 10
+_COMPOUND: Final = TIGHTEST - 1
+_SIGN: Final = NEGATION.level
 
 
 def print_expression(expression: Expression) -> str:
@@ -44,31 +46,35 @@ def _spelled(expression: Expression, level: int) -> str:
 def _text(expression: Expression) -> tuple[str, int]:
     match expression:
         case Number(value):
-            return number(value), _ATOM if value >= 0 else _SIGN
+            return number(value), TIGHTEST if value >= 0 else _SIGN
         case Text(value):
             return string(value)
         case Variable():
-            return _variable(expression), _ATOM
-        case Apply(name, arguments):
-            return _apply(name, arguments), _ATOM
-        case Unary("NOT", operand):
-            return f"NOT {_spelled(operand, _NOT)}", _NOT
-        case Unary(operator, operand):
-            blank = " " if operator == "COM" else ""
-            return f"{operator}{blank}{_spelled(operand, _SIGN)}", _SIGN
-        case Binary("^", left, right):
-            return f"{_spelled(left, _POWER)}^{_exponent(right)}", _POWER
-        case Binary(operator, left, right):
-            level = forms.LEVELS[operator]
-            return f"{_spelled(left, level)} {operator} {_spelled(right, level + 1)}", level
+            return _variable(expression), TIGHTEST
+        case Apply():
+            return _applied(expression), row_of(expression).level
         case Compound(parts):
-            return ":".join(_spelled(part, _ATOM) for part in parts), _COMPOUND
+            return ":".join(_spelled(part, TIGHTEST) for part in parts), _COMPOUND
+
+
+def _applied(e: Apply) -> str:
+    level, operator = row_of(e).level, f"{e.function} " if e.function.isalpha() else e.function
+    match children(e):
+        case _ if e.function not in OPERATORS:
+            return _called(e)
+        case (operand,):
+            return operator + _spelled(operand, level)
+        case (left, right) if operator == "^":
+            return f"{_spelled(left, level)}^{_exponent(right)}"
+        case (left, right):
+            return f"{_spelled(left, level)} {e.function} {_spelled(right, level + 1)}"
+    raise AssertionError(e)
 
 
 def _exponent(expression: Expression) -> str:
-    if isinstance(expression, Unary) and expression.operator != "NOT":
-        blank = " " if expression.operator == "COM" else ""
-        return f"{expression.operator}{blank}{_exponent(expression.operand)}"
+    match expression, children(expression):
+        case Apply("-" | "COM" as operator), (operand,):
+            return f"{operator.replace('COM', 'COM ')}{_exponent(operand)}"
     return _spelled(expression, _COMPOUND)
 
 
@@ -91,7 +97,7 @@ def string(value: str) -> tuple[str, int]:
             plain += character
     if plain or not parts:
         parts.append(f'"{plain}"')
-    return " + ".join(parts), _ATOM if len(parts) == 1 else forms.LEVELS["+"]
+    return " + ".join(parts), TIGHTEST if len(parts) == 1 else OPERATORS["+"].level
 
 
 def _variable(variable: Variable) -> str:
@@ -102,12 +108,12 @@ def _variable(variable: Variable) -> str:
     return f"{variable.name}[{','.join(_spelled(i, 0) for i in variable.indices)}]"
 
 
-def _apply(name: str, arguments: tuple[Expression | Format | None, ...]) -> str:
-    if not arguments:
-        return name if forms.FUNCTIONS[name].constant else f"{name}()"
-    if name == "SHIFT" and len(arguments) > 1:
-        return f"SHIFT({_item(arguments[0])} BY {_listed(arguments[1:])})"
-    return f"{name}({_listed(arguments)})"
+def _called(e: Apply) -> str:
+    if not e.arguments:
+        return e.function if "constant" in row_of(e).tags else f"{e.function}()"
+    if e.function == "SHIFT" and len(e.arguments) > 1:
+        return f"SHIFT({_item(e.arguments[0])} BY {_listed(e.arguments[1:])})"
+    return f"{e.function}({_listed(e.arguments)})"
 
 
 def _listed(items: tuple[Expression | Format | None, ...]) -> str:
@@ -182,19 +188,11 @@ def print_program(program: Program) -> str:
     for step in program.steps:
         i = step.statement
         goes = isinstance(i, Ignored) or (i.keyword == "IF" and len(i.operands) > 1)
-        out, inside = (0, 0) if goes else _SHAPES.get(i.keyword, (0, 0))
-        level = max(level - out, 0)
+        tags = frozenset[str]() if goes else STATEMENTS[i.keyword].tags
+        level = max(level - ("closes" in tags), 0)
         lines.append(_line(step, level))
-        level += inside
+        level += "opens" in tags
     return "\n".join([*lines, ".END", ""])
-
-
-_SHAPES: Final = {
-    **dict.fromkeys(("END", "UNTIL"), (1, 0)),
-    **dict.fromkeys(("ELSE", "VALUE", "ANY"), (1, 1)),
-    **dict.fromkeys(("IF", "WHILE", "FOR", "CASE", "DO"), (0, 1)),
-}
-"""How many levels a statement stands further out, and how many what follows it stands further in."""
 
 
 def _line(step: Step, level: int) -> str:

@@ -14,12 +14,12 @@ from pathlib import PurePath
 from typing import Final
 
 from interfaces.val2 import forms, grammar
-from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import nearest_word
+from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import (
     Reading,
     directive,
+    indented,
     lines_of,
     read_program,
     read_steps,
@@ -28,15 +28,15 @@ from interfaces.val2.parser import (
     whole,
 )
 from interfaces.val2.printer import number, print_expression, print_program
+from interfaces.val2.rows import nearest_word
 from interfaces.val2.signals import SignalRule
-from interfaces.val2.syntax import Apply, Binary, Expression, Number, Program, Text, Variable
+from interfaces.val2.syntax import Apply, Expression, Number, Program, Text, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, from_oat, to_oat
 
 DECIMALS: Final = 9
 """Of lengths [mm] and angles [deg] of transformations: what is read again is printed as it was."""
 _NAME: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)(?:\s*\[([0-9,\s]*)\])?(?=[\s,=]|$)\s*[=,]?\s*")
-_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[Ee][+-]?[0-9]+)?(?=[\s,]|$)")
-_GAP: Final = re.compile(r"\s*,?\s*")
+_NUMBER: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[Ee][+-]?[0-9]+)?)(?=[\s,]|$)\s*,?\s*")
 _ELEMENT: Final = re.compile(r"[0-9]{1,6}")
 
 
@@ -101,7 +101,12 @@ class _SourceReader:
                     program, i = yield from read_program(self._lines, i)
                     self._add(program)
                 case ".LOCATIONS" | ".REALS" | ".STRINGS" | ".SIGNALS" as section:
-                    _check_alone(line, section, i + 1)
+                    code, _ = split_comment(line, i + 1)
+                    behind = indented(code) + len(section)
+                    if code[behind:].strip():
+                        raise syntax_error(
+                            f"allowed: {section} alone on its line", i + 1, indented(code, behind) + 1
+                        )
                     i = yield from self._section(section, i + 1)
                 case ".END":
                     i += 1
@@ -125,8 +130,7 @@ class _SourceReader:
         if not split_comment(self._lines[i], i + 1)[0].strip():
             return i + 1
         if self._programs:
-            column = len(self._lines[i]) - len(self._lines[i].lstrip()) + 1
-            raise ValError("Syntax error", "allowed: .PROGRAM name(arguments)", place=TextPosition(i + 1, column))
+            raise syntax_error("allowed: .PROGRAM name(arguments)", i + 1, indented(self._lines[i]) + 1)
         stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(self._name).stem)
         name = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
         steps, end = yield from read_steps(self._lines, i, name)
@@ -148,19 +152,10 @@ class _SourceReader:
         return len(self._lines)
 
 
-def _check_alone(line: str, section: str, number: int) -> None:
-    """See that nothing stands behind the word that begins a section."""
-    code, _ = split_comment(line, number)
-    behind = code.lstrip()[len(section) :]
-    if behind.strip():
-        column = len(code) - len(behind.lstrip()) + 1
-        raise ValError("Syntax error", f"allowed: {section} alone on its line", place=TextPosition(number, column))
-
-
 def _variable(code: str, line: int, prefixes: str) -> tuple[Variable, int]:
     """The variable that a line begins with, and where what stands behind it begins."""
     found = _NAME.match(code)
-    at = TextPosition(line, len(code) - len(code.lstrip()) + 1)
+    at = TextPosition(line, indented(code) + 1)
     if found is None:
         raise ValError("Syntax error", "allowed: a name, and its value", place=at)
     prefix = found[1][0] if found[1][0] in "#$" else ""
@@ -182,16 +177,15 @@ def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
         found = _NUMBER.match(code, position)
         if found is None or len(values) == count:
             what = "a number" if len(values) < count else "the end of the line"
-            raise ValError("Syntax error", f"allowed: {what}", place=TextPosition(line, position + 1))
-        value = float(found[0])
+            raise syntax_error(f"allowed: {what}", line, position + 1)
+        value = float(found[1])
         if not math.isfinite(value):
-            raise ValError("Number too large", found[0], place=TextPosition(line, position + 1))
+            raise syntax_error(found[1], line, position + 1, "Number too large")
         values.append(value)
-        gap = _GAP.match(code, found.end())
-        position = gap.end() if gap else found.end()
+        position = found.end()
     if len(values) < count:
         detail = f"{len(values)} of {count} numbers"
-        raise ValError("Missing argument", detail, place=TextPosition(line, len(code.rstrip()) + 1))
+        raise syntax_error(detail, line, len(code.rstrip()) + 1, "Missing argument")
     return tuple(values)
 
 
@@ -224,8 +218,8 @@ def _constant(expression: Expression) -> str:
             return value
         case Apply("$CHR", (Number(code),)) if code.is_integer() and 0 <= code <= 0x10FFFF:
             return chr(int(code))
-        case Binary("+", left, right):
-            return _constant(left) + _constant(right)
+        case Apply("+", (left, right)):
+            return _constant(left) + _constant(right)  # type: ignore[arg-type]
     raise ValError("Syntax error", "allowed: strings and $CHR(code) with + between them", place=expression.at)
 
 
@@ -258,7 +252,7 @@ def parse_rule(text: str, line: int = 1) -> SignalRule:
     times: dict[str, float] = {}
     for word, seconds in zip(rest[::2], rest[1::2], strict=True):
         if word.type in times:
-            raise ValError("Syntax error", f"a second {word}", place=TextPosition(line, word.column))
+            raise syntax_error(f"a second {word}", line, word.column)
         times[word.type] = grammar.number(seconds, line)
     return SignalRule(
         int(number_of),

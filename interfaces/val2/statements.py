@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.forms import MISSING, TOO_MANY, Form, nearest
-from interfaces.val2.grammar import Node, Worded
+from interfaces.val2.functions import row_of
+from interfaces.val2.grammar import Node, type_of
+from interfaces.val2.rows import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.syntax import (
     Apply,
     Compound,
@@ -20,17 +21,37 @@ from interfaces.val2.syntax import (
     Number,
     Statement,
     Text,
-    Unary,
     Variable,
+    literal,
 )
 
 HIGHEST_LABEL: Final = 65535
+MOST_LOOPS: Final = 100
+"""What EXIT and NEXT may count."""
 _SIMPLE: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)\s*\Z")
 _PLAIN: Final = re.compile(
     r"\s*(#?[A-Za-z][A-Za-z0-9_.]*)[ \t]*"
     r"\(((?:[ \t]*-?[0-9]{1,15}(?:\.[0-9]*)?[ \t]*,)*[ \t]*-?[0-9]{1,15}(?:\.[0-9]*)?[ \t]*)\)\s*\Z"
 )
 _NUMBER: Final = re.compile(r"(-?)([0-9]+(?:\.[0-9]*)?)")
+_CHANNEL: Final = re.compile(
+    r"(\s*)\(([^()]*)\)(\s*)(?=[0-9.(A-Za-z])(?!(?:AND|X?OR|MOD|B(?:AND|X?OR)|EQ|NE|L[TE]|G[TE])(?![A-Za-z0-9_.]))",
+    re.IGNORECASE | re.ASCII,
+)
+_KIND: Final = re.compile(r"\s*(REAL|DOUBLE|LOC)\s+(?=[A-Za-z#$])", re.IGNORECASE | re.ASCII)
+_SETTING: Final = re.compile(r"\s*([A-Za-z][A-Za-z0-9_.]*)\s*(=(?!=))?")
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
+_TIMED: Final = re.compile(
+    r"(.*?[^\s+\-*/^(,:<>=])\s+(MOVES?T?|APPROS?|DEPARTS?|DRIVE|DRAW|READY|NEST|ALIGN)(?![A-Za-z0-9_.])",
+    re.IGNORECASE | re.ASCII,
+)
+_BETWEEN: Final = ("EQUALS", "TO", "STEP", "BY", "THEN", "GOTO", "DO", "OF")
+"""Words of the grammar between operands."""
+
+Word: TypeAlias = tuple[str, TextPosition]
+"""A word behind an operand, upper case, and where it stands."""
+Worded: TypeAlias = tuple[Expression | None, tuple[Word, ...]]
+"""An operand, and the words behind it."""
 
 
 class OperandText:
@@ -45,7 +66,7 @@ class OperandText:
             at: Where the keyword stands.
         """
         self.text = " " * behind + code[behind:]
-        self.at, self.line, self.behind = at, at.line, behind
+        self.at, self.line, self._behind = at, at.line, behind
 
     @property
     def empty(self) -> bool:
@@ -55,20 +76,28 @@ class OperandText:
     @property
     def end(self) -> TextPosition:
         """Behind the last character of the line."""
-        return TextPosition(self.line, max(len(self.text.rstrip()), self.behind) + 1)
+        return TextPosition(self.line, max(len(self.text.rstrip()), self._behind) + 1)
 
     @property
     def start(self) -> TextPosition:
         """At the first character behind the keyword."""
         return TextPosition(self.line, len(self.text) - len(self.text.lstrip()) + 1)
 
+    def unreadable(self, detail: str, at: TextPosition | None = None) -> ValError:
+        """The error of a rest that can't be; at its start unless it's told where."""
+        return ValError("Syntax error", detail, place=at or self.start)
+
+    def skip(self, characters: int) -> None:
+        """Have blanks in place of the first characters."""
+        self.text = " " * characters + self.text[characters:]
+
     def tree(self, start: str) -> list[Node]:
         """The children of Lark's tree."""
         return list(grammar.read(self.text, start, self.line).children)
 
-    def expression(self, node: Node) -> Expression:
-        """The expression of a tree."""
-        return grammar.expression(node, self.line)
+    def expression(self) -> Expression:
+        """The expression that all of it is."""
+        return grammar.expression(grammar.read(self.text, "expression", self.line), self.line)
 
     def operands(self) -> list[Worded]:
         """The operands between commas, with the words behind each; none if the rest is empty."""
@@ -78,7 +107,14 @@ class OperandText:
             return [(Variable(grammar.name_of(simple[1]), (), TextPosition(self.line, simple.start(1) + 1)), ())]
         if (plain := _PLAIN.match(self.text)) and (built := self._call_of_numbers(plain)) is not None:
             return [(built, ())]
-        return [grammar.operand(node, self.line) for node in self.tree("operands")]
+        return [self._worded(node) for node in self.tree("operands")]
+
+    def _worded(self, node: Node) -> Worded:
+        if node is None:
+            return None, ()
+        first, *words = node.children if getattr(node, "data", "") == "worded" else [node]
+        found = tuple((word.upper(), TextPosition(self.line, word.column)) for word in words)
+        return grammar.expression(first, self.line), found
 
     def _call_of_numbers(self, plain: re.Match[str]) -> Apply | None:
         """A call such as `TRANS(1, 2, -3.5)`, of which long programs are full, without the grammar; or None."""
@@ -86,12 +122,10 @@ class OperandText:
         row = forms.FUNCTIONS.get(name)
         arguments: list[Expression] = []
         for found in _NUMBER.finditer(plain[2]):
-            at = TextPosition(self.line, plain.start(2) + found.start() + 1)
-            if found[1]:
-                magnitude = Number(float(found[2]), TextPosition(self.line, at.column + 1))
-                arguments.append(Unary("-", magnitude, at))
-            else:
-                arguments.append(Number(float(found[2]), at))
+            column = plain.start(2) + found.start() + 1
+            at = TextPosition(self.line, column)
+            value = Number(float(found[2]), TextPosition(self.line, column + len(found[1])))
+            arguments.append(Apply("-", (value,), at) if found[1] else value)
         if row is None or len(arguments) != len(row.slots):
             return None
         return Apply(name, tuple(arguments), TextPosition(self.line, plain.start(1) + 1))
@@ -106,61 +140,101 @@ class OperandText:
             self.require(row)
         elif self.empty:
             return []
-        nodes = [node for node in self.tree(start) if getattr(node, "type", "") not in _BETWEEN]
-        return [self._by_kind(node, row.slots[min(n, len(row.slots) - 1)].kind) for n, node in enumerate(nodes)]
+        nodes = [node for node in self.tree(start) if type_of(node) not in _BETWEEN]
+        return [self._by_kind(node, row.slot(n).kind) for n, node in enumerate(nodes)]
 
     def _by_kind(self, node: Node, kind: str) -> Any:
         if node is None:
             return None
         if kind == "variable":
             return grammar.variable(node, self.line)
-        if kind == "label":
-            return label_of(self.expression(node), self)
-        return grammar.form_of(node, self.line) if getattr(node, "type", "") == "FORMAT" else self.expression(node)
+        if type_of(node) == "FORMAT":
+            return grammar.form_of(node, self.line)
+        operand = grammar.expression(node, self.line)
+        return self.label(operand) if kind == "label" else operand
 
-    def require(self, form: Form) -> None:
+    def label(self, operand: Expression | None) -> Number:
+        """The label that an operand names.
+
+        Raises:
+            ValError: If it isn't one.
+        """
+        if isinstance(operand, Number) and operand.value.is_integer() and operand.value <= HIGHEST_LABEL:
+            return operand
+        place = operand.at if operand else self.start
+        raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=place)
+
+    def require(self, row: Form) -> None:
         """See that there's something.
 
         Raises:
             ValError: If there's nothing.
         """
         if self.empty:
-            raise ValError(MISSING, form.usage, place=self.end)
+            raise ValError(MISSING, row.usage, place=self.end)
+
+    def operands_and_words(self, row: Form) -> tuple[list[Any], tuple[str, ...]]:
+        """Tell operands from words, which look like variables where no operand stands before them.
+
+        Raises:
+            ValError: If a word isn't allowed.
+        """
+        operands: list[Expression | None] = []
+        found: list[Word] = []
+        for operand, words in self.operands():
+            word = as_word(operand)
+            if operand is not None and word in row.allowed_words:
+                found.append((word, operand.at))
+            else:
+                operands.append(operand)
+            found += words
+        ordered = []
+        for group in row.words:
+            here = [(word, at) for word, at in found if word in group]
+            if len(here) > 1:
+                raise self.unreadable(f"one of {', '.join(group)} is allowed", here[1][1])
+            ordered += [word for word, _ in here]
+        for word, at in found:
+            if word not in row.allowed_words:
+                raise self.unreadable(f"unexpected {word}; allowed: {row.usage}", at)
+        return _given(operands), tuple(ordered)
+
+    def too_many(self, row: Form, extra: Expression | None = None) -> ValError:
+        """The error of too many operands, where the first one stands that is too many."""
+        return ValError(TOO_MANY, f"allowed: {row.usage}", place=self.end if extra is None else extra.at)
+
+    def count(self, row: Form, operands: list[Any]) -> None:
+        """Count the operands.
+
+        Raises:
+            ValError: If there are too few or too many of them.
+        """
+        if len(operands) > len(row.slots) and not row.repeats:
+            raise self.too_many(row, operands[len(row.slots)])
+        for i, slot in enumerate(row.slots):
+            if slot.required and (i >= len(operands) or operands[i] is None):
+                raise ValError(MISSING, f"{slot.name}; allowed: {row.usage}", place=self.end)
+
+    def has_strangers(self, names: list[str], kind: str, known: Collection[str]) -> bool:
+        """Whether some of what is named isn't known here: then it's V+'s, and passed over.
+
+        Raises:
+            ValError: If one looks like one that is known, or stands beside one.
+        """
+        strange = [name for name in names if name not in known]
+        for name in strange:
+            close = nearest(name, known)
+            if close or len(names) > len(strange):
+                detail = f"{name}{close}; allowed: {', '.join(sorted(known))}"
+                raise ValError(f"Unknown {kind}", detail, place=self.start)
+        return bool(strange)
 
 
-def operands_and_words(row: Form, given: list[Worded]) -> tuple[list[Expression | None], tuple[str, ...]]:
-    """Tell operands from words, which look like variables where no operand stands before them.
-
-    Raises:
-        ValError: If a word isn't allowed.
-    """
-    operands: list[Expression | None] = []
-    found: list[tuple[str, TextPosition]] = []
-    allowed = row.allowed_words
-    for operand, words in given:
-        word = as_word(operand)
-        if word in allowed and isinstance(operand, Variable | Text):
-            found.append((word, operand.at))
-        else:
-            operands.append(operand)
-        found += words
+def _given(operands: list[Any]) -> list[Any]:
+    """Operands without those at the end that were left out."""
     while operands and operands[-1] is None:
         operands.pop()
-    return operands, _ordered(row, found)
-
-
-def _ordered(row: Form, found: list[tuple[str, TextPosition]]) -> tuple[str, ...]:
-    words = []
-    for group in row.words:
-        here = [(word, at) for word, at in found if word in group]
-        if len(here) > 1:
-            raise ValError("Syntax error", f"one of {', '.join(group)} is allowed", place=here[1][1])
-        words += [word for word, _ in here]
-    for word, at in found:
-        if word not in row.allowed_words:
-            detail = f"unexpected {word}; allowed: {row.usage}"
-            raise ValError("Syntax error", detail, place=at)
-    return tuple(words)
+    return operands
 
 
 def as_word(operand: Expression | None) -> str:
@@ -170,65 +244,6 @@ def as_word(operand: Expression | None) -> str:
     return operand.value.upper() if isinstance(operand, Text) else ""
 
 
-def count(row: Form, operands: list[Expression | None], rest: OperandText) -> None:
-    """Count the operands.
-
-    Raises:
-        ValError: If there are too few or too many of them.
-    """
-    if len(operands) > len(row.slots) and not row.repeats:
-        extra = operands[len(row.slots)]
-        raise ValError(TOO_MANY, f"allowed: {row.usage}", place=extra.at if extra is not None else rest.end)
-    for i, slot in enumerate(row.slots):
-        if slot.required and (i >= len(operands) or operands[i] is None):
-            raise ValError(MISSING, f"{slot.name}; allowed: {row.usage}", place=rest.end)
-
-
-def label_of(operand: Expression | None, rest: OperandText) -> Number:
-    """The label that an operand names.
-
-    Raises:
-        ValError: If it isn't one.
-    """
-    if isinstance(operand, Number) and operand.value.is_integer() and operand.value <= HIGHEST_LABEL:
-        return operand
-    raise ValError("Invalid label", f"allowed: 0 to {HIGHEST_LABEL}", place=operand.at if operand else rest.start)
-
-
-def reject_misspelling(kind: str, names: list[str], known: Collection[str], at: TextPosition) -> None:
-    """See that names which aren't known don't look like those that are, and don't stand beside them.
-
-    Raises:
-        ValError: If one does.
-    """
-    for name in names:
-        close = nearest(name, known)
-        if name not in known and (close or len(names) > sum(one not in known for one in names)):
-            raise ValError(f"Unknown {kind}", f"{name}{close}; allowed: {', '.join(sorted(known))}", place=at)
-
-
-MOST_LOOPS: Final = 100
-"""What EXIT and NEXT may count."""
-_BETWEEN: Final = ("EQUALS", "TO", "STEP", "BY", "THEN", "GOTO", "DO", "OF")
-"""Words of the grammar between operands."""
-_RULES: Final = {
-    "SET": "assignment", "DECOMPOSE": "assignment", "TIMER": "timing", "IF": "branch", "WHILE": "while",
-    "UNTIL": "until", "FOR": "loop", "CASE": "case", "TYPE": "items",
-}  # fmt: skip
-"""What of the grammar stands behind keywords."""
-_CHANNEL: Final = re.compile(
-    r"(\s*)\(([^()]*)\)(\s*)(?=[0-9.(A-Za-z])(?!(?:AND|X?OR|MOD|B(?:AND|X?OR)|EQ|NE|L[TE]|G[TE])(?![A-Za-z0-9_.]))",
-    re.IGNORECASE | re.ASCII,
-)
-_KIND: Final = re.compile(r"\s*(REAL|DOUBLE|LOC)\s+(?=[A-Za-z#$])", re.IGNORECASE | re.ASCII)
-_SETTING: Final = re.compile(r"\s*([A-Za-z][A-Za-z0-9_.]*)\s*(=(?!=))?")
-_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
-_TIMED: Final = re.compile(
-    r"(.*?[^\s+\-*/^(,:<>=])\s+(MOVES?T?|APPROS?|DEPARTS?|DRIVE|DRAW|READY|NEST|ALIGN)(?![A-Za-z0-9_.])",
-    re.IGNORECASE | re.ASCII,
-)
-
-
 def statement(keyword: str, rest: OperandText) -> Statement:
     """The statement of a keyword, upper case, and what stands behind it.
 
@@ -236,17 +251,15 @@ def statement(keyword: str, rest: OperandText) -> Statement:
         ValError: If that can't be.
     """
     row = forms.INSTRUCTIONS.get(keyword)
-    if row is not None and keyword in _RULES:
-        operands = rest.by_rule(row, _RULES[keyword])
-        while operands and operands[-1] is None:
-            operands.pop()
-        return Instruction(keyword, tuple(operands), (), rest.at)
     if row is not None:
-        return _OWN.get(keyword, _instruction)(row, rest)
+        rule = _RULES.get(keyword, _instruction)
+        if isinstance(rule, str):
+            return Instruction(keyword, tuple(_given(rest.by_rule(row, rule))), (), rest.at)
+        return rule(row, rest)
     if keyword in forms.IGNORED:
         return Ignored(keyword, rest.text.strip(), rest.at)
     if rest.text.lstrip().startswith("=="):
-        raise ValError("Syntax error", "'==' compares, '=' assigns", place=rest.start)
+        raise rest.unreadable("'==' compares, '=' assigns")
     detail = f"{keyword}{nearest(keyword, forms.INSTRUCTIONS)}"
     if keyword in ("ELSEIF", "ELIF"):
         detail = f"{keyword}; allowed: ELSE on a line, and an IF of its own on the next"
@@ -256,45 +269,39 @@ def statement(keyword: str, rest: OperandText) -> Statement:
 def assignment(rest: OperandText) -> Statement:
     """`x = 3`, or a location without SET before it."""
     target, value = rest.by_rule(forms.INSTRUCTIONS["SET"], "assignment")
-    located = target.prefix == "#" or _is_location(value)
-    return Instruction("SET" if located else "=", (target, value), (), rest.at)
-
-
-def _is_location(value: Expression) -> bool:
-    if isinstance(value, Apply):
-        return forms.FUNCTIONS[value.function].gives in ("frame", "location")
-    return isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
+    match value:
+        case Apply():
+            located = row_of(value).gives in ("frame", "location")
+        case _:
+            located = isinstance(value, Compound) or (isinstance(value, Variable) and value.prefix == "#")
+    return Instruction("SET" if located or target.prefix == "#" else "=", (target, value), (), rest.at)
 
 
 def _instruction(row: Form, rest: OperandText) -> Instruction:
-    if row.name in ("ACCEL", "ALTER", "ALTON"):
-        _open_channel(row, rest)
-    operands, words = operands_and_words(row, rest.operands())
+    """Operands between commas, and words behind them."""
+    if row.name in ("ACCEL", "ALTER", "ALTON") and (found := _CHANNEL.match(rest.text)):
+        # `ALTER (1) 3` reads like `ALTER 1, 3`.
+        channel = found[2] if found[2].strip() or row.name != "ACCEL" else "1"
+        rest.text = f"{found[1]} {channel},{found[3]}{rest.text[found.end() :]}"
+    operands, words = rest.operands_and_words(row)
     if row.name == "ACCEL" and len(operands) == 3:
         operands = operands[1:]
-    count(row, operands, rest)
+    rest.count(row, operands)
     if row.name == "GRASP" and len(operands) == 2:
-        operands[1] = label_of(operands[1], rest)
+        operands[1] = rest.label(operands[1])
     if row.name == "WAIT" and operands:
         operands[0] = _channel_wait(operands[0])
     return Instruction(row.name, tuple(operands), words, rest.at)
 
 
-def _open_channel(row: Form, rest: OperandText) -> None:
-    """`ALTER (1) 3` reads like `ALTER 1, 3`."""
-    if found := _CHANNEL.match(rest.text):
-        inner = found[2] if found[2].strip() or row.name != "ACCEL" else "1"
-        rest.text = f"{found[1]} {inner},{found[3]}{rest.text[found.end() :]}"
-
-
-def _channel_wait(condition: Expression | None) -> Expression | None:
+def _channel_wait(condition: Expression) -> Expression:
     """`WAIT 3` and `WAIT -3` of VAL wait for an input."""
-    inner = condition.operand if isinstance(condition, Unary) and condition.operator == "-" else condition
-    if not isinstance(inner, Number) or not inner.value.is_integer() or inner.value < 1:
+    value = literal(condition)
+    if value is None or not value.is_integer() or abs(value) < 1:
         return condition
-    channel = Number(inner.value + 1000 if inner.value <= 32 else inner.value, inner.at)
-    signed = channel if inner is condition else Unary("-", channel, inner.at)
-    return Apply("SIG", (signed,), inner.at)
+    at = condition.at if isinstance(condition, Number) else condition.arguments[0].at  # type: ignore[union-attr]
+    channel = Number(abs(value) + 1000 if abs(value) <= 32 else abs(value), at)
+    return Apply("SIG", (channel if value > 0 else Apply("-", (channel,), at),), at)
 
 
 def timed(text: str) -> tuple[int, int, int] | None:
@@ -310,78 +317,75 @@ def _at(row: Form, rest: OperandText) -> Statement:
         return _instruction(row, rest)
     end, begin, behind = places
     time = grammar.read(rest.text[:end], "expression", rest.line)
-    motion = forms.INSTRUCTIONS[rest.text[begin:behind].upper()]
-    made = _instruction(motion, OperandText(rest.text, behind, TextPosition(rest.line, begin + 1)))
-    return replace(made, begins=rest.expression(time))
+    motion = OperandText(rest.text, behind, TextPosition(rest.line, begin + 1))
+    made = _instruction(forms.INSTRUCTIONS[rest.text[begin:behind].upper()], motion)
+    return replace(made, begins=grammar.expression(time, rest.line))
 
 
-def _plain(row: Form, rest: OperandText) -> Statement:
+def _bare(row: Form, rest: OperandText) -> Statement:
+    if row.name == "ANY":
+        rest.text = rest.text.rstrip().removesuffix(":")
     if not rest.empty:
-        detail = f"unexpected '{rest.text.strip()}' behind {row.name}; allowed: the end of the line"
-        raise ValError("Syntax error", detail, place=rest.start)
+        raise rest.unreadable(f"unexpected '{rest.text.strip()}' behind {row.name}; allowed: the end of the line")
     return Instruction(row.name, (), (), rest.at)
 
 
 def _shift(row: Form, rest: OperandText) -> Statement:
-    target, *values = rest.by_rule(row, "shift")
-    if len(values) > 3:
-        raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
-    return Instruction("SET", (target, Apply("SHIFT", (target, *values), rest.at)), (), rest.at)
+    target, *way = rest.by_rule(row, "shift")
+    if len(way) > 3:
+        raise rest.too_many(row)
+    return Instruction("SET", (target, Apply("SHIFT", (target, *way), rest.at)), (), rest.at)
 
 
-def _parameter(row: Form, rest: OperandText) -> Statement:
+def _setting(row: Form, rest: OperandText) -> Statement:
+    """`PARAMETER name = value`."""
     rest.require(row)
     found = _SETTING.match(rest.text)
     if found is None:
-        raise ValError("Syntax error", f"allowed: {row.usage}", place=rest.start)
+        raise rest.unreadable(f"allowed: {row.usage}")
     name = found[1].upper()
-    if name not in forms.PARAMETERS:
-        reject_misspelling("parameter", [name], forms.PARAMETERS, TextPosition(rest.line, found.start(1) + 1))
+    if rest.has_strangers([name], "parameter", forms.PARAMETERS):
         return Ignored(row.name, rest.text.strip(), rest.at)
     if found[2] is None:
         raise ValError(MISSING, f"allowed: {row.usage}", place=TextPosition(rest.line, found.end() + 1))
-    value = grammar.read(" " * found.end() + rest.text[found.end() :], "expression", rest.line)
-    return Instruction(row.name, (rest.expression(value),), (name,), rest.at)
+    rest.skip(found.end())
+    return Instruction(row.name, (rest.expression(),), (name,), rest.at)
 
 
 def _switches(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     names = []
     for operand, words in rest.operands():
-        name = as_word(operand)
-        if not isinstance(operand, Variable) or not name or words:
-            at = operand.at if operand is not None else rest.start
-            raise ValError("Syntax error", f"allowed: {row.usage}", place=at)
-        names.append(name)
-    if any(name not in forms.SWITCHES for name in names):
-        reject_misspelling("switch", names, forms.SWITCHES, rest.start)
+        names.append(as_word(operand))
+        if not isinstance(operand, Variable) or not names[-1] or words:
+            raise rest.unreadable(f"allowed: {row.usage}", None if operand is None else operand.at)
+    if rest.has_strangers(names, "switch", forms.SWITCHES):
         return Ignored(row.name, rest.text.strip(), rest.at)
     return Instruction(row.name, (), tuple(names), rest.at)
 
 
 def _react(row: Form, rest: OperandText) -> Statement:
-    operands, words = operands_and_words(row, rest.operands())
-    count(row, operands[:2], rest)
+    operands, words = rest.operands_and_words(row)
+    rest.count(row, operands[:2])
     if len(operands) > 3:
-        raise ValError(TOO_MANY, f"allowed: {row.usage}", place=rest.end)
-    signal, *others = operands
-    program = _program_of(others[0]) if others and others[0] is not None else ""
-    return Instruction(row.name, (signal,), words, rest.at, program=program)
-
-
-def _program_of(operand: Expression) -> str:
-    if isinstance(operand, Variable) and not operand.prefix and not operand.indices:
-        return operand.name
-    if isinstance(operand, Apply) and not operand.arguments and not operand.function.startswith(("#", "$")):
-        return operand.function.lower()
-    raise ValError("Syntax error", "allowed: the name of a program", place=operand.at)
+        raise rest.too_many(row)
+    match operands[1:2]:
+        case [] | [None]:
+            program = ""
+        case [Variable(name, (), prefix="")]:
+            program = name
+        case [Apply(name, ())] if name[0] not in "#$":
+            program = name.lower()
+        case [other]:
+            raise rest.unreadable("allowed: the name of a program", other.at)
+    return Instruction(row.name, (operands[0],), words, rest.at, program=program)
 
 
 def _goto(row: Form, rest: OperandText) -> Statement:
     operands = rest.operands()
     if len(operands) != 1 or operands[0][1]:
         raise ValError(MISSING if rest.empty else "Syntax error", f"allowed: {row.usage}", place=rest.end)
-    return Instruction(row.name, (label_of(operands[0][0], rest),), (), rest.at)
+    return Instruction(row.name, (rest.label(operands[0][0]),), (), rest.at)
 
 
 def _value(row: Form, rest: OperandText) -> Statement:
@@ -390,74 +394,62 @@ def _value(row: Form, rest: OperandText) -> Statement:
     operands = rest.operands()
     for operand, words in operands:
         if operand is None or words:
-            raise ValError("Syntax error", f"allowed: {row.usage}", place=words[0][1] if words else rest.start)
+            raise rest.unreadable(f"allowed: {row.usage}", words[0][1] if words else None)
     return Instruction(row.name, tuple(operand for operand, _ in operands), (), rest.at)
 
 
-def _any(row: Form, rest: OperandText) -> Statement:
-    rest.text = rest.text.rstrip().removesuffix(":")
-    return _plain(row, rest)
-
-
 def _loops(row: Form, rest: OperandText) -> Statement:
-    text, count = rest.text.strip(), 1
+    text = rest.text.strip() or "1"
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
-    if text and not (plain and 1 <= (count := int(text)) <= MOST_LOOPS):
-        raise ValError("Syntax error", f"allowed: a number of loops, 1 to {MOST_LOOPS}", place=rest.start)
-    return Instruction(row.name, (Number(float(count)),) if count > 1 else (), (), rest.at)
+    if not plain or not 1 <= int(text) <= MOST_LOOPS:
+        raise rest.unreadable(f"allowed: a number of loops, 1 to {MOST_LOOPS}")
+    return Instruction(row.name, (Number(float(text)),) if int(text) > 1 else (), (), rest.at)
 
 
 def _call(row: Form, rest: OperandText) -> Statement:
     rest.require(row)
     name, arguments = rest.tree("call")
     if not _NAME.fullmatch(name):
-        raise ValError("Syntax error", "allowed: the name of a program", place=TextPosition(rest.line, name.column))
+        raise rest.unreadable("allowed: the name of a program", TextPosition(rest.line, name.column))
     given: list[Expression | None] = []
     for node in arguments.children if arguments is not None else ():
-        if getattr(node, "type", "") in ("FORMAT", "BY"):
-            raise ValError("Syntax error", f"unexpected {node}", place=TextPosition(rest.line, node.column))
-        given.append(None if node is None else rest.expression(node))
+        if type_of(node) in ("FORMAT", "BY"):
+            raise rest.unreadable(f"unexpected {node}", TextPosition(rest.line, node.column))
+        given.append(None if node is None else grammar.expression(node, rest.line))
     if given == [None]:
         given = []
     return Instruction(row.name, tuple(given), (), rest.at, program=grammar.name_of(name))
 
 
 def _prompt(row: Form, rest: OperandText) -> Statement:
-    operands, targets = rest.operands(), []
-    first = operands[0][0] if operands else None
+    operands = rest.operands() or [(None, ())]
+    text = operands[0][0]
     for operand, words in operands:
         if words:
-            raise ValError("Syntax error", f"unexpected {words[0][0]}; allowed: {row.usage}", place=words[0][1])
-        if operand is not first:
-            if not isinstance(operand, Variable) or operand.array:
-                at = operand.at if operand is not None else rest.start
-                raise ValError("Syntax error", "allowed: variables behind the text", place=at)
-            targets.append(operand)
-    text = Text("", rest.at) if first is None else first
-    return Instruction(row.name, (text, *targets), (), rest.at)
+            raise rest.unreadable(f"unexpected {words[0][0]}; allowed: {row.usage}", words[0][1])
+        if operand is not text and (not isinstance(operand, Variable) or operand.array):
+            raise rest.unreadable("allowed: variables behind the text", None if operand is None else operand.at)
+    targets = [operand for operand, _ in operands[1:] if operand is not None]
+    return Instruction(row.name, (Text("", rest.at) if text is None else text, *targets), (), rest.at)
 
 
 def _local(row: Form, rest: OperandText) -> Statement:
     words: tuple[str, ...] = ()
     if found := _KIND.match(rest.text):
         words = ("LOC" if found[1].upper() == "LOC" else "REAL",)
-        rest.text = " " * found.end() + rest.text[found.end() :]
+        rest.skip(found.end())
     return Instruction(row.name, tuple(rest.by_rule(row, "names")), words, rest.at)
 
 
-_OWN: Final[dict[str, Callable[[Form, OperandText], Statement]]] = {
-    **dict.fromkeys(("ELSE", "END", "DO", "RETURN"), _plain),
+_RULES: Final[dict[str, str | Callable[[Form, OperandText], Statement]]] = {
+    "SET": "assignment", "DECOMPOSE": "assignment", "TIMER": "timing", "IF": "branch", "WHILE": "while",
+    "UNTIL": "until", "FOR": "loop", "CASE": "case", "TYPE": "items",
+    **dict.fromkeys(("ELSE", "END", "DO", "RETURN", "ANY"), _bare),
     **dict.fromkeys(("ENABLE", "DISABLE"), _switches),
     **dict.fromkeys(("REACT", "REACTI"), _react),
     **dict.fromkeys(("EXIT", "NEXT"), _loops),
     **dict.fromkeys(("CALL", "GOSUB"), _call),
     **dict.fromkeys(("AUTO", "LOCAL", "GLOBAL"), _local),
-    "AT": _at,
-    "SHIFT": _shift,
-    "PARAMETER": _parameter,
-    "VALUE": _value,
-    "ANY": _any,
-    "GOTO": _goto,
-    "PROMPT": _prompt,
-}
-"""Keywords whose operands aren't a list between commas, nor a rule of the grammar."""
+    "AT": _at, "PARAMETER": _setting, "SHIFT": _shift, "VALUE": _value, "GOTO": _goto, "PROMPT": _prompt,
+}  # fmt: skip
+"""What stands behind keywords where it isn't operands between commas: a rule of the grammar, or what reads it."""

@@ -206,30 +206,3 @@ class _Surveyor:
         else:
             known = ", ".join(map(str, sorted(self.labels)[:8])) or "none"
             self._fail(i, f"{label}; the program's labels: {known}", "Undefined label", at)
-
-
-_MEANWHILE: Final = {
-    "=", "SET", "DECOMPOSE", "TYPE", "SIGNAL", "RESET", "ENABLE", "DISABLE", "PARAMETER", "TIMER", "SPEED", "HERE",
-    "ALTOUT", "ALTER", "NOALTER",
-}  # fmt: skip
-"""What DO may do while a program runs."""
-_OF_PROGRAMS: Final = {
-    "ELSE", "END", "DO", "ANY", "RETURN", "IF", "WHILE", "UNTIL", "FOR", "CASE", "VALUE", "EXIT", "NEXT", "GOTO",
-    "AUTO", "LOCAL", "GLOBAL",
-}  # fmt: skip
-"""What can't stand alone."""
-
-
-def standalone_error(step: Step) -> ValError | None:
-    """Why a step can't stand alone, as DO wants it; None if it can."""
-    if isinstance(step.statement, Instruction) and step.statement.keyword in _OF_PROGRAMS:
-        return ValError("Control structure error", "it's for programs", place=step.at)
-    return None
-
-
-def runs_beside_program(step: Step) -> bool:
-    """Whether a step takes no time and moves nothing."""
-    i = step.statement
-    if not isinstance(i, Instruction) or (i.keyword == "SPEED" and "MONITOR" not in i.words):
-        return False
-    return i.keyword in _MEANWHILE

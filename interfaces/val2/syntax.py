@@ -7,6 +7,7 @@ alone are equal.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
@@ -48,31 +49,12 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Apply:
-    """A function or a constant of the language, such as `TRANS(..)`, `SHIFT(p BY 1,,3)`, `HERE`, `PI`."""
+    """A function, a constant or an operator, such as `TRANS(..)`, `SHIFT(p BY 1,,3)`, `HERE`, `PI`, `-x`, `a+b`."""
 
     function: str
-    """Upper case; with its prefix, as `$ENCODE`, `#PPOINT`."""
+    """Upper case; with its prefix, as `$ENCODE`, `#PPOINT`; of an operator as in `functions.OPERATORS`."""
     arguments: tuple[Expression | Format | None, ...] = ()
     """None for one that was left out; formats in `$ENCODE` alone."""
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Unary:
-    """`-`, `NOT` or `COM` before an expression."""
-
-    operator: str
-    operand: Expression
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Binary:
-    """Two expressions with `+ - * / MOD ^ == <> < <= > >= AND OR XOR BAND BOR BXOR` between them."""
-
-    operator: str
-    left: Expression
-    right: Expression
     at: TextPosition = field(default=NOWHERE, compare=False)
 
 
@@ -84,7 +66,36 @@ class Compound:
     at: TextPosition = field(default=NOWHERE, compare=False)
 
 
-Expression: TypeAlias = Number | Text | Variable | Apply | Unary | Binary | Compound
+Expression: TypeAlias = Number | Text | Variable | Apply | Compound
+
+
+def children(expression: Expression) -> tuple[Expression, ...]:
+    """The expressions that an expression is made of."""
+    match expression:
+        case Variable(indices=indices):
+            return indices
+        case Apply(arguments=arguments):
+            return tuple(a for a in arguments if a is not None and not isinstance(a, Format))
+        case Compound(parts=inner):
+            return inner
+    return ()
+
+
+def parts(expression: Expression) -> Iterator[Expression]:
+    """An expression and all that it's made of, outer ones first."""
+    yield expression
+    for child in children(expression):
+        yield from parts(child)
+
+
+def literal(expression: Expression | Format | None) -> float | None:
+    """The value of a number that is written down, with a minus or without; None of anything else."""
+    match expression:
+        case Number(value):
+            return value
+        case Apply("-", (Number(value),)):
+            return -value
+    return None
 
 
 @dataclass(frozen=True, slots=True)

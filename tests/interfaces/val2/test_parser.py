@@ -23,7 +23,6 @@ from interfaces.val2.syntax import (
     Instruction,
     Number,
     Text,
-    Unary,
     Variable,
 )
 
@@ -57,7 +56,7 @@ def statement(text):
         ("moves #safe", Instruction("MOVES", (name("#safe"),))),
         ("MOVET p,TRUE", Instruction("MOVET", (name("p"), Apply("TRUE")))),
         ("APPROS p[1], 50", Instruction("APPROS", (Variable("p", (number(1),)), number(50)))),
-        ("DEPART -50", Instruction("DEPART", (Unary("-", number(50)),))),
+        ("DEPART -50", Instruction("DEPART", (Apply("-", (number(50),)),))),
         ("DRIVE 3,40,50", Instruction("DRIVE", (number(3), number(40), number(50)))),
         ("DRAW ,,10", Instruction("DRAW", (None, None, number(10)))),
         ("SPEED 30", Instruction("SPEED", (number(30),))),
@@ -73,7 +72,7 @@ def statement(text):
         ("ENABLE CP, dry.run", Instruction("ENABLE", (), ("CP", "DRY.RUN"))),
         ("PARAMETER hand.time = 0.5", Instruction("PARAMETER", (number(0.5),), ("HAND.TIME",))),
         ("TIMER 1 = 0", Instruction("TIMER", (number(1), number(0)))),
-        ("SIGNAL 1,-2", Instruction("SIGNAL", (number(1), Unary("-", number(2))))),
+        ("SIGNAL 1,-2", Instruction("SIGNAL", (number(1), Apply("-", (number(2),))))),
         ("WAIT", Instruction("WAIT")),
         ("ALTER (1) 3", Instruction("ALTER", (number(1), number(3)))),
         ("ALTOUT 0,0,1,0,0,0", Instruction("ALTOUT", tuple(map(number, (0, 0, 1, 0, 0, 0))))),
@@ -92,7 +91,7 @@ def statement(text):
         ("IF a THEN", Instruction("IF", (name("a"),))),
         ("IF a GOTO 10", Instruction("IF", (name("a"), number(10)))),
         ("FOR i = 1 TO n STEP 2", Instruction("FOR", (name("i"), number(1), name("n"), number(2)))),
-        ("VALUE 1, -2:", Instruction("VALUE", (number(1), Unary("-", number(2))))),
+        ("VALUE 1, -2:", Instruction("VALUE", (number(1), Apply("-", (number(2),))))),
         ("EXIT 2", Instruction("EXIT", (number(2),))),
         (
             "CALL a.b(x, , y[])",
@@ -100,7 +99,7 @@ def statement(text):
         ),
         ("GOSUB sub", Instruction("GOSUB", program="sub")),
         ("REACT 1001, halt.it ALWAYS", Instruction("REACT", (number(1001),), ("ALWAYS",), program="halt.it")),
-        ("REACTI -1001", Instruction("REACTI", (Unary("-", number(1001)),))),
+        ("REACTI -1001", Instruction("REACTI", (Apply("-", (number(1001),)),))),
         ('TYPE "x =", x, /F8.2, /S', Instruction("TYPE", (Text("x ="), name("x"), Format("F", 8, 2), Format("S")))),
         ('PROMPT "n? ", n, $s', Instruction("PROMPT", (Text("n? "), name("n"), name("$s")))),
         ("AUTO REAL q[6], r", Instruction("AUTO", (Variable("q", (number(6),)), name("r")), ("REAL",))),
@@ -376,8 +375,8 @@ def test_calls_with_numbers_alone_are_what_the_grammar_makes_of_them(text):
     assert quick.at == slow.at
     for left, right in zip(quick.arguments, slow.arguments, strict=True):
         assert left.at == right.at
-        if isinstance(left, Unary):
-            assert left.operand.at == right.operand.at
+        if isinstance(left, Apply):
+            assert left.arguments[0].at == right.arguments[0].at
 
 
 def test_a_long_program_is_read_quickly():

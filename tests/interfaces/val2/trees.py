@@ -7,12 +7,12 @@ import string
 from hypothesis import strategies as st
 
 from interfaces.val2 import forms
+from interfaces.val2.functions import row_of
 from interfaces.val2.parser import LONGEST_LINE
 from interfaces.val2.printer import print_step
 from interfaces.val2.syntax import (
     BLANK,
     Apply,
-    Binary,
     Compound,
     Format,
     Ignored,
@@ -21,7 +21,6 @@ from interfaces.val2.syntax import (
     Program,
     Step,
     Text,
-    Unary,
     Variable,
 )
 
@@ -80,8 +79,8 @@ def larger(inner):
     """Expressions of others."""
     loose = inner.filter(lambda e: not isinstance(e, Compound))
     return (
-        st.builds(Unary, st.sampled_from(["-", "NOT", "COM"]), inner)
-        | st.builds(Binary, st.sampled_from(OPERATORS), inner, inner)
+        st.builds(Apply, st.sampled_from(["-", "NOT", "COM"]), st.tuples(inner))
+        | st.builds(Apply, st.sampled_from(OPERATORS), st.tuples(inner, inner))
         | st.builds(Compound, st.lists(loose, min_size=2, max_size=4).map(tuple))
         | variables(inner)
         | applications(inner)
@@ -95,7 +94,7 @@ optional = st.none() | expressions
 def _located(value):
     return (
         isinstance(value, Compound)
-        or (isinstance(value, Apply) and forms.FUNCTIONS[value.function].gives in ("frame", "location"))
+        or (isinstance(value, Apply) and row_of(value).gives in ("frame", "location"))
         or (isinstance(value, Variable) and value.prefix == "#")
     )
 
@@ -134,7 +133,8 @@ def instructions(draw):
             return Instruction("GRASP", (draw(expressions), *label))
         case "WAIT":
             return Instruction(
-                "WAIT", draw(st.just(()) | st.tuples(st.builds(Binary, st.just("<"), expressions, expressions)))
+                "WAIT",
+                draw(st.just(()) | st.tuples(st.builds(Apply, st.just("<"), st.tuples(expressions, expressions)))),
             )
     operands = []
     count = len(row.slots) + (draw(st.integers(0, 3)) if row.repeats else 0)

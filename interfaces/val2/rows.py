@@ -1,0 +1,169 @@
+"""Rows of the table of the language: instructions, functions, operators, monitor commands, switches, parameters.
+
+A row says how a word is written, what it does in a line, whose it is, where it's allowed, and what carries it out.
+Parser, printer, compiler, checker, help and completion read rows alone; `forms.py` has all of them.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeAlias
+
+from interfaces.val2.errors import TextPosition, ValError
+
+Kind: TypeAlias = Literal[
+    "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "signal", "output",
+    "string", "alike", "location", "frame", "point", "any", "label", "program", "variable", "array", "name", "text",
+]  # fmt: skip
+"""What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
+what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are
+numbers."""
+Origin: TypeAlias = Literal["VAL", "VAL-II", "V+", "ours"]
+"""Where a word is known from; VAL-II took over what VAL has, and V+ what VAL-II has."""
+
+MISSING: Final = "Missing argument"
+TOO_MANY: Final = "Too many arguments"
+TIGHTEST: Final = 10
+"""How tightly functions and names bind."""
+
+
+@dataclass(frozen=True, slots=True)
+class OperandSlot:
+    """A place for an operand."""
+
+    name: str
+    kind: Kind
+    required: bool = True
+    default: float | None = None
+    """What stands for one that was left out; None where that's for the instruction or function to say."""
+
+    @classmethod
+    def read(cls, spelled: str) -> OperandSlot:
+        """A slot as `Form` has it."""
+        named, _, default = spelled.partition("=")
+        name, _, kind = named.rstrip("?*").partition(":")
+        return cls(name, kind or "real", "?" not in spelled, float(default) if default else None)  # type: ignore[arg-type]
+
+
+class Form:
+    """How something is written, what it does, and what carries it out."""
+
+    def __init__(
+        self,
+        name: str,
+        spelled: str,
+        explanation: str,
+        origin: Origin,
+        act: Callable[..., Any] | None = None,
+        *,
+        words: str = "",
+        usage: str = "",
+        tags: str = "",
+        level: int = TIGHTEST,
+    ) -> None:
+        """Read a row.
+
+        Args:
+            name: Upper case; of a function with its prefix.
+            spelled: Slots such as `target:location, hand:real?=0`, and what a function gives: `angle -> real`. Of
+                a slot that ends in `?` the operand may be left out; the number behind `=` stands for it then. One
+                that ends in `*` may come many times.
+            explanation: What it does, a line.
+            origin: Where it's known from.
+            act: Carries it out: of a function, takes the arguments' values; of an instruction, makes the closure
+                of a step; of a monitor command, takes the terminal and what follows the name.
+            words: What may stand behind the operands, in their order, one of each group at most: `MMPS|IPS ALWAYS`.
+            usage: How it's written, where that isn't told by the slots.
+            tags: What else is to be known of it: of a function `constant` (it may be written without parentheses,
+                and its name can't be a variable's), `context` (its first argument is the context), `idle` (it's
+                recognised, but has no meaning here: 0, or an empty string); of an instruction `opens`, `closes` (a
+                structure; both: divides one), `program` (it can't stand alone), `beside` (DO may do it while a
+                program runs); of a monitor command what `monitor/commands.py` says.
+            level: How tightly an operator binds.
+        """
+        operands, _, gives = spelled.partition("-> ")
+        self.name, self.help, self.origin, self.act, self.level = name, explanation, origin, act, level
+        self.tags = frozenset(tags.split())
+        self.gives = gives
+        """Of a function: a kind, or `truth`."""
+        self.alike = ":alike" in operands
+        """Whether its operands are numbers or strings, all of them."""
+        self.repeats = "*" in operands
+        """Whether the last operand may come many times."""
+        self.slots = tuple(OperandSlot.read(part) for part in operands.strip().split(", ") if part)
+        self.words = tuple(tuple(group.split("|")) for group in words.split())
+        self.allowed_words = tuple(word for group in self.words for word in group)
+        self.usage = usage or self._usage()
+
+    def _usage(self) -> str:
+        shown = ""
+        for i, slot in enumerate(self.slots):
+            piece = f"{', ' if i else ''}{slot.name}"
+            shown += piece if slot.required else f"[{piece}]"
+        shown += ", .." if self.repeats else ""
+        if self.gives:
+            return self.name if "constant" in self.tags else f"{self.name}({shown})"
+        return f"{self.name} {shown}".rstrip() + "".join(f" [{'|'.join(group)}]" for group in self.words)
+
+    def slot(self, n: int) -> OperandSlot:
+        """The slot of an operand, counted from 0: the last one is that of all behind it."""
+        return self.slots[min(n, len(self.slots) - 1)]
+
+    def expect(self, arguments: Sequence[object | None], at: TextPosition) -> None:
+        """Count a function's arguments.
+
+        Raises:
+            ValError: If there are too few or too many of them.
+        """
+        if len(arguments) > len(self.slots) and not self.repeats:
+            raise ValError(TOO_MANY, f"{self.name}: {self.usage}", place=at)
+        for i, slot in enumerate(self.slots):
+            if slot.required and (i >= len(arguments) or arguments[i] is None):
+                raise ValError(MISSING, f"{self.name}: {self.usage}", place=at)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A switch, which ENABLE and DISABLE turn, or a number that PARAMETER sets."""
+
+    name: str
+    default: float
+    """Of a switch, whether it's on."""
+    help: str
+    origin: Origin
+    low: float = 0.0
+    high: float = 1.0
+    unit: str = ""
+
+
+SWITCHES: Final = {
+    row.name: row
+    for row in (
+        Setting("CP", True, "Continuous path: motions go round their destinations.", "VAL-II"),
+        Setting("DRY.RUN", False, "Programs run without motion.", "V+"),
+        Setting("MESSAGES", True, "TYPE prints.", "VAL-II"),
+        Setting("POWER", True, "The arm has power.", "V+"),
+    )
+}
+"""What ENABLE and DISABLE turn."""
+PARAMETERS: Final = {
+    row.name: row
+    for row in (
+        Setting("HAND.TIME", 0.05, "How long OPENI, CLOSEI and RELAXI take.", "VAL-II", 0.0, 60.0, "s"),
+        Setting("HAND.LOAD", 0.0, "What the real hand holds while it's closed.", "ours", 0.0, 20.0, "kg"),
+    )
+}
+"""What PARAMETER sets."""
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """`; did you mean MOVES?`, or nothing."""
+    close = nearest_word(word, words)
+    return f"; did you mean {close}?" if close else ""
+
+
+def nearest_word(word: str, words: Iterable[str]) -> str:
+    """The word that is most like another, upper case; empty where none is."""
+    return next(iter(difflib.get_close_matches(word.upper(), list(words), n=1, cutoff=0.7)), "")
