@@ -20,10 +20,9 @@ from websockets.frames import Opcode
 from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
 from interfaces.timer import Turning
-from interfaces.val2.monitor.completion import suggestions
 from interfaces.val2.monitor.control import SharedController, SharedOperator
 from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
-from interfaces.val2.monitor.state import OutputText, Style
+from interfaces.val2.monitor.state import Expects, OutputText, Style
 from vrs.clock import Clock
 from vrs.errors import VrsError
 
@@ -168,9 +167,8 @@ class PageTerminal:
 
     def _act(self, monitor: TerminalMonitor, message: TypedLines | Interrupt | Complete, now: float) -> None:
         if isinstance(message, Complete):
-            fragment, words = suggestions(message.text[:LONGEST], monitor.state, program=monitor.edits)
-            takes = monitor.takes_commands or monitor.edits
-            listed = [one.word for one in words[:SUGGESTED]] if takes else []
+            fragment, words = monitor.suggestions(message.text[:LONGEST])
+            listed = [one.word for one in words[:SUGGESTED]]
             self._answers.append({"type": "completed", "text": message.text, "fragment": fragment, "words": listed})
             return
         self._prompt = None
@@ -238,7 +236,7 @@ class PageTerminal:
         self._prompt = prompt
         message = {
             "type": "said", "pieces": pieces, "prompt": prompt, "size": self._sent,
-            "commands": self.monitor.takes_commands,
+            "commands": self.monitor.expects is Expects.COMMAND,
         }  # fmt: skip
         return json.dumps(message).encode()
 

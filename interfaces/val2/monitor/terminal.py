@@ -25,12 +25,10 @@ from prompt_toolkit.styles import Style
 from pygments.token import Token, _TokenType
 
 from interfaces.timer import Turning
-from interfaces.val2.errors import ValError
 from interfaces.val2.lexer import Val2Lexer
-from interfaces.val2.monitor import commands
-from interfaces.val2.monitor.completion import hint, suggestions
+from interfaces.val2.monitor.commands import command_named, hint
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.state import OutputText
+from interfaces.val2.monitor.state import Expects, OutputText
 from vrs.clock import Clock
 
 if TYPE_CHECKING:
@@ -87,15 +85,13 @@ class LineLexer(Lexer):
 
     def pieces(self, text: str) -> StyleAndTextTuples:
         """A line in pieces, each with its class."""
-        if self._monitor.edits:
+        if self._monitor.expects is Expects.STEP:
             return self._coloured(text)
-        if not self._monitor.takes_commands:
+        if self._monitor.expects is Expects.ANSWER:
             return [("", text)]
         bare = text.lstrip()
         word = bare.split(None, 1)[0] if bare else ""
-        try:
-            commands.command_named(word)
-        except ValError:
+        if command_named(word) is None:
             return [("", text)]
         end = len(text) - len(bare) + len(word)
         return [("class:command", text[:end]), *self._coloured(text[end:])]
@@ -132,12 +128,9 @@ class _Completer(Completer):
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
         """What may complete the line."""
-        if not self._monitor.takes_commands and not self._monitor.edits:
-            return
         if not complete_event.completion_requested and not document.text_before_cursor.strip():
             return
-        state = self._monitor.state
-        fragment, found = suggestions(document.text_before_cursor, state, program=self._monitor.edits)
+        fragment, found = self._monitor.suggestions(document.text_before_cursor)
         for one in found:
             yield Completion(one.word, -len(fragment), display_meta=one.help)
 
@@ -259,12 +252,12 @@ class Terminal:
 
     def _toolbar(self) -> StyleAndTextTuples:
         document = self._session.default_buffer.document
-        if not (self._monitor.takes_commands or self._monitor.edits):
+        if self._monitor.expects is Expects.ANSWER:
             return [("", " ")]
         width = shutil.get_terminal_size().columns
         with contextlib.suppress(OSError):
             width = self._session.app.output.get_size().columns
-        said = hint(document.text_before_cursor, program=self._monitor.edits)
+        said = hint(document.text_before_cursor, program=self._monitor.expects is Expects.STEP)
         return [
             ("class:hint", (said or "Tab completes, HELP explains, Ctrl-C is ABORT, Ctrl-D leaves")[: width - 1])
         ]

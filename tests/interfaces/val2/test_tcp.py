@@ -16,7 +16,7 @@ import pytest
 
 from interfaces.stream import sockets
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import Free, SharedController
+from interfaces.val2.monitor.control import Control, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.state import OutputText, Style
@@ -127,7 +127,7 @@ async def door_here(tmp_path):
     engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
     arm, clock = arm_for(engine), WallClock()
     controller = Controller(arm, parameters=arm.parameters)
-    shared = SharedController(controller, Free())
+    shared = SharedController(controller, Control())
 
     def terminal(token):
         rights = {"secret": "", "look": "this token only looks"}
