@@ -345,7 +345,7 @@ class TerminalMonitor:
         while self.state.steps and not (controller.running or controller.doing):
             self.state.steps -= 1
             with self.state.guarded():
-                controller.xstep(now=self.state.now)
+                controller.proceed(single=True, now=self.state.now)
             self._shared.advance(now=self.state.now)
 
     def _release_scheduled(self) -> None:

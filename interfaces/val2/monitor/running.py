@@ -56,10 +56,13 @@ def execute(state: TerminalState, rest: str) -> None:
 
 def xstep(state: TerminalState, rest: str) -> None:
     """XSTEP; XSTEP program, cycles, step begins one."""
-    name, arguments, cycles, step = _program(state, rest) if rest else (None, (), 1, 1)
+    if not rest:
+        state.controller.proceed(single=True, now=state.now)
+        return
+    name, arguments, cycles, step = _program(state, rest)
     if arguments:
         raise ValError("Invalid argument", f"{rest}: XSTEP gives a program no arguments")
-    state.controller.xstep(name, cycles=cycles, step=step, now=state.now)
+    state.controller.execute(name, cycles=cycles, step=step, single=True, now=state.now)
 
 
 def next_(state: TerminalState, rest: str) -> None:
@@ -67,7 +70,7 @@ def next_(state: TerminalState, rest: str) -> None:
     steps = integer(rest, 1, "the number of steps")
     if not 1 <= steps <= 10_000:
         raise ValError("Invalid argument", f"{rest}: 1 to 10000 steps")
-    state.controller.xstep(now=state.now)
+    state.controller.proceed(single=True, now=state.now)
     state.steps = steps - 1
 
 
