@@ -75,7 +75,7 @@ def console(
 
 
 def _alone(files: Path) -> None:
-    from interfaces.val2.monitor.control import Free
+    from interfaces.val2.monitor.control import Control
     from interfaces.val2.motion import arm_for
     from robots import puma560
     from vrs.clock import ManualClock, WallClock
@@ -83,7 +83,7 @@ def _alone(files: Path) -> None:
 
     model = puma560.model()
     engine = Engine(model, q=model.poses["nominal"], clock=ManualClock(0.0))
-    _converse(arm_for(engine), Free(), WallClock(), files, f"{software()}, a virtual {model.name} alone")
+    _converse(arm_for(engine), Control(), WallClock(), files, f"{software()}, a virtual {model.name} alone")
 
 
 def _connected(url: str, token_file: Path | None, files: Path) -> None:

@@ -324,7 +324,8 @@ async def _serve(
         from interfaces.stream.access import Access, make_token
         from interfaces.stream.server import application
         from interfaces.val2.pages import PageTerminalServer
-        from interfaces.val2.served import HOST, ServedVal
+        from interfaces.val2.rooms import HOST, ServedVal
+        from interfaces.val2.tcp import TcpTerminalServer
         from robots import puma560
         from robots.onboard.lease import LeaseState
 
@@ -338,8 +339,8 @@ async def _serve(
         station = Station(described(model, operator.scene.tool))
         shown = Address(host, port)
         near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
-        val = ServedVal(f"ws://{near}/ws", doors.own_token, access, doors.val_files, software())
-        terminals = PageTerminalServer(val.enter).route
+        val = ServedVal(f"ws://{near}/ws", doors.own_token, doors.val_files, software())
+        terminals = PageTerminalServer(val.enter, access).route
         facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
         recordings = Recordings(operator, Shelf(shelved.directory), access, facts)
         routes = [*operator.routes, terminals, *recordings.routes, *station.routes]
@@ -357,7 +358,8 @@ async def _serve(
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()
             val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
-            await stack.enter_async_context(val.listening(val_listening, val_access))
+            val_door = TcpTerminalServer(await val.enter(), val_access)
+            await stack.enter_async_context(val_door.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
             if val_token is not None:
                 typer.echo(f"vrs: VAL-II asks each terminal for a token, the first line to send: {val_token}")

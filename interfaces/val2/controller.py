@@ -17,7 +17,7 @@ from interfaces.val2.context import Context, Event, ProgramFailed
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
 from interfaces.val2.interpreter import ProgramState, Task
-from interfaces.val2.memory import LONGEST_STRING, Memory, VariableSlot
+from interfaces.val2.memory import LONGEST_STRING, VariableSlot
 from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import SignalRule
 from interfaces.val2.syntax import (
@@ -60,7 +60,6 @@ class Controller(Context):
         self,
         arm: Arm,
         *,
-        memory: Memory | None = None,
         parameters: MutableMapping[str, float] | None = None,
         rng: random.Random | None = None,
         now: float = 0.0,
@@ -69,12 +68,11 @@ class Controller(Context):
 
         Args:
             arm: What moves.
-            memory: Programs and variables; an empty one by default.
             parameters: Shared with the arm where it reads some; those that are missing are added.
             rng: Of RANDOM.
             now: Session time [s]; timers begin here.
         """
-        super().__init__(arm, compiled, memory or Memory(), now=now)
+        super().__init__(arm, compiled, now=now)
         if rng is not None:
             self.rng = rng
         if parameters is not None:
@@ -110,25 +108,28 @@ class Controller(Context):
     # Commands.
 
     def execute(
-        self, name: str, arguments: Sequence[Expression] = (), *, cycles: int = 1, step: int = 1, now: float
+        self,
+        name: str,
+        arguments: Sequence[Expression] = (),
+        *,
+        cycles: int = 1,
+        step: int = 1,
+        single: bool = False,
+        now: float,
     ) -> None:
-        """EXECUTE: run a program.
+        """EXECUTE, XSTEP: run a program.
 
         Args:
             name: The program.
             arguments: Names by reference, other expressions by value.
             cycles: How often; negative for ever.
             step: First step, from 1.
+            single: Whether it pauses after each step.
             now: Session time [s].
 
         Raises:
             ValError: If one runs, or this one is missing or not right.
         """
-        self._begin(name, arguments, cycles=cycles, step=step, single=False, now=now)
-
-    def _begin(
-        self, name: str, arguments: Sequence[Expression], *, cycles: int, step: int, single: bool, now: float
-    ) -> None:
         self._free()
         self.now = max(now, self.now)
         code = self.code(name)
@@ -219,14 +220,17 @@ class Controller(Context):
         self._due = True
         self.arm.give_up(now=self.now)
 
-    def proceed(self, *, now: float) -> None:
-        """PROCEED: go on, with the next step where one was given up.
+    def proceed(self, *, single: bool = False, now: float) -> None:
+        """PROCEED, XSTEP: go on, with the next step where one was given up.
+
+        Args:
+            single: Whether it pauses after that step.
+            now: Session time [s].
 
         Raises:
             ValError: If there's nothing to go on with.
         """
-        task = self._paused(now)
-        task.go_on(again=False)
+        self._paused(now).go_on(again=False, single=single)
 
     def retry(self, *, now: float) -> None:
         """RETRY: go on, with the motion and the step that were given up.
@@ -237,17 +241,6 @@ class Controller(Context):
         task = self._paused(now)
         self.arm.retry(now=self.now)
         task.go_on(again=True)
-
-    def xstep(self, name: str | None = None, *, cycles: int = 1, step: int = 1, now: float) -> None:
-        """XSTEP: one step of a paused program, or the first step of another one.
-
-        Raises:
-            ValError: As `execute` and `proceed`.
-        """
-        if name is None:
-            self._paused(now).go_on(again=False, single=True)
-        else:
-            self._begin(name, (), cycles=cycles, step=step, single=True, now=now)
 
     def answer(self, text: str, *, now: float) -> None:
         """A line for the PROMPT that asked.

@@ -17,14 +17,12 @@ from starlette.routing import WebSocketRoute
 from starlette.types import Receive, Scope, Send
 from websockets.frames import Opcode
 
+from interfaces.stream.access import Access
 from interfaces.stream.limits import Bucket
 from interfaces.stream.sockets import let_stay
-from interfaces.timer import Turning
-from interfaces.val2.monitor.completion import suggestions
-from interfaces.val2.monitor.control import SharedController, SharedOperator
 from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
-from interfaces.val2.monitor.state import OutputText, Style
-from vrs.clock import Clock
+from interfaces.val2.monitor.state import Expects, OutputText, Style
+from interfaces.val2.rooms import TerminalRoom
 from vrs.errors import VrsError
 
 PATH: Final = "/val"
@@ -94,18 +92,7 @@ class ShownCharacters(msgspec.Struct, frozen=True, tag="shown"):
 _read: Final = msgspec.json.Decoder(PageHello | Who | TypedLines | Interrupt | Complete | ShownCharacters).decode
 
 
-@dataclass(frozen=True, slots=True)
-class TerminalRoom:
-    """What terminals are at."""
-
-    shared: SharedController
-    clock: Clock
-    """Session time."""
-    terminal: Callable[[str | None, SharedOperator | None], TerminalMonitor | None]
-    """Makes a monitor for a token, and a person who commands elsewhere, too; None where the token opens nothing."""
-
-
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class PageTerminal:
     """A page's terminal: messages in, messages out. It's the person, too, whose control the monitor asks for."""
 
@@ -128,6 +115,8 @@ class PageTerminal:
     _answers: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=32))
     _prompt: str | None = None
     """The prompt that the page was told last; None where it's to be told again."""
+    wake: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set when there may be something to send."""
 
     def take(self) -> None:
         """Let the page ask for the lease."""
@@ -168,9 +157,8 @@ class PageTerminal:
 
     def _act(self, monitor: TerminalMonitor, message: TypedLines | Interrupt | Complete, now: float) -> None:
         if isinstance(message, Complete):
-            fragment, words = suggestions(message.text[:LONGEST], monitor.state, program=monitor.edits)
-            takes = monitor.takes_commands or monitor.edits
-            listed = [one.word for one in words[:SUGGESTED]] if takes else []
+            fragment, words = monitor.suggestions(message.text[:LONGEST])
+            listed = [one.word for one in words[:SUGGESTED]]
             self._answers.append({"type": "completed", "text": message.text, "fragment": fragment, "words": listed})
             return
         self._prompt = None
@@ -184,12 +172,12 @@ class PageTerminal:
 
     def advance(self, *, now: float) -> None:
         """Do what is due."""
-        if self.monitor is None:
-            return
-        self.monitor.advance(now=now)
-        self._collect_output(self.monitor)
-        if self.monitor.done and not self._output:
-            self.close(1000, "the monitor was left")
+        if self.monitor is not None:
+            self.monitor.advance(now=now)
+            self._collect_output(self.monitor)
+            if self.monitor.done and not self._output:
+                self.close(1000, "the monitor was left")
+            self.wake.set()
 
     def _collect_output(self, monitor: TerminalMonitor) -> None:
         """Take what was said, as far as there's room."""
@@ -225,20 +213,18 @@ class PageTerminal:
             return None
         pieces, size = [], 0
         while self._output and size < FRAME:
-            text, style = self._output[0].text, self._output[0].style
-            part = text[:FRAME]
-            if len(part) < len(text):
-                self._output[0] = OutputText(text[FRAME:], style)
-            else:
-                self._output.popleft()
-            size += len(part)
-            pieces.append((part, style.value))
+            piece = self._output.popleft()
+            text, style = piece.text, piece.style
+            if len(text) > FRAME:
+                self._output.appendleft(OutputText(text[FRAME:], style))
+            size += len(text[:FRAME])
+            pieces.append((text[:FRAME], style.value))
         self.waiting -= size
         self._sent += size
         self._prompt = prompt
         message = {
             "type": "said", "pieces": pieces, "prompt": prompt, "size": self._sent,
-            "commands": self.monitor.takes_commands,
+            "commands": self.monitor.expects is Expects.COMMAND,
         }  # fmt: skip
         return json.dumps(message).encode()
 
@@ -253,27 +239,19 @@ class PageTerminal:
             self.monitor.leave(now=now)
 
 
-class _TerminalClient:
-    """A terminal and its socket."""
-
-    def __init__(self, terminal: PageTerminal) -> None:
-        self.terminal = terminal
-        self.wake, self.heard = asyncio.Event(), asyncio.Event()
-
-
 class PageTerminalServer:
-    """Terminals of pages; its route goes into an application. What they are at is made for the first of them."""
+    """Terminals of pages; its route goes into an application. Their room is made for the first of them."""
 
-    def __init__(self, enter: Callable[[], Awaitable[TerminalRoom]]) -> None:
+    def __init__(self, enter: Callable[[], Awaitable[TerminalRoom]], access: Access) -> None:
         """Begin with nobody.
 
         Args:
-            enter: Gives what terminals are at, which may take a while.
+            enter: Gives the room, which may take a while.
+            access: What the token of a page opens; without any tokens, whoever comes is an operator.
         """
-        self._enter = enter
-        self._clients: set[_TerminalClient] = set()
+        self._enter, self._access = enter, access
+        self._terminals: set[PageTerminal] = set()
         self._room: TerminalRoom | None = None
-        self._turning: Turning | None = None
 
     @property
     def route(self) -> WebSocketRoute:
@@ -287,12 +265,10 @@ class PageTerminalServer:
         """Serve one page, until it goes."""
         await receive()
         await send({"type": "websocket.accept"})
-        client = _TerminalClient(PageTerminal())
-        terminal = client.terminal
-        self._clients.add(client)
-        writing = asyncio.create_task(self._write(client, scope["state"]["socket"], send))
-        greeting = asyncio.create_task(self._greet(client, scope))
-        client.wake.set()
+        terminal, met = PageTerminal(), asyncio.Event()
+        self._terminals.add(terminal)
+        writing = asyncio.create_task(self._write(terminal, scope["state"]["socket"], send))
+        greeting = asyncio.create_task(self._greet(terminal, met, scope))
         clock = asyncio.get_running_loop().time
         allowed = Bucket(RATE, BURST, clock())
         try:
@@ -302,77 +278,57 @@ class PageTerminalServer:
                 elif terminal.closing is None:
                     text = message.get("text")
                     terminal.receive(message.get("bytes") or b"" if text is None else text, now=self._now())
-                client.heard.set()
-                client.wake.set()
-                self._soon()
+                if terminal.greeted or terminal.closing is not None:
+                    met.set()
+                terminal.wake.set()
+                if self._room is not None:
+                    self._room.soon()
         finally:
             greeting.cancel()
-            self._clients.discard(client)
-            terminal.leave(now=self._now())
-            if not self._clients and self._turning is not None:
-                self._turning.stop()
+            self._terminals.discard(terminal)
+            if self._room is not None:
+                self._room.leave(terminal)
             writing.cancel()
             await asyncio.wait([writing, greeting])
 
-    async def _greet(self, client: _TerminalClient, scope: Scope) -> None:
+    async def _greet(self, terminal: PageTerminal, met: asyncio.Event, scope: Scope) -> None:
         """Give a page its monitor, once it has said who it is."""
-        terminal = client.terminal
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(GREETING):
-                while not terminal.greeted and terminal.closing is None:
-                    await client.heard.wait()
-                    client.heard.clear()
-        if not terminal.greeted or terminal.closing is not None:
+                await met.wait()
+        if not terminal.greeted:
             terminal.close(_POLICY, f"hello must come within {GREETING:g} s")
-            client.wake.set()
-            return
         try:
-            self._room = room = await self._enter()
+            if terminal.closing is None:
+                self._room = room = await self._enter()
+                self._begin(terminal, room, scope)
         except (VrsError, OSError) as error:
             terminal.close(_FAILED, f"VAL-II isn't there: {error}")
-            client.wake.set()
-            return
-        if self._turning is None:
-            self._turning = Turning(room.clock, self._turn)
-        self._turning.start()
-        monitor = room.terminal(terminal.token, terminal)
+        terminal.wake.set()
+
+    def _begin(self, terminal: PageTerminal, room: TerminalRoom, scope: Scope) -> None:
+        monitor = room.monitor(self._access, terminal.token, terminal)
         if monitor is None:
             terminal.close(_POLICY, "this token opens no terminal")
-        elif sum(other.terminal.monitor is not None for other in self._clients) >= MOST:
+        elif sum(other.monitor is not None for other in self._terminals) >= MOST:
             terminal.close(_TRY_AGAIN, f"there are {MOST} terminals already: close one elsewhere")
         else:
             let_stay(scope, known=True)
             terminal.begin(monitor, now=room.clock.now())
-        client.wake.set()
+            room.join(terminal)
 
-    def _soon(self) -> None:
-        if self._turning is not None:
-            self._turning.soon()
-
-    def _turn(self, now: float) -> float:
-        assert self._room is not None
-        self._room.shared.advance(now=now)
-        for client in tuple(self._clients):
-            client.terminal.advance(now=now)
-            client.wake.set()
-        deadlines = [client.terminal.next_deadline() for client in self._clients]
-        return min([self._room.shared.next_deadline(), *deadlines])
-
-    async def _write(self, client: _TerminalClient, socket: Any, send: Send) -> None:
+    async def _write(self, terminal: PageTerminal, socket: Any, send: Send) -> None:
         """Send what there is; a page that takes nothing is cut off."""
-        terminal = client.terminal
         try:
-            while True:
-                await client.wake.wait()
-                client.wake.clear()
+            while terminal.closing is None:
+                await terminal.wake.wait()
+                terminal.wake.clear()
                 while (data := terminal.outgoing()) is not None:
                     async with asyncio.timeout(BLOCKED):
                         await socket.put(data, Opcode.TEXT)
-                if terminal.closing is not None:
-                    code, reason = terminal.closing
-                    async with asyncio.timeout(BLOCKED):
-                        await send({"type": "websocket.close", "code": code, "reason": _short(reason)})
-                    return
+            code, reason = terminal.closing
+            async with asyncio.timeout(BLOCKED):
+                await send({"type": "websocket.close", "code": code, "reason": _short(reason)})
         except (TimeoutError, OSError):
             socket.abort()
 

@@ -8,10 +8,19 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Final, Literal
+from dataclasses import dataclass
+from typing import Final
 
-from interfaces.val2.context import Asked, Event, ProgramEnded, ProgramFailed, ProgramPaused, Typed, Warned
+from interfaces.val2.context import (
+    Asked,
+    Event,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    SignalChanged,
+    Typed,
+    Warned,
+)
 from interfaces.val2.controller import STATEMENT, TURN, Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.motion import Arm, EngineRobot
@@ -22,13 +31,8 @@ from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 
-def unanswered(_question: str) -> str | None:
-    """Nobody answers."""
-    return None
-
-
-def unheard(text: str) -> None:
-    """Nobody listens."""
+def unheard(_text: str) -> None:
+    """Nobody listens, or answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,35 +43,42 @@ class Listeners:
     """What it TYPEs, with line ends."""
     warned: Callable[[str], None] = unheard
     """Warnings, a line each."""
-    asked: Callable[[str], str | None] = unanswered
+    asked: Callable[[str], str | None] = unheard
     """Answers PROMPT; None where nobody does."""
 
 
-@dataclass(slots=True)
 class Player:
     """A controller that carries out the first program of a file, once."""
 
-    source: SourceFile
-    arm: Arm
-    listeners: Listeners = field(default_factory=Listeners)
-    rng: random.Random | None = None
-    """Of RANDOM."""
-    skips: bool = False
-    """Whether it goes on after what it can't reach, and after PAUSE."""
-    errors: list[ValError] = field(default_factory=list)
-    """What stopped it, or what it went on after."""
-    done: bool = False
-    _controller: Controller = field(init=False)
+    def __init__(
+        self, source: SourceFile, arm: Arm, listeners: Listeners, rng: random.Random, *, skips: bool = False
+    ) -> None:
+        """Load the file.
 
-    def __post_init__(self) -> None:
-        if not self.source.programs:
+        Args:
+            source: The file.
+            arm: What moves.
+            listeners: Who hears what the program says.
+            rng: Of RANDOM.
+            skips: Whether it goes on after what it can't reach, and after PAUSE.
+
+        Raises:
+            ValError: If there's no program.
+        """
+        if not source.programs:
             raise ValError("Undefined program name", "the file holds no program")
-        self._controller = controller = Controller(self.arm, parameters=self.arm.parameters, rng=self.rng)
-        for program in self.source.programs:
+        self.source, self._listeners, self._skips = source, listeners, skips
+        self.errors: list[ValError] = []
+        """What stopped it, or what it went on after."""
+        self.given_up: ValError | None = None
+        """Why it was ended, for a reason of its surroundings."""
+        self.done = False
+        self._controller = controller = Controller(arm, parameters=arm.parameters, rng=rng)
+        for program in source.programs:
             controller.memory.programs[program.name] = program
-        for entry in self.source.values:
+        for entry in source.values:
             controller.memory.set(entry.variable, entry.value)
-        controller.cell = self.source.signals
+        controller.cell = source.signals
 
     def begin(self, now: float) -> None:
         """Execute the program.
@@ -86,40 +97,45 @@ class Player:
         """When something is due [s]; infinity where nothing will ever be."""
         return math.inf if self.done else self._controller.next_deadline()
 
-    def give_up(self, error: ValError, now: float) -> ValError:
-        """End it for a reason of its surroundings; the error, with the step at which the program is."""
+    def expire(self, now: float, limit: float) -> None:
+        """Give a program up that nothing wakes, or that hasn't ended by a time [s]."""
+        if not self.done and self.next_deadline() == math.inf:
+            self._give_up(ValError("Waits for ever", "no signal that it waits for will come"), now)
+        if not self.done and now >= limit:
+            self._give_up(ValError("Program given up", f"it hadn't ended after {limit:g} s"), now)
+
+    def _give_up(self, error: ValError, now: float) -> None:
         status = self._controller.status()
-        error = error.at(program=status.program, step=status.step)
-        self.errors.append(error)
+        self.given_up = error.at(program=status.program, step=status.step)
+        self.errors.append(self.given_up)
         self._controller.abort(now=now)
         self.done = True
-        return error
 
     def _take(self, event: Event, now: float) -> None:
         match event:
             case Typed(text):
-                self.listeners.typed(text)
+                self._listeners.typed(text)
             case Warned(text):
-                self.listeners.warned(text)
+                self._listeners.warned(text)
             case Asked(question):
-                line = self.listeners.asked(question)
+                line = self._listeners.asked(question)
                 if line is None:
-                    self.give_up(ValError("No answer", f"nobody answers {question!r}"), now)
+                    self._give_up(ValError("No answer", f"nobody answers {question!r}"), now)
                 else:
                     self._controller.answer(line, now=now)
             case ProgramFailed(error):
                 self.errors.append(error)
-                self._go_on(now, out_of_reach(error))
+                self._go_on(now, error.what in _OUT_OF_REACH)
             case ProgramPaused(program, step, word):
                 if not self.done and not self._go_on(now, True):
-                    self.listeners.warned(f"{word} in program {program} before step {step}: nobody proceeds")
+                    self._listeners.warned(f"{word} in program {program} before step {step}: nobody proceeds")
             case ProgramEnded():
                 self.done = True
-            case _:
+            case SignalChanged():
                 pass
 
     def _go_on(self, now: float, may: bool) -> bool:
-        if self.skips and may:
+        if self._skips and may:
             self._controller.proceed(now=now)
             return True
         self.done = True
@@ -134,21 +150,8 @@ class Player:
         return error.place if error.step is None else None
 
 
-def out_of_reach(error: ValError) -> bool:
-    """Whether an error is about where the arm can't go."""
-    return error.what in ("Location out of range", "Straight line not possible")
-
-
-def stuck_error() -> ValError:
-    """The error of a program that nothing wakes."""
-    return ValError("Waits for ever", "no signal that it waits for will come")
-
-
-def endless_error(limit: float) -> ValError:
-    """The error of a program that is given up."""
-    return ValError("Program given up", f"it hadn't ended after {limit:g} s")
-
-
+_OUT_OF_REACH: Final = ("Location out of range", "Straight line not possible")
+"""Errors about where the arm can't go."""
 LONGEST: Final = 600.0
 """How long a program may take [s]."""
 COMPUTING: Final = 10.0
@@ -191,29 +194,22 @@ def rehearse(
     """
     now, computed, clock = 0.0, 0.0, ManualClock(0.0)
     engine = Engine(model, q=model.poses["nominal"] if start is None else start, clock=clock)
-    given_up: ValError | None = None
     rng = random.Random(0)  # noqa: S311 - RANDOM is no secret
     player = Player(source, Arm(EngineRobot(engine)), listeners or Listeners(), rng, skips=True)
     player.begin(0.0)
-    while not player.done:
+    while True:
         player.advance(now)
-        deadline = player.next_deadline()
-        if player.done:
-            break
-        if len(player.errors) >= MOST:
-            break
-        if deadline == math.inf or now >= limit or computed >= COMPUTING:
-            given_up = player.give_up(stuck_error() if deadline == math.inf else endless_error(now), now)
+        if len(player.errors) < MOST:
+            player.expire(now, now if now >= limit or computed >= COMPUTING else math.inf)
+        if player.done or len(player.errors) >= MOST:
             break
         # The steps of one call take little more than this; longer pauses are waits.
+        deadline = player.next_deadline()
         computed += deadline - now if deadline - now <= 4 * TURN * STATEMENT else 0.0
         now = max(now, deadline)
         clock.set(now)
     findings = tuple(
-        CheckFinding(_severity(error, given_up), error, player.place(error)) for error in player.errors
+        CheckFinding("warning" if error is player.given_up else "error", error, player.place(error))
+        for error in player.errors
     )
     return Rehearsal(findings, engine.timeline, now)
-
-
-def _severity(error: ValError, given_up: ValError | None) -> Literal["error", "warning"]:
-    return "warning" if error is given_up or error.what == "No answer" else "error"

@@ -11,16 +11,17 @@ import contextlib
 import math
 import re
 import socket
-from collections import deque
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from typing import Final
 
+from typing_extensions import override
+
+from interfaces.stream.access import Access
 from interfaces.stream.limits import Strangers
-from interfaces.timer import Turning
-from interfaces.val2.monitor.control import SharedController
 from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
-from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
-from vrs.clock import Clock
+from interfaces.val2.monitor.teletype import LineTerminal
+from interfaces.val2.rooms import TerminalRoom
 
 MOST: Final = 16
 """Terminals at a time, those that have shown a token."""
@@ -51,11 +52,11 @@ _OTHER_PROTOCOL: Final = re.compile(
     r"|[!#$%&'*+.^_`|~0-9a-z-]+:[ \t]",  # a header line
     re.IGNORECASE,
 )
-_HEADER: Final = re.compile(r"[!#$%&'*+.^_`|~0-9a-z-]+:", re.IGNORECASE)
+_FOREIGN_LINE: Final = re.compile(rf"{_OTHER_PROTOCOL.pattern}|[!#$%&'*+.^_`|~0-9a-z-]+:", re.IGNORECASE)
 
 
-class TcpTerminal:
-    """The terminal of a connection: bytes to lines, what is said to bytes."""
+class TcpTerminal(LineTerminal):
+    """The terminal of a connection, once it has shown a token."""
 
     def __init__(
         self,
@@ -70,123 +71,82 @@ class TcpTerminal:
             terminal: Makes the monitor for a token; None for a wrong one.
             full: Whether there are as many terminals as there may be.
         """
-        self._writer, self._terminal, self._full = writer, terminal, full
-        self._input, self._output = Input(), Output(_NEWLINE)
-        self._lines: deque[str] = deque()
-        self.monitor: TerminalMonitor | None = None
-        """None before a token was accepted: nothing is carried out."""
+        super().__init__(self._write, newline=_NEWLINE, at_once=SLICE)
+        self.writer, self._terminal, self._full = writer, terminal, full
         self._tries, self._characters = TOKEN_TRIES, 0
-        self._ended = self._end_announced = False
         self.lost = False
         """Whether output was lost since anything was sent."""
-        self._probed_at = 0.0
+        self._probed_at = math.inf
+        """When a client that sends no more was looked after [s]; infinity before."""
         self.over = asyncio.Event()
         """Set when it's to be closed."""
         self.may_read = asyncio.Event()
         """Set while more may be read."""
         self.may_read.set()
-        self._send(_TOKEN)
+        self.send(_TOKEN)
 
     @property
     def unread(self) -> int:
         """Bytes that wait for the reader."""
-        return self._writer.transport.get_write_buffer_size()
+        return self.writer.transport.get_write_buffer_size()
 
-    def unlock(self, data: bytes, *, now: float) -> bool:
-        """Take bytes, none at the end of the input, until a token was accepted; whether it was."""
-        self.feed(data)
-        return self._unlock(now)
-
+    @override
     def feed(self, data: bytes) -> None:
-        """Take bytes; none at the end of the input."""
-        self._lines.extend(self._input.feed(data) if data else self._input.end())
-        self._ended = self._ended or not data
-        if len(self._lines) > MOST_QUEUED:
+        super().feed(data)
+        if len(self.lines) > MOST_QUEUED:
             self.may_read.clear()
 
+    @override
     def advance(self, *, now: float) -> None:
-        """Do what is due, and what was typed."""
-        if self._writer.transport.is_closing():
+        if self.writer.transport.is_closing():
             self.leave(now=now)
+        if self.monitor is None or self.over.is_set():
             return
-        monitor = self.monitor
-        if monitor is None or self.over.is_set():
-            return
-        monitor.advance(now=now)
-        self._give()
-        for _ in range(min(SLICE, len(self._lines))):
-            if not monitor.done:
-                self._type(monitor, self._lines.popleft(), now)
-        if len(self._lines) <= MOST_QUEUED:
+        super().advance(now=now)
+        if len(self.lines) <= MOST_QUEUED:
             self.may_read.set()
-        if self._ended and not self._lines:
-            if not self._end_announced:
-                self._end_announced, self._probed_at = True, now
-                monitor.end_of_input(now=now)
-            self._probe(now)
-        self._give()
-        if monitor.done:
+        if self.end_announced:
+            self._probed_at = min(self._probed_at, now)
+            if self.monitor.busy and now >= self._probed_at + PROBE_PERIOD:
+                self._probed_at = now
+                self.writer.write(_NUL)
+        if self.monitor.done:
             self.over.set()
 
-    def _unlock(self, now: float) -> bool:
-        """Make the monitor, once a token is right; whether there's one."""
-        while self._lines and not self.over.is_set():
-            text = self._lines.popleft().strip()
+    def unlock(self, data: bytes, *, now: float) -> bool:
+        """Take bytes, none at the end of the input, until a token makes the monitor; whether one has."""
+        self.feed(data)
+        while self.lines and not self.over.is_set():
+            text = self.lines.popleft().strip()
             self._characters += len(text) + 1
             monitor = self._terminal(text) if text else None
             if monitor is not None and self._full():
-                self._send(f"*Too many terminals* {MOST} at most{_NEWLINE}")
+                self.send(f"*Too many terminals* {MOST} at most{_NEWLINE}")
                 self.over.set()
             elif monitor is not None:
                 self.monitor = monitor
                 monitor.start(now=now)
                 return True
-            elif (
-                text == OVERLONG
-                or self._characters > TOKEN_CHARACTERS
-                or _OTHER_PROTOCOL.match(text)
-                or _HEADER.match(text)
-            ):
+            elif text == OVERLONG or self._characters > TOKEN_CHARACTERS or _FOREIGN_LINE.match(text):
                 self.over.set()
             elif text:
                 self._tries -= 1
-                self._send(f"*Invalid token*{_NEWLINE}{_TOKEN if self._tries else ''}")
+                self.send(f"*Invalid token*{_NEWLINE}{_TOKEN if self._tries else ''}")
                 if not self._tries:
                     self.over.set()
         begun = self._input.begun.lstrip()
-        if self._ended or len(begun) > TOKEN_CHARACTERS or _OTHER_PROTOCOL.match(begun):
+        if self.ended or len(begun) > TOKEN_CHARACTERS or _OTHER_PROTOCOL.match(begun):
             self.over.set()
         return False
 
-    def _type(self, monitor: TerminalMonitor, text: str, now: float) -> None:
-        self._output.took()
-        if text == INTERRUPT:
-            self._send(_NEWLINE)
-            monitor.interrupt(now=now)
-        else:
-            monitor.line(text, now=now)
-        self._give()
-
-    def _probe(self, now: float) -> None:
-        if self.monitor is not None and self.monitor.busy and now >= self._probed_at + PROBE_PERIOD:
-            self._probed_at = now
-            self._writer.write(_NUL)
-
-    def _give(self) -> None:
-        assert self.monitor is not None
-        self._send(self._output.give(self.monitor.output(), self.monitor.prompt))
-
-    def _send(self, text: str) -> None:
+    def _write(self, text: str) -> None:
         data = text.encode()
         if self.unread + len(data) > UNREAD:
             self.lost = True
-            return
-        if not data:
-            return
-        if self.lost:
+        elif data:
+            told = f"{_NEWLINE}*Output lost* it wasn't read{_NEWLINE}".encode() if self.lost else b""
             self.lost = False
-            data = f"{_NEWLINE}*Output lost* it wasn't read{_NEWLINE}".encode() + data
-        self._writer.write(data)
+            self.writer.write(told + data)
 
     def leave(self, *, now: float) -> None:
         """The connection is gone: what it ran is stopped."""
@@ -198,29 +158,22 @@ class TcpTerminal:
         """When something is due [s]."""
         if self.monitor is None or self.over.is_set():
             return math.inf
-        if self._lines:
-            return -math.inf
-        looked = self._probed_at + PROBE_PERIOD if self._end_announced else math.inf
-        return min(self.monitor.next_deadline(), looked)
+        return -math.inf if self.lines else min(self.monitor.next_deadline(), self._probed_at + PROBE_PERIOD)
 
 
 class TcpTerminalServer:
-    """Terminals at one controller, over TCP."""
+    """Terminals of a room, over TCP."""
 
-    def __init__(
-        self, shared: SharedController, clock: Clock, terminal: Callable[[str], TerminalMonitor | None]
-    ) -> None:
+    def __init__(self, room: TerminalRoom, access: Access) -> None:
         """Begin with `listening`.
 
         Args:
-            shared: What all terminals are at.
-            clock: Session time.
-            terminal: Makes a connection's monitor for a token; None for a wrong one.
+            room: What all terminals are at.
+            access: What a terminal's token opens; there's no terminal without one.
         """
-        self._shared, self._clock, self._terminal = shared, clock, terminal
+        self._room, self._access = room, access
         self._connections: set[TcpTerminal] = set()
         self._unauthenticated: Strangers[asyncio.StreamWriter] = Strangers(MOST_UNAUTHENTICATED)
-        self._turning = Turning(clock, self._turn)
         self.port = 0
         """Where it listens."""
 
@@ -243,7 +196,6 @@ class TcpTerminalServer:
         """
         server = await asyncio.start_server(self._serve, sock=listening)
         self.port = listening.getsockname()[1]
-        self._turning.start()
         try:
             yield self
         finally:
@@ -251,43 +203,36 @@ class TcpTerminalServer:
             for writer in self._unauthenticated:
                 writer.transport.abort()
             for connection in self._connections:
-                connection.leave(now=self._clock.now())
-            self._turning.stop()
+                connection.leave(now=self._room.clock.now())
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(2.0):
                     while self._connections or len(self._unauthenticated):
                         await asyncio.sleep(0.01)
 
-    def _turn(self, now: float) -> float:
-        self._shared.advance(now=now)
-        for connection in tuple(self._connections):
-            connection.advance(now=now)
-        deadlines = [connection.next_deadline() for connection in self._connections]
-        return min([self._shared.next_deadline(), *deadlines])
-
-    def _full(self) -> bool:
-        return len(self._connections) >= MOST
-
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        connection = TcpTerminal(writer, self._terminal, self._full)
-        if not await self._let_in(connection, reader, writer):
-            await _close(writer)
-            return
-        self._connections.add(connection)
-        self._turning.soon()
-        reading = asyncio.create_task(self._read(connection, reader))
-        try:
-            await connection.over.wait()
-        finally:
-            reading.cancel()
-            connection.leave(now=self._clock.now())
-            self._connections.discard(connection)
-            await _close(writer)
+        monitor = partial(self._room.monitor, self._access)
+        connection = TcpTerminal(writer, monitor, lambda: len(self._connections) >= MOST)
+        if await self._let_in(connection, reader):
+            self._connections.add(connection)
+            self._room.join(connection)
+            reading = asyncio.create_task(self._read(connection, reader))
+            try:
+                await connection.over.wait()
+            finally:
+                reading.cancel()
+                self._room.leave(connection)
+                self._connections.discard(connection)
+        with contextlib.suppress(OSError):
+            try:
+                async with asyncio.timeout(1.0):
+                    writer.close()
+                    await writer.wait_closed()
+            except TimeoutError:
+                writer.transport.abort()
 
-    async def _let_in(
-        self, connection: TcpTerminal, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-    ) -> bool:
+    async def _let_in(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> bool:
         """Wait for a token; whether one was accepted. Another stranger may be cut off for this one."""
+        writer = connection.writer
         address = str(writer.get_extra_info("peername", ("",))[0])
         oldest = self._unauthenticated.add(writer, address, until=math.inf)
         if oldest is not None:
@@ -296,7 +241,7 @@ class TcpTerminalServer:
             async with asyncio.timeout(TOKEN_TIMEOUT):
                 while not connection.over.is_set():
                     data = await reader.read(_READ)
-                    if connection.unlock(data, now=self._clock.now()):
+                    if connection.unlock(data, now=self._room.clock.now()):
                         return True
                     await asyncio.sleep(0)
         except (OSError, TimeoutError):
@@ -311,21 +256,10 @@ class TcpTerminalServer:
             try:
                 data = await reader.read(_READ)
             except OSError:
-                connection.leave(now=self._clock.now())
+                connection.leave(now=self._room.clock.now())
                 return
             connection.feed(data)
-            self._turning.soon()
+            self._room.soon()
             await connection.may_read.wait()
             # Others have their turn, too, where there's always something to read.
             await asyncio.sleep(0)
-
-
-async def _close(writer: asyncio.StreamWriter) -> None:
-    """Send what waits, and close."""
-    with contextlib.suppress(OSError):
-        try:
-            async with asyncio.timeout(1.0):
-                writer.close()
-                await writer.wait_closed()
-        except TimeoutError:
-            writer.transport.abort()

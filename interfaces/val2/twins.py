@@ -13,7 +13,7 @@ from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
-from interfaces.val2.playing import Listeners, Player, endless_error, stuck_error
+from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt
@@ -70,10 +70,7 @@ class _Operator:
         """Let the program go on, and say when it's to be looked after again."""
         player = self.player
         player.advance(now)
-        if not player.done and player.next_deadline() == math.inf:
-            player.give_up(stuck_error(), now)
-        if not player.done and now >= self.limit:
-            player.give_up(endless_error(self.limit), now)
+        player.expire(now, self.limit)
         if player.done:
             self.session.last_action = now
         else:

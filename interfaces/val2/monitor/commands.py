@@ -1,4 +1,7 @@
-"""The monitor's commands: names, forms, help, what each needs, and HELP itself."""
+"""The monitor's commands, a row each: names, forms, help, completion, what each needs, and what carries it out.
+
+Abbreviations, HELP, completion and the line of help below a prompt read these rows, and those of the language.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,19 @@ import difflib
 import enum
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor import layout, locations, running, settings, storage
+from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
-from interfaces.val2.monitor.state import Dialogue, TerminalState, nothing, split_word, unique
+from interfaces.val2.monitor.state import Dialogue, TerminalState, begun, nothing, split_word
 
 Handler: TypeAlias = Callable[[TerminalState, str], Dialogue | None]
-"""Carries a command out, with what follows its name; gives what takes the next line, or None for commands."""
+"""Carries a command out, with what follows its name; what asks, or None."""
 
 
 class Need(enum.Enum):
@@ -32,6 +35,22 @@ class Need(enum.Enum):
     """Control: it moves the arm, or changes what others see."""
 
 
+class Suggestion(NamedTuple):
+    """A word that may come."""
+
+    word: str
+    help: str = ""
+    """One line; empty for none."""
+
+
+Completer: TypeAlias = Callable[[TerminalState, str], Iterable[Suggestion]]
+"""Gives what may come behind a command's name, and what was typed between."""
+
+
+def _none(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class MonitorCommand:
     """A command."""
@@ -39,20 +58,20 @@ class MonitorCommand:
     name: str
     """Upper case."""
     act: Handler | None
-    """Carries it out; None for what the monitor does itself."""
+    """Carries it out; None for leaving, the name of which can't be abbreviated."""
     forms: str
     """What follows the name; forms are separated by `|`."""
     help: str
     """One line."""
     need: Need = Need.CHANGE
+    completes: Completer = _none
+    """What may come behind its name and what else was typed."""
     idle: bool = False
     """Only while no program runs."""
     ours: bool = False
     """An extension, not VAL's."""
-    whole: bool = False
-    """Its name can't be abbreviated."""
-    bare: bool = False
-    """Nothing may follow its name."""
+    more: bool = False
+    """Something may follow its name though no form says what."""
 
     @property
     def usage(self) -> tuple[str, ...]:
@@ -60,24 +79,20 @@ class MonitorCommand:
         return tuple(f"{self.name} {form.strip()}".rstrip() for form in self.forms.split("|"))
 
     def carry_out(self, state: TerminalState, rest: str) -> Dialogue | None:
-        """Do it; gives what takes the next line, or None for commands.
+        """Do it, but for leaving; what asks, or None.
 
         Raises:
             ValError: If it can't be done.
         """
-        assert self.act is not None
-        if self.bare:
+        if not (self.forms or self.more):
             nothing(rest, self.name)
-        return self.act(state, rest)
+        return None if self.act is None else self.act(state, rest)
 
     def only_shows(self, rest: str) -> bool:
         """Whether it changes nothing, with what follows its name."""
         if self.need is not Need.ARGUMENT:
             return self.need is Need.LOOK
         return rest in {"", "?"} or (self.name == "PARAMETER" and "=" not in rest)
-
-
-_LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
 
 
 _ASSIGNMENT: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9._]*(\[[^\]]*\])?\s*=(?!=).*", re.DOTALL)
@@ -90,31 +105,46 @@ def command(line: str) -> MonitorCommand:
         ValError: If it's none; it says so where the line is an instruction.
     """
     word, rest = split_word(line)
+    upper = word.upper()
     if _ASSIGNMENT.fullmatch(line):
         raise ValError("Invalid command", f"{_short(line)}: an assignment is an instruction, DO {_short(line)}")
-    try:
-        if word.upper() in forms.INSTRUCTIONS and word.upper() not in COMMANDS:
-            raise ValError("Invalid command", word.upper())
-        return command_named(word)
-    except ValError as error:
-        if error.what == "Ambiguous command":
-            raise
-        raise ValError("Invalid command", _hint(word.upper(), rest, line)) from None
+    is_instruction = upper in forms.INSTRUCTIONS
+    found = [] if is_instruction and upper not in COMMANDS else _candidates(word)
+    if len(found) == 1:
+        return COMMANDS[found[0]]
+    if found:
+        raise ValError("Ambiguous command", f"{upper}: {', '.join(sorted(found))}")
+    if is_instruction:
+        said = f"{upper} is an instruction: DO {_short(f'{upper} {rest}'.strip())}"
+    elif upper in forms.SWITCHES:
+        said = f"{upper} is a switch: ENABLE {upper}, DISABLE {upper}"
+    elif upper:
+        said = _short(upper) + (_near(upper, COMMANDS) or "; HELP lists the commands")
+    else:
+        said = _short(line)
+    raise ValError("Invalid command", said)
 
 
-def _hint(word: str, rest: str, line: str) -> str:
-    if not word:
-        return _short(line)
-    if word in forms.INSTRUCTIONS:
-        return f"{word} is an instruction: DO {_short(f'{word} {rest}'.strip())}"
-    if word in forms.SWITCHES:
-        return f"{word} is a switch: ENABLE {word}, DISABLE {word}"
-    close = difflib.get_close_matches(word, COMMANDS, n=1, cutoff=0.7)
-    return f"{_short(word)}; did you mean {close[0]}?" if close else f"{_short(word)}; HELP lists the commands"
+def command_named(word: str) -> MonitorCommand | None:
+    """The command that a word names, whole or by its beginning; None where that's none or several."""
+    found = _candidates(word)
+    return COMMANDS[found[0]] if len(found) == 1 else None
+
+
+def _candidates(word: str) -> list[str]:
+    wanted = word.upper()
+    if wanted in COMMANDS or wanted in SHORT:
+        return [SHORT.get(wanted, wanted)]
+    return begun(wanted, (name for name, one in COMMANDS.items() if one.act is not None))
 
 
 def _short(text: str) -> str:
     return text if len(text) <= 40 else f"{text[:37]}.."
+
+
+def _near(word: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word.upper(), known, n=1, cutoff=0.7)
+    return f"; did you mean {close[0]}?" if close else ""
 
 
 def explained(word: str) -> Iterator[tuple[str, str, str]]:
@@ -157,122 +187,239 @@ def help_(state: TerminalState, rest: str) -> None:
         state.say("Functions:")
         state.say(*layout.in_columns(forms.FUNCTIONS))
         return
-    found = list(explained(rest)) or list(explained(_whole(rest)))
-    if not found:
-        raise ValError("Unknown word", f"{_short(rest)}{_near(rest)}")
-    for kind, usage, said in found:
+    tables = (COMMANDS, forms.INSTRUCTIONS, forms.FUNCTIONS, forms.SWITCHES, forms.PARAMETERS)
+    whole = next((found[0] for names in tables if len(found := begun(rest.upper(), names)) == 1), rest)
+    explanations = list(explained(rest)) or list(explained(whole))
+    if not explanations:
+        raise ValError("Unknown word", f"{_short(rest)}{_near(rest, [word for names in tables for word in names])}")
+    for kind, usage, said in explanations:
         state.say(
             f"{usage}  ({kind})",
             *textwrap.wrap(said, layout.WIDTH, initial_indent="    ", subsequent_indent="    "),
         )
 
 
-def _whole(word: str) -> str:
-    """The command, instruction, switch or parameter that a word is the beginning of; itself if there's none."""
-    upper = word.upper()
-    for names in (COMMANDS, forms.INSTRUCTIONS, forms.FUNCTIONS, forms.SWITCHES, forms.PARAMETERS):
-        try:
-            return unique(upper, names, "word")
-        except ValError:
-            continue
-    return upper
+MOST: Final = 200
+"""Longest list of suggestions."""
+_FRAGMENT: Final = re.compile(r"[#$]?[A-Za-z0-9._]*$")
+_DO: Final = re.compile(r"\sDO\s(.*)$", re.IGNORECASE | re.DOTALL)
+_LABEL: Final = re.compile(r"\s*\d+\s+")
 
 
-def _near(word: str) -> str:
-    known = [*COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS]
-    close = difflib.get_close_matches(word.upper(), known, n=1, cutoff=0.7)
-    return f"; did you mean {close[0]}?" if close else ""
+def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Suggestion]]:
+    """What may complete a line.
+
+    Args:
+        text: As far as the cursor.
+        state: Whose memory and files are known.
+        program: Whether it's a line of a program, not a command.
+
+    Returns:
+        What is typed of the last word, and the words that begin with it; keywords in its case.
+    """
+    found = _FRAGMENT.search(text)
+    fragment = found[0] if found else ""
+    before = text[: len(text) - len(fragment)]
+    word, _ = split_word(before)
+    if before.count('"') % 2 or ";" in before:
+        return fragment, []
+    if program:
+        known = _instruction(state, before)
+    elif not word:
+        known = (Suggestion(one.name, one.help) for one in COMMANDS.values())
+    else:
+        named = command_named(word)
+        known = iter(named.completes(state, before.lstrip()[len(word) :]) if named else ())
+    wanted = fragment.upper()
+    fitting = {one.word: one for one in known if one.word.upper().startswith(wanted) and one.word.upper() != wanted}
+    lower = bool(fragment) and not any(letter.isupper() for letter in fragment)
+    some = sorted(fitting.values(), key=lambda one: one.word.upper())[:MOST]
+    return fragment, [Suggestion(one.word.lower() if lower else one.word, one.help) for one in some]
 
 
+def _instruction(state: TerminalState, before: str) -> Iterator[Suggestion]:
+    word, _ = split_word(_LABEL.sub("", before))
+    keyword = word.upper()
+    if not word:
+        yield from _rows(forms.INSTRUCTIONS)(state, before)
+        yield from _names("real", "string")(state, before)
+    elif keyword in {"ENABLE", "DISABLE"}:
+        yield from _rows(forms.SWITCHES)(state, before)
+    else:
+        if keyword in {"CALL", "GOSUB", "REACT", "REACTI"}:
+            yield from _programs(state, before)
+        if keyword in forms.INSTRUCTIONS:
+            allowed = forms.INSTRUCTIONS[keyword].allowed_words
+            yield from (Suggestion(one, forms.WORDS.get(one, "")) for one in allowed)
+        yield from _operands(state, before)
+
+
+def _motion(state: TerminalState, before: str) -> Iterable[Suggestion]:
+    found = _DO.search(before)
+    return _instruction(state, found[1]) if found else [Suggestion("DO")]
+
+
+def _operands(state: TerminalState, before: str) -> Iterator[Suggestion]:
+    yield from (Suggestion(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
+    yield from (Suggestion(name, said) for name, said in forms.OPERATORS.items())
+    yield from _names("location", "point", "real", "string")(state, before)
+
+
+def _programs(state: TerminalState, _before: str) -> Iterable[Suggestion]:
+    return [Suggestion(one) for one in state.controller.memory.programs]
+
+
+def _files(state: TerminalState, _before: str) -> Iterable[Suggestion]:
+    return [Suggestion(one) for one in state.files.listed()]
+
+
+def _rows(table: Mapping[str, forms.Form | forms.Switch | forms.Parameter]) -> Completer:
+    return lambda _state, _before: [Suggestion(one.name, one.help) for one in table.values()]
+
+
+def _names(*kinds: str) -> Completer:
+    """Names in memory, an array's once."""
+
+    def completes(state: TerminalState, _before: str) -> Iterable[Suggestion]:
+        listing = state.controller.memory.listing
+        found = {name.partition("[")[0]: None for kind in kinds for name, _ in listing(kind)}
+        return [Suggestion(name) for name in found]
+
+    return completes
+
+
+def _until(letters: str, first: Completer, then: Completer = _none) -> Completer:
+    """Completes by one, and behind certain letters by another."""
+    return lambda state, before: (then if set(letters) & set(before) else first)(state, before)
+
+
+def _all_words(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
+    for name in {*COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS}:
+        yield Suggestion(name, next(said for _, _, said in explained(name)))
+
+
+def hint(text: str, *, program: bool = False) -> str:
+    """One line on the word that's being typed, or the last one that means something; empty for none.
+
+    Args:
+        text: As far as the cursor.
+        program: Whether it's a line of a program, not a command.
+    """
+    parts = re.findall(r"[#$]?[A-Za-z][A-Za-z0-9._]*", text)
+    if not program and parts:
+        named = command_named(parts[0])
+        if named is None:
+            return ""
+        parts[0] = named.name
+    for index in reversed(range(len(parts))):
+        found = list(explained(parts[index]))
+        wanted = "command" if index == 0 and not program else "instruction"
+        if found:
+            _, usage, said = next((one for one in found if one[0].startswith(wanted)), found[0])
+            return f"{usage}: {said}"
+    return ""
+
+
+_LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
+_LOCATIONS, _REALS, _STRINGS = _names("location", "point"), _names("real"), _names("string")
+_SWITCHES, _STORED = _rows(forms.SWITCHES), _until("=", _files, _programs)
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "",
-                   "Stop the program and the arm, within its limits; Ctrl-C does the same.", bare=True),
+                   "Stop the program and the arm, within its limits; Ctrl-C does the same."),
     MonitorCommand("AT", running.at, "t | +t [motion]",
-                   "The next motion begins at a time, or so long from now [s].", idle=True, ours=True),
+                   "The next motion begins at a time, or so long from now [s].", completes=_motion, idle=True,
+                   ours=True),
     MonitorCommand("BASE", partial(locations.frame, word="BASE"), "| dx,dy,dz,turn",
-                   "Show the base, or set it: mm, and deg about Z.", need=_ARGUMENT, idle=True),
-    MonitorCommand("CALIBRATE", settings.calibrate, "", "Make joint values valid; asks first.", idle=True,
-                   bare=True),
-    MonitorCommand("COPY", partial(storage.put, keep=True), "new=old", "Copy a program."),
-    MonitorCommand("DELETE", storage.delete_programs, "program,..", "Delete programs; asks first.", idle=True),
-    MonitorCommand("DELETEL", partial(storage.delete_values, kind="locations"), "location,..",
-                   "Delete locations; asks first.", idle=True),
-    MonitorCommand("DELETEP", storage.delete_programs, "program,..", "Delete programs; asks first.", idle=True),
-    MonitorCommand("DELETER", partial(storage.delete_values, kind="reals"), "real,..", "Delete reals; asks first.",
-                   idle=True),
-    MonitorCommand("DELETES", partial(storage.delete_values, kind="strings"), "$string,..",
-                   "Delete strings; asks first.", idle=True),
-    MonitorCommand("DIRECTORY", storage.directory, "", "List the programs in memory.", need=_LOOK),
-    MonitorCommand("DISABLE", partial(settings.turn, on=False), "switch,..", "Turn switches off."),
+                   "Show the base, or set it: mm, and deg about Z.", _ARGUMENT, _operands, idle=True),
+    MonitorCommand("CALIBRATE", running.calibrate, "", "Make joint values valid; asks first.", idle=True),
+    MonitorCommand("COPY", partial(storage.put, keep=True), "new=old", "Copy a program.", completes=_programs),
+    MonitorCommand("DELETE", partial(storage.delete, kind="programs"), "program,..",
+                   "Delete programs; asks first.", completes=_programs, idle=True),
+    MonitorCommand("DELETEL", partial(storage.delete, kind="locations"), "location,..",
+                   "Delete locations; asks first.", completes=_until("=:", _LOCATIONS), idle=True),
+    MonitorCommand("DELETEP", partial(storage.delete, kind="programs"), "program,..",
+                   "Delete programs; asks first.", completes=_programs, idle=True),
+    MonitorCommand("DELETER", partial(storage.delete, kind="reals"), "real,..", "Delete reals; asks first.",
+                   completes=_REALS, idle=True),
+    MonitorCommand("DELETES", partial(storage.delete, kind="strings"), "$string,..", "Delete strings; asks first.",
+                   completes=_STRINGS, idle=True),
+    MonitorCommand("DIRECTORY", storage.directory, "", "List the programs in memory.", _LOOK, _programs, more=True),
+    MonitorCommand("DISABLE", partial(running.turn, on=False), "switch,..", "Turn switches off.",
+                   completes=_SWITCHES),
     MonitorCommand("DO", running.do, "instruction |", "Carry out one instruction; without one, the last again.",
-                   idle=True),
-    MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.", idle=True),
-    MonitorCommand("ENABLE", partial(settings.turn, on=True), "switch,..",
-                   "Turn switches on; ENABLE POWER after PANIC."),
+                   completes=_instruction, idle=True),
+    MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.",
+                   completes=_programs, idle=True),
+    MonitorCommand("ENABLE", partial(running.turn, on=True), "switch,..",
+                   "Turn switches on; ENABLE POWER after PANIC.", completes=_SWITCHES),
     MonitorCommand("EXECUTE", running.execute, "program[(arguments)][,cycles[,step]] |",
-                   "Run a program, or the last; cycles -1 for ever.", idle=True),
-    MonitorCommand("EXIT", None, "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
-    MonitorCommand("FLIST", storage.flist, "", "List the files.", need=_LOOK),
-    MonitorCommand("FREE", storage.free, "", "Show what is in memory.", need=_LOOK, bare=True),
-    MonitorCommand("HELP", help_, "| word", "List the commands, or explain a word of the language.", need=_LOOK),
+                   "Run a program, or the last; cycles -1 for ever.", completes=_programs, idle=True),
+    MonitorCommand("EXIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
+    MonitorCommand("FLIST", storage.flist, "", "List the files.", _LOOK),
+    MonitorCommand("FREE", storage.free, "", "Show what is in memory.", _LOOK),
+    MonitorCommand("HELP", help_, "| word", "List the commands, or explain a word of the language.", _LOOK,
+                   _all_words),
     MonitorCommand("HERE", locations.here, "location | #location | a:b",
-                   "Record where the arm is; then CR, or changes: ,,10"),
-    MonitorCommand("ID", lambda s, _: s.say(s.version), "", "Show what this is, and its version.", need=_LOOK,
-                   bare=True),
-    MonitorCommand("IO", settings.io, "", "Show inputs, outputs and internal signals.", need=_LOOK, bare=True),
-    MonitorCommand("LISTF", storage.flist, "", "List the files.", need=_LOOK),
-    MonitorCommand("LISTL", storage.listl, "| location,..", "List locations; * stands for any characters.",
-                   need=_LOOK),
-    MonitorCommand("LISTP", storage.listp, "| program,..", "List programs.", need=_LOOK),
-    MonitorCommand("LISTR", storage.listr, "| real,.. | expression",
-                   "List reals, or show what an expression comes to.", need=_LOOK),
-    MonitorCommand("LISTS", storage.lists, "| $string,.. | expression",
-                   "List strings, or show what an expression comes to.", need=_LOOK),
-    MonitorCommand("LOAD", storage.load, "file", "Read programs and values from a file."),
+                   "Record where the arm is; then CR, or changes: ,,10",
+                   completes=_until("=:", _LOCATIONS, _operands)),
+    MonitorCommand("ID", lambda s, _: s.say(s.version), "", "Show what this is, and its version.", _LOOK),
+    MonitorCommand("IO", running.io, "", "Show inputs, outputs and internal signals.", _LOOK),
+    MonitorCommand("LISTF", storage.flist, "", "List the files.", _LOOK, more=True),
+    MonitorCommand("LISTL", partial(storage.list_values, kind="locations"), "| location,..",
+                   "List locations; * stands for any characters.", _LOOK, _until("=:", _LOCATIONS)),
+    MonitorCommand("LISTP", storage.list_programs, "| program,..", "List programs.", _LOOK, _programs),
+    MonitorCommand("LISTR", partial(storage.list_values, kind="reals"), "| real,.. | expression",
+                   "List reals, or show what an expression comes to.", _LOOK, _REALS),
+    MonitorCommand("LISTS", partial(storage.list_values, kind="strings"), "| $string,.. | expression",
+                   "List strings, or show what an expression comes to.", _LOOK, _STRINGS),
+    MonitorCommand("LOAD", storage.load, "file", "Read programs and values from a file.", completes=_STORED),
     MonitorCommand("NEXT", running.next_, "| n", "Carry out the next step of a program that stands, or the next n.",
                    idle=True),
-    MonitorCommand("PANIC", running.panic, "", "Stop at once and turn the power off."),
-    MonitorCommand("PARAMETER", settings.parameter, "| name | name=value", "Show or set parameters.",
-                   need=_ARGUMENT),
+    MonitorCommand("PANIC", running.panic, "", "Stop at once and turn the power off.", more=True),
+    MonitorCommand("PARAMETER", running.parameter, "| name | name=value", "Show or set parameters.", _ARGUMENT,
+                   _until("=", _rows(forms.PARAMETERS))),
     MonitorCommand("POINT", locations.point, "location[=expression]",
-                   "Define or change a location; then CR, or changes: ,,10"),
+                   "Define or change a location; then CR, or changes: ,,10",
+                   completes=_until("=:", _LOCATIONS, _operands)),
     MonitorCommand("PROCEED", lambda s, _: s.controller.proceed(now=s.now), "",
-                   "Go on with a program that stands, at its next step.", idle=True, bare=True),
-    MonitorCommand("QUIT", None, "", "Leave the monitor.", need=_LOOK, ours=True, whole=True),
-    MonitorCommand("RENAME", partial(storage.put, keep=False), "new=old", "Rename a program.", idle=True),
-    MonitorCommand("RESET", lambda s, _: s.controller.signals.reset(), "", "Turn all outputs off.", bare=True),
-    MonitorCommand("RETRY", lambda s, _: s.controller.retry(now=s.now), "",
-                   "Go on with a program that stands, at the step that was interrupted.", idle=True, bare=True),
-    MonitorCommand("REWIND", locations.rewind, "t | -t", "Show what WHERE showed at a time, or so long ago [s].",
-                   need=_LOOK, ours=True),
-    MonitorCommand("SIGNAL", settings.signal, "| n,-m,..", "Turn signals on, or off with a minus; show them.",
-                   need=_ARGUMENT),
-    MonitorCommand("SPEED", settings.speed, "| percent", "Show or set the monitor speed; it counts at once.",
-                   need=_ARGUMENT),
-    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.",
-                   need=_LOOK, bare=True),
-    MonitorCommand("STORE", partial(storage.store, parts=""), "file[=program,..]",
-                   "Write programs, with all that they use, to a file."),
-    MonitorCommand("STOREL", partial(storage.store, parts="locations"), "file[=location,..]",
-                   "Write locations to a file."),
-    MonitorCommand("STOREP", partial(storage.store, parts="programs"), "file[=program,..]",
-                   "Write programs to a file."),
-    MonitorCommand("STORER", partial(storage.store, parts="reals"), "file[=real,..]", "Write reals to a file."),
-    MonitorCommand("STORES", partial(storage.store, parts="strings"), "file[=$string,..]",
-                   "Write strings to a file."),
-    MonitorCommand("SWITCH", settings.switch, "| switch,..", "Show switches.", need=_LOOK),
-    MonitorCommand("TEACH", locations.teach, "location", "Record one location after the other, each by CR; E ends.",
+                   "Go on with a program that stands, at its next step.", idle=True),
+    MonitorCommand("QUIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
+    MonitorCommand("RENAME", partial(storage.put, keep=False), "new=old", "Rename a program.", completes=_programs,
                    idle=True),
-    MonitorCommand("TIMELINE", running.timeline, "", "Show what is scheduled.", need=_LOOK, ours=True, bare=True),
+    MonitorCommand("RESET", lambda s, _: s.controller.signals.reset(), "", "Turn all outputs off."),
+    MonitorCommand("RETRY", lambda s, _: s.controller.retry(now=s.now), "",
+                   "Go on with a program that stands, at the step that was interrupted.", idle=True),
+    MonitorCommand("REWIND", locations.rewind, "t | -t", "Show what WHERE showed at a time, or so long ago [s].",
+                   _LOOK, _operands, ours=True),
+    MonitorCommand("SIGNAL", running.signal, "| n,-m,..", "Turn signals on, or off with a minus; show them.",
+                   _ARGUMENT, _operands),
+    MonitorCommand("SPEED", running.speed, "| percent", "Show or set the monitor speed; it counts at once.",
+                   _ARGUMENT, _operands),
+    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.", _LOOK),
+    MonitorCommand("STORE", partial(storage.store, parts=""), "file[=program,..]",
+                   "Write programs, with all that they use, to a file.", completes=_STORED),
+    MonitorCommand("STOREL", partial(storage.store, parts="locations"), "file[=location,..]",
+                   "Write locations to a file.", completes=_STORED),
+    MonitorCommand("STOREP", partial(storage.store, parts="programs"), "file[=program,..]",
+                   "Write programs to a file.", completes=_STORED),
+    MonitorCommand("STORER", partial(storage.store, parts="reals"), "file[=real,..]", "Write reals to a file.",
+                   completes=_STORED),
+    MonitorCommand("STORES", partial(storage.store, parts="strings"), "file[=$string,..]",
+                   "Write strings to a file.", completes=_STORED),
+    MonitorCommand("SWITCH", running.switch, "| switch,..", "Show switches.", _LOOK, _SWITCHES),
+    MonitorCommand("TEACH", locations.teach, "location", "Record one location after the other, each by CR; E ends.",
+                   completes=_until("=:", _LOCATIONS), idle=True),
+    MonitorCommand("TIMELINE", running.timeline, "", "Show what is scheduled.", _LOOK, ours=True),
     MonitorCommand("TOOL", partial(locations.frame, word="TOOL"), "| transformation", "Show the tool, or set it.",
-                   need=_ARGUMENT, idle=True),
+                   _ARGUMENT, _operands, idle=True),
     MonitorCommand("UNDO", lambda s, _: s.say(s.controller.arm.undo(now=s.now)), "",
-                   "Take back the newest motion, as far as it's still to come.", ours=True, bare=True),
+                   "Take back the newest motion, as far as it's still to come.", ours=True),
     MonitorCommand("WHERE", locations.where, "| 1 | REAL",
-                   "Show where the arm is; 1 repeats until CR, REAL: the other twin.", need=_LOOK),
+                   "Show where the arm is; 1 repeats until CR, REAL: the other twin.", _LOOK,
+                   lambda _state, _before: [Suggestion("REAL", "The other twin.")]),
     MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
-                   "Begin a program step by step, or do its next step.", idle=True),
-    MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True, bare=True),
+                   "Begin a program step by step, or do its next step.", completes=_programs, idle=True),
+    MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),
 )  # fmt: skip
 
 COMMANDS: Final = {command.name: command for command in _TABLE}
@@ -287,18 +434,3 @@ SHORT: Final = {
     "W": "WHERE",
 }
 """What stands for a command though others begin with it too."""
-
-
-def command_named(word: str) -> MonitorCommand:
-    """The command that a word names, whole or by its beginning.
-
-    Raises:
-        ValError: If none or several begin with it.
-    """
-    wanted = word.upper()
-    if wanted in COMMANDS:
-        return COMMANDS[wanted]
-    found = SHORT.get(wanted) or unique(
-        wanted, (name for name, one in COMMANDS.items() if not one.whole), "command"
-    )
-    return COMMANDS[found]

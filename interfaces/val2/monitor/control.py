@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from enum import Enum
+from functools import partial
 from typing import TYPE_CHECKING, Final, Protocol, TypeAlias
 
 from typing_extensions import override
@@ -50,23 +51,29 @@ class SharedOperator(Protocol):
         """Let that session ask for it."""
 
 
-class Control(Protocol):
-    """The right to command the robot, as its site gives it."""
+class Control:
+    """The right to command the robot: here over what nobody else can reach."""
 
-    def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
+    fault_poll_interval = math.inf
+    """How often it's to be asked for trouble [s]; infinity for never."""
+
+    def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:  # noqa: ARG002
         """Ask for it, if it isn't there.
 
         Args:
             person: Whose right it's to be; None for the controller's own.
             now: Session time [s].
         """
+        return ControlState.HELD
 
     @property
     def held(self) -> bool:
         """Whether it's there."""
+        return True
 
     def pop_lapse(self) -> str:
         """Why it has ended since this was asked last; empty where it hasn't."""
+        return ""
 
     def release(self, *, now: float) -> None:
         """Give it back; the robot stops."""
@@ -74,47 +81,13 @@ class Control(Protocol):
     def resume(self, *, now: float) -> None:
         """Let a robot go on that stopped by itself."""
 
-    def fault(self, *, now: float) -> ValError | None:
+    def fault(self, *, now: float) -> ValError | None:  # noqa: ARG002
         """What is wrong with the robot or the way to it; None where nothing is."""
-
-    @property
-    def fault_poll_interval(self) -> float:
-        """How often it's to be asked for trouble [s]; infinity for never."""
-
-
-class Free(Control):
-    """Control over what nobody else can reach."""
-
-    held = True
-    """It's there."""
-    fault_poll_interval = math.inf
-
-    @override
-    def request(self, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
-        return ControlState.HELD
-
-    @override
-    def pop_lapse(self) -> str:
-        return ""
-
-    @override
-    def release(self, *, now: float) -> None:
-        """It stays."""
-
-    @override
-    def resume(self, *, now: float) -> None:
-        """It doesn't stop by itself."""
-
-    @override
-    def fault(self, *, now: float) -> ValError | None:
         return None
 
 
-class TerminalListener(Protocol):
-    """What is told of what happens."""
-
-    def take(self, event: Event) -> None:
-        """Take an event of the controller."""
+Listener: TypeAlias = Callable[[Event], None]
+"""A terminal, as what takes the events of the controller when it's in control."""
 
 
 class SharedController:
@@ -127,17 +100,15 @@ class SharedController:
             controller: What programs run on.
             control: The right to command the robot.
         """
-        self.controller, self._control = controller, control
-        self.holder: TerminalListener | None = None
+        self.controller, self.control = controller, control
+        self.holder: Listener | None = None
         """The terminal in control."""
         self._person: SharedOperator | None = None
         """Who sits there."""
-        self._withdraws: float | None = None
-        """When to see next whether what a program asked for ahead can be taken back [s]; None where nothing is."""
+        self._withdraws = math.inf
+        """When to see next whether what a program asked for ahead can be taken back [s]; infinity for never."""
 
-    def request(
-        self, terminal: TerminalListener, person: SharedOperator | None = None, *, now: float
-    ) -> ControlAnswer:
+    def request(self, terminal: Listener, person: SharedOperator | None = None, *, now: float) -> ControlAnswer:
         """Ask for control for a terminal.
 
         Args:
@@ -146,62 +117,47 @@ class SharedController:
             now: Session time [s].
         """
         self._notice(now)
-        if self.holder is not None and self.holder is not terminal:
-            if self._control.held:
+        if self.holder is not None and self.holder != terminal:
+            if self.control.held:
                 return "another terminal is in control"
-            self._dismiss(now)
-        answer = self._control.request(person, now=now)
+            if self._runs:
+                self.controller.abort(now=now)
+                self._tell(now)
+            self.holder = None
+        answer = self.control.request(person, now=now)
         if answer is ControlState.HELD:
             self.holder, self._person = terminal, person
         return answer
 
-    def _dismiss(self, now: float) -> None:
-        """Let the terminal go that has lost control; what it ran ends."""
-        if self.controller.running or self.controller.doing:
-            self.controller.abort(now=now)
-            self._tell(now)
-        self.holder = None
+    @property
+    def _runs(self) -> bool:
+        return self.controller.running or self.controller.doing
 
     def _notice(self, now: float) -> None:
         """End what runs if control has ended since this was called last, though it may be there again."""
-        why = self._control.pop_lapse()
-        if why and (self.controller.running or self.controller.doing):
+        why = self.control.pop_lapse()
+        if why and self._runs:
             self.controller.interrupt(ValError("Motion interrupted", why), now=now)
             self._withdraws = now
-        if self._withdraws is not None and now >= self._withdraws:
-            self._withdraws = now + _AGAIN if self._withdraw(now) else None
+        if now >= self._withdraws:
+            self._withdraws = now + _AGAIN if self._withdraw(now) else math.inf
 
     def _withdraw(self, now: float) -> bool:
         """Take out of the plan what was asked for ahead; whether it's to be tried again."""
         person = self._person
         shares = person is not None and person.holds
-        answer = self._control.request(person, now=now) if shares else ControlState.HELD
-        if answer is ControlState.HELD and self._control.held:
+        answer = self.control.request(person, now=now) if shares else ControlState.HELD
+        if answer is ControlState.HELD and self.control.held:
             self.controller.arm.withdraw(now=now)
         return answer is ControlState.PENDING
 
-    def resume(self, *, now: float) -> None:
-        """Let a robot go on that stopped by itself."""
-        self._control.resume(now=now)
-
-    def fault(self, *, now: float) -> ValError | None:
-        """What is wrong with the robot or the way to it; None where nothing is."""
-        return self._control.fault(now=now)
-
-    @property
-    def fault_poll_interval(self) -> float:
-        """How often it's to be asked for trouble [s]."""
-        return self._control.fault_poll_interval
-
-    def leave(self, terminal: TerminalListener, *, now: float) -> None:
+    def leave(self, terminal: Listener, *, now: float) -> None:
         """A terminal is gone: what it ran is stopped."""
-        if self.holder is not terminal:
-            return
-        self.holder = None
-        controller = self.controller
-        if controller.running or controller.doing:
-            controller.abort(now=now)
-        self._control.release(now=now)
+        if self.holder == terminal:
+            self.holder = None
+            if self._runs:
+                self.controller.abort(now=now)
+            self.control.release(now=now)
 
     def advance(self, *, now: float) -> None:
         """Do what is due, and tell the terminal in control."""
@@ -211,11 +167,11 @@ class SharedController:
     def _tell(self, now: float) -> None:
         for event in self.controller.advance(now=now):
             if self.holder is not None:
-                self.holder.take(event)
+                self.holder(event)
 
     def next_deadline(self) -> float:
         """When something is due [s]; infinity for never."""
-        return min(self.controller.next_deadline(), math.inf if self._withdraws is None else self._withdraws)
+        return min(self.controller.next_deadline(), self._withdraws)
 
 
 LEASE_TIMEOUT: Final = 3.0
@@ -262,9 +218,12 @@ class LeaseControl(Control):
             now: Session time [s].
         """
         lease = self._observe_lease(now)
-        if not self._connection.is_connected:
-            return self._answer("there's no connection to the robot's server")
-        return self._request_own(lease, now) if person is None else self._request_share(person, lease, now)
+        answer: ControlAnswer = "there's no connection to the robot's server"
+        if self._connection.is_connected:
+            answer = self._request_own(lease, now) if person is None else self._request_share(person, lease, now)
+        if answer is not ControlState.PENDING:
+            self._requested_at = None
+        return answer
 
     def _observe_lease(self, now: float) -> Lease | None:
         """The lease as it was last heard of."""
@@ -277,23 +236,19 @@ class LeaseControl(Control):
 
     def _request_own(self, lease: Lease | None, now: float) -> ControlAnswer:
         if lease is not None and lease.state is LeaseState.HELD and not self._release_pending:
-            if not lease.yours:
-                return self._answer(f"{lease.holder} has control")
-            return self._answer(ControlState.HELD) if self._follows(now) else ControlState.PENDING
-        return self._poll(now, self._acquire, "the robot isn't at rest yet: try again")
-
-    def _acquire(self) -> None:
-        self._connection.acquire(wait=0.0)
+            return self._followed(now) if lease.yours else f"{lease.holder} has control"
+        ask = partial(self._connection.acquire, wait=0.0)
+        return self._poll(now, ask, "the robot isn't at rest yet: try again")
 
     def _request_share(self, person: SharedOperator, lease: Lease | None, now: float) -> ControlAnswer:
         """A share of the lease of a person's session, which is to take one if it has none."""
         mine = lease is not None and lease.shared and lease.commands and not self._release_pending
         if mine and self._share[0] == person.session:
-            return self._answer(ControlState.HELD) if self._follows(now) else ControlState.PENDING
+            return self._followed(now)
         if not person.holds:
             asked = self._requested_at is not None and self._requested_at <= now < self._requested_at + _TAKE_GRACE
             if lease is not None and lease.state is LeaseState.HELD and not (lease.yours or asked):
-                return self._answer(f"{lease.holder} has control")
+                return f"{lease.holder} has control"
             return self._poll(now, person.take, "control wasn't given: try again")
         session, number = self._share
         if session != person.session or not number:
@@ -302,28 +257,25 @@ class LeaseControl(Control):
         answer = self._connection.answer(number)
         if answer is not None:
             self._share = session, 0
-        return self._answer(answer.text) if isinstance(answer, Problem) else ControlState.PENDING
+        return answer.text if isinstance(answer, Problem) else ControlState.PENDING
 
-    def _poll(self, now: float, ask: Callable[[], None], timeout_reason: str) -> ControlAnswer:
+    def _poll(self, now: float, ask: Callable[[], object], timeout_reason: str) -> ControlAnswer:
         """Ask now and then, but not for ever."""
         if self._requested_at is None or now < self._requested_at:
             self._requested_at, self._polled_at = now, now - _ASK_AGAIN
         if now >= self._requested_at + LEASE_TIMEOUT:
-            return self._answer(timeout_reason)
+            return timeout_reason
         if now >= self._polled_at + _ASK_AGAIN:
             self._polled_at = now
             ask()
         return ControlState.PENDING
 
-    def _follows(self, now: float) -> bool:
-        """Whether the robot follows this lease; one that doesn't in time says why to those who command it."""
+    def _followed(self, now: float) -> ControlState:
+        """Wait until the robot follows this lease; one that doesn't in time says why to those who command it."""
         assert self._granted is not None
         state = self._connection.state
-        return now >= self._granted + FOLLOW_TIMEOUT or (state is not None and state.connected and not state.halted)
-
-    def _answer(self, answer: ControlAnswer) -> ControlAnswer:
-        self._requested_at = None
-        return answer
+        follows = state is not None and state.connected and not state.halted
+        return ControlState.HELD if follows or now >= self._granted + FOLLOW_TIMEOUT else ControlState.PENDING
 
     @property
     def _release_pending(self) -> bool:

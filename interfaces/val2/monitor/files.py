@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -78,13 +79,11 @@ class Files:
         Raises:
             ValError: If it can't be read, or is too long.
         """
-        try:
+        with _tried(path.name):
             if not path.is_file():
                 raise ValError("Nonexistent file", path.name)
             with path.open("rb") as file:
                 data = file.read(LARGEST + 1)
-        except OSError as error:
-            raise ValError("File error", f"{path.name}: {error.strerror}") from None
         if len(data) > LARGEST:
             raise ValError("File error", f"{path.name}: longer than {LARGEST} bytes")
         return data.decode("utf-8", errors="replace")
@@ -95,10 +94,8 @@ class Files:
         Raises:
             ValError: If it can't be written.
         """
-        try:
+        with _tried(path.name):
             write_whole(path, text.encode())
-        except OSError as error:
-            raise ValError("File error", f"{path.name}: {error.strerror}") from None
 
     def listed(self) -> list[str]:
         """The names of the files in the directory, without the suffix.
@@ -106,7 +103,14 @@ class Files:
         Raises:
             ValError: If it can't be read.
         """
-        try:
+        with _tried(self.directory):
             return sorted(path.stem for path in self.directory.glob(f"*{SUFFIX}") if path.is_file())
-        except OSError as error:
-            raise ValError("File error", f"{self.directory}: {error.strerror}") from None
+
+
+@contextlib.contextmanager
+def _tried(name: str | Path) -> Iterator[None]:
+    """Raise what goes wrong with a file as VAL's error."""
+    try:
+        yield
+    except OSError as error:
+        raise ValError("File error", f"{name}: {error.strerror}") from None

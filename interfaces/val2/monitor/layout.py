@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from interfaces.val2.motion.places import Where
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import Location, PrecisionPoint, Transformation, to_oat
+from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, to_oat
 
 WIDTH = 79
 """Longest line [characters]."""
@@ -58,26 +58,18 @@ def where(place: Where) -> list[str]:
     return [f"{heading()}{'HAND':>{_COLUMN}}", row(place.tool), f"{joints}{fixed(place.hand, 2):>{_COLUMN}}"]
 
 
-def locations(values: Mapping[str, Location]) -> list[str]:
-    """LISTL: a line each; a long name has one of its own."""
-    lines = [f"{'':15}{heading()}"] if values else []
-    for name, value in values.items():
-        if len(name) > 15:
-            lines.append(name)
-        lines.append(f"{name if len(name) <= 15 else '':15}{row(value)}")
+def values(known: Mapping[str, Value]) -> list[str]:
+    """LISTL, LISTR, LISTS: a line each; a location's long name has one of its own."""
+    width, lines = max(map(len, known), default=0), []
+    for name, value in known.items():
+        if isinstance(value, float):
+            lines.append(f"{name:{width}} = {number(value)}")
+        elif isinstance(value, str):
+            lines.append(f'{name:{width}} = "{visible(value)}"')
+        else:
+            lines += [] if lines else [f"{'':15}{heading()}"]
+            lines += [f"{name:15}{row(value)}"] if len(name) <= 15 else [name, f"{'':15}{row(value)}"]
     return lines
-
-
-def reals(values: Mapping[str, float]) -> list[str]:
-    """LISTR: a line each."""
-    width = max(map(len, values), default=0)
-    return [f"{name:{width}} = {number(value)}" for name, value in values.items()]
-
-
-def strings(values: Mapping[str, str]) -> list[str]:
-    """LISTS: a line each."""
-    width = max(map(len, values), default=0)
-    return [f'{name:{width}} = "{visible(value)}"' for name, value in values.items()]
 
 
 def visible(text: str) -> str:

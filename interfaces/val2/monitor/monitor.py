@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import deque
-from collections.abc import Callable
 from typing import Final
 
 from interfaces.val2 import context
 from interfaces.val2.errors import ValError
-from interfaces.val2.monitor import commands, settings
+from interfaces.val2.monitor import commands, running
 from interfaces.val2.monitor.control import ControlState, SharedController, SharedOperator
-from interfaces.val2.monitor.editor import Editing
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.locations import Teach, WatchDialogue
-from interfaces.val2.monitor.state import Dialogue, OutputText, Style, TerminalState, split_word
-from vrs.errors import VrsError
+from interfaces.val2.monitor.state import Dialogue, Expects, OutputText, Question, Style, TerminalState, split_word
 
 LONGEST: Final = 2048
 """Longest line [characters]."""
@@ -58,13 +55,16 @@ class TerminalMonitor:
         self._shared, self._queues_commands, self.read_only = shared, queues_commands, read_only
         self.state = TerminalState(shared.controller, files, version)
         self._dialogue: Dialogue | None = None
-        self._question: str | None = None
+        self._asked = Question()
+        """What the dialogue asks."""
+        self._prompted: str | None = None
+        """What a program asks."""
         self._waiting: deque[str] = deque()
-        self._greeting = False
         self._ended = False
         self._control_due = math.inf
-        self._pending_command = ("", "")
-        """A command's name, and its line that waits for control."""
+        """When to see whether control was given [s]; infinity where it isn't waited for."""
+        self._pending: tuple[str, str] | None = None
+        """The name and the line of a command that waits for control; None at the beginning."""
         self._fault, self._checked_at = "", -math.inf
         self.done = False
         """Whether it's over: QUIT, or the end of the input."""
@@ -75,38 +75,47 @@ class TerminalMonitor:
         if self.done:
             return ""
         if self._dialogue is not None and not self._busy:
-            return self._dialogue.prompt
-        if self._question is not None:
-            return self._question
-        if self._busy:
-            return ""
-        return "*" if self.state.controller.running else "."
+            return self._asked.prompt
+        if self._prompted is not None:
+            return self._prompted
+        return "" if self._busy else "*" if self.state.controller.running else "."
+
+    @property
+    def expects(self) -> Expects:
+        """What the next line is."""
+        if self._prompted is not None:
+            return Expects.ANSWER
+        return Expects.COMMAND if self._dialogue is None else self._asked.expects
+
+    def suggestions(self, text: str) -> tuple[str, list[commands.Suggestion]]:
+        """What may complete the next line, as far as the cursor; see `commands.suggestions`."""
+        fragment, found = commands.suggestions(text, self.state, program=self.expects is Expects.STEP)
+        return fragment, [] if self.expects is Expects.ANSWER else found
 
     @property
     def _in_control(self) -> bool:
-        return self._shared.holder is self
+        return self._shared.holder == self.take
+
+    @property
+    def _runs(self) -> bool:
+        """Whether a program or an instruction of this terminal is under way."""
+        return self._in_control and (self.state.controller.running or self.state.controller.doing)
+
+    @property
+    def _greets(self) -> bool:
+        """Whether control is asked for the first time, without a command."""
+        return self._control_due < math.inf and self._pending is None
 
     @property
     def _busy(self) -> bool:
         """Whether lines wait: for an instruction, or for control."""
         works = self.state.work is not None or (self._in_control and self.state.controller.doing)
-        return self._greeting or self._control_due < math.inf or works
+        return self._control_due < math.inf or works
 
     @property
     def busy(self) -> bool:
         """Whether a program or an instruction of this terminal is under way, or lines wait."""
-        running = self._in_control and (self.state.controller.running or self.state.controller.doing)
-        return running or self._busy or bool(self._waiting)
-
-    @property
-    def takes_commands(self) -> bool:
-        """Whether the next line is a command."""
-        return self._question is None and (self._dialogue is None or isinstance(self._dialogue, Teach))
-
-    @property
-    def edits(self) -> bool:
-        """Whether the next line is one of a program."""
-        return isinstance(self._dialogue, Editing)
+        return self._runs or self._busy or bool(self._waiting)
 
     def output(self) -> list[OutputText]:
         """What was said since this was last called."""
@@ -117,7 +126,8 @@ class TerminalMonitor:
         """Say what this is, and ask for control."""
         self.state.now = now
         self.state.say(f"{self.state.version}. HELP lists the commands.", style=Style.NOTE)
-        self._greeting = self._person is None or bool(self.read_only)
+        if self._person is None or self.read_only:
+            self._control_due = now
         self.advance(now=now)
 
     def line(self, text: str, *, now: float) -> None:
@@ -130,112 +140,93 @@ class TerminalMonitor:
             return
         text = "".join(letter for letter in text.expandtabs() if letter.isprintable())
         word = text.strip().upper()
-        if not self._queues_commands and (word == "PANIC" or (word == "ABORT" and not self._at_prompt)):
+        at_prompt = not (self._busy or self._waiting) and self._prompted is None
+        if not self._queues_commands and (word == "PANIC" or (word == "ABORT" and not at_prompt)):
             self._urgent(word)
         elif self.takes(text):
             self._take(text)
+        elif len(self._waiting) >= WAITING and not self._queues_commands:
+            self.state.fail(ValError("Too many lines waiting", f"{WAITING} at most"))
         else:
-            self._wait(text)
+            self._waiting.append(text)
         self.advance(now=now)
-
-    @property
-    def _at_prompt(self) -> bool:
-        """Whether the next line can be taken, and isn't an answer to a program."""
-        return not (self._busy or self._waiting) and self._question is None
 
     def _urgent(self, word: str) -> None:
         """What is done whatever is under way; what a program asks and what waits is dropped."""
         if word == "PANIC" or self._in_control:
             self._waiting.clear()
-            dialogue, self._question = self._dialogue, None
+            self._prompted = None
             self._command(word)
-            self._dialogue = dialogue
-
-    def _wait(self, text: str) -> None:
-        if len(self._waiting) >= WAITING and not self._queues_commands:
-            self.state.fail(ValError("Too many lines waiting", f"{WAITING} at most"))
-        else:
-            self._waiting.append(text)
 
     def takes(self, text: str) -> bool:
         """Whether a line can be taken now; else it waits."""
         return not self._waiting and self._can_take(text)
 
     def _can_take(self, text: str) -> bool:
-        if self._busy or self._dialogue is not None or self._question is not None:
-            return not self._busy or self._question is not None
-        runs = self._queues_commands and self._in_control and self.state.controller.running
-        return not runs or self._is_allowed(text)
+        if self._prompted is not None:
+            return True
+        if self._busy or self._dialogue is not None:
+            return not self._busy
+        if not (self._queues_commands and self._in_control and self.state.controller.running):
+            return True
+        command = commands.command_named(split_word(text)[0])
+        return not text.strip() or (command is not None and not command.idle)
 
     def _take(self, text: str) -> None:
         """Do what a line says."""
         if self._dialogue is not None and not self._busy:
-            self._answer_dialogue(self._dialogue, text)
-        elif self._question is not None:
-            self._question = None
-            self._guarded(lambda: self.state.controller.answer(text, now=self.state.now))
+            if self._asked.expects is Expects.COMMAND and text.strip().upper() not in self._asked.answers:
+                self._command(text)
+            else:
+                self.state.line = text
+                self._ask(self._dialogue, text)
+        elif self._prompted is not None:
+            self._prompted = None
+            with self.state.guarded():
+                self.state.controller.answer(text, now=self.state.now)
         else:
             self._command(text)
 
-    def _answer_dialogue(self, dialogue: Dialogue, text: str) -> None:
-        if isinstance(dialogue, Teach) and not dialogue.takes(text):
-            self._command(text)
-            self._dialogue = self._dialogue or dialogue
-            return
-
-        def answer() -> None:
-            self.state.line = text
-            self._dialogue = dialogue.line(text)
-
-        self._guarded(answer)
-
-    @staticmethod
-    def _is_allowed(text: str) -> bool:
-        """Whether a line is a command that may be given while a program runs."""
-        word, _ = split_word(text)
-        try:
-            return not text.strip() or not commands.command_named(word).idle
-        except ValError:
-            return False
+    def _ask(self, dialogue: Dialogue, text: str | None) -> None:
+        """Let a dialogue go on with a line, or without; it asks, or is over."""
+        asked: Question | None = None
+        with self.state.guarded(), contextlib.suppress(StopIteration):
+            asked = dialogue.send(text)
+        if asked is not None:
+            self._dialogue, self._asked = dialogue, asked
+        elif self._dialogue is dialogue:
+            self._dialogue = None
 
     def _command(self, text: str) -> None:
         """Do what a command says, or say what is wrong with it."""
         self.state.line = text
-        self._guarded(lambda: self._carry_out(text))
-
-    def _guarded(self, action: Callable[[], object]) -> None:
-        try:
-            action()
-        except ValError as error:
-            self.state.fail(error)
-        except VrsError as error:
-            self.state.fail(ValError("Not possible", str(error)))
+        with self.state.guarded():
+            self._carry_out(text)
 
     def _carry_out(self, text: str) -> None:
         bare = text.split(";", 1)[0].strip() if '"' not in text else text.strip()
         word, rest = split_word(bare)
-        if not bare:
-            return
-        if rest == "?" and settings.show_setting(self.state, word.upper()):
+        if not bare or (rest == "?" and running.show_setting(self.state, word.upper())):
             return
         command = commands.command(bare)
         if command.act is None:
             self._end()
             return
         if not command.only_shows(rest):
-            answer = self.read_only or self._shared.request(self, self._person, now=self.state.now)
+            answer = self.read_only or self._shared.request(self.take, self._person, now=self.state.now)
             if answer is ControlState.PENDING and command.name not in _URGENT:
                 self._waiting.appendleft(text)
-                self._control_due, self._pending_command = self.state.now + CONTROL_POLL, (command.name, text)
+                self._control_due, self._pending = self.state.now + CONTROL_POLL, (command.name, text)
                 return
             if isinstance(answer, str):
                 raise ValError("No control", f"{command.name}: {answer}")
-        running = self.state.controller.running
-        if command.idle and running and command.name != "DO":
+        if command.idle and self.state.controller.running and command.name != "DO":
             raise ValError("Program running", f"{command.name} must wait, or ABORT it")
-        self._dialogue = command.carry_out(self.state, rest)
+        dialogue = command.carry_out(self.state, rest)
+        if dialogue is not None:
+            self._ask(dialogue, None)
         if command.name == "ENABLE":
-            self._shared.resume(now=self.state.now)
+            self._shared.control.resume(now=self.state.now)
 
     def interrupt(self, *, now: float) -> None:
         """Ctrl-C: what is asked is dropped, else what this terminal runs is aborted."""
@@ -244,15 +235,18 @@ class TerminalMonitor:
         self.state.drop_work()
         if self._dialogue is not None:
             self._end_dialogue(kept=False)
-        elif self._in_control and (self.state.controller.running or self.state.controller.doing):
-            self._question = None
+        elif self._runs:
+            self._prompted = None
             self._command("ABORT")
         self.advance(now=now)
 
     def _end_dialogue(self, *, kept: bool) -> None:
-        dialogue, self._dialogue, self._question = self._dialogue, None, None
+        dialogue, self._dialogue, self._prompted = self._dialogue, None, None
         if dialogue is not None:
-            self._guarded(lambda: dialogue.leave(kept=kept))
+            with self.state.guarded(), contextlib.suppress(EOFError, StopIteration):
+                if kept:
+                    dialogue.throw(EOFError())
+            dialogue.close()
 
     def end_of_input(self, *, now: float) -> None:
         """No line will come any more: what is under way is done, then it's over."""
@@ -271,7 +265,7 @@ class TerminalMonitor:
         self.state.drop_work()
         self.done = True
         self._waiting.clear()
-        self._shared.leave(self, now=self.state.now)
+        self._shared.leave(self.take, now=self.state.now)
 
     def take(self, event: context.Event) -> None:
         """Take an event of the controller, when in control."""
@@ -280,41 +274,37 @@ class TerminalMonitor:
             case context.Typed(text):
                 state.output.append(OutputText(text, Style.TYPED))
             case context.Asked(text):
-                self._question = text
+                self._prompted = text
             case context.ProgramPaused(program, step, word):
-                self._question = None
+                self._prompted = None
                 if word != "XSTEP" or not state.steps:
                     state.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
             case context.ProgramEnded(program, word):
-                self._question, state.steps = None, 0
+                self._prompted, state.steps = None, 0
                 if program or word == "ABORT":
                     state.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
             case context.ProgramFailed(error):
-                self._question, state.steps = None, 0
+                self._prompted, state.steps = None, 0
                 state.fail(error)
             case context.Warned(text):
-                state.say(text if text.startswith("*") else f"*Warning* {text}", style=Style.NOTE)
-            case _:
+                state.say(f"*Warning* {text}", style=Style.NOTE)
+            case context.SignalChanged():
                 pass
 
     def advance(self, *, now: float) -> None:
         """Do what is due: of the controller, of what is shown again and again, and lines that have waited."""
         self.state.now = now
         self._shared.advance(now=now)
-        if self._greeting or now >= self._control_due:
+        if self._greets or now >= self._control_due:
             self._settle_control()
         self._report_fault()
-        if isinstance(self._dialogue, WatchDialogue):
-            self._dialogue.advance()
+        if self._dialogue is not None and now >= self._asked.due:
+            self._ask(self._dialogue, None)
         self.state.work_on(allowed=self._in_control)
         self._continue_steps()
         self._release_scheduled()
-        while self._waiting and not self.done:
-            text = self._waiting.popleft()
-            if not self._can_take(text):
-                self._waiting.appendleft(text)
-                break
-            self._take(text)
+        while self._waiting and not self.done and self._can_take(self._waiting[0]):
+            self._take(self._waiting.popleft())
             if self._control_due < math.inf:
                 break
             self._shared.advance(now=now)
@@ -324,32 +314,29 @@ class TerminalMonitor:
 
     def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.read_only or self._shared.request(self, self._person, now=self.state.now)
+        answer = self.read_only or self._shared.request(self.take, self._person, now=self.state.now)
         if answer is ControlState.PENDING:
             self._control_due = self.state.now + CONTROL_POLL
             return
-        self._control_due = math.inf
-        if self._greeting:
-            self._greeting = False
-            if isinstance(answer, str):
-                self.state.say(f"*No control* {answer}: looking only", style=Style.NOTE)
-        elif isinstance(answer, str) and self._waiting and self._waiting[0] is self._pending_command[1]:
+        pending, self._pending, self._control_due = self._pending, None, math.inf
+        if not isinstance(answer, str):
+            return
+        if pending is None:
+            self.state.say(f"*No control* {answer}: looking only", style=Style.NOTE)
+        elif self._waiting and self._waiting[0] is pending[1]:
             self._waiting.popleft()
-            self.state.fail(ValError("No control", f"{self._pending_command[0]}: {answer}"))
+            self.state.fail(ValError("No control", f"{pending[0]}: {answer}"))
 
     def _report_fault(self) -> None:
         """Say when the robot has stopped by itself, or can't be reached; and when that's over."""
         self._checked_at = self.state.now
-        if self._greeting:
+        if self._greets:
             return
-        fault = self._shared.fault(now=self.state.now)
-        text = "" if fault is None else str(fault)
-        if text == self._fault:
-            return
-        self._fault = text
-        if text:
-            self.state.say(text, style=Style.ERROR)
-        else:
+        fault = self._shared.control.fault(now=self.state.now)
+        before, self._fault = self._fault, "" if fault is None else str(fault)
+        if self._fault and self._fault != before:
+            self.state.say(self._fault, style=Style.ERROR)
+        elif before and not self._fault:
             self.state.say("The robot follows again", style=Style.NOTE)
 
     def _continue_steps(self) -> None:
@@ -357,7 +344,8 @@ class TerminalMonitor:
         controller = self.state.controller
         while self.state.steps and not (controller.running or controller.doing):
             self.state.steps -= 1
-            self._guarded(lambda: controller.xstep(now=self.state.now))
+            with self.state.guarded():
+                controller.proceed(single=True, now=self.state.now)
             self._shared.advance(now=self.state.now)
 
     def _release_scheduled(self) -> None:
@@ -372,9 +360,9 @@ class TerminalMonitor:
         """Leave, once nothing is under way."""
         if self._dialogue is not None and not self._busy and not self._waiting:
             self._end_dialogue(kept=True)
-        if self._question is not None:
+        if self._prompted is not None:
             self.state.fail(ValError("End of input", "the program asks for a line"))
-            self._question = None
+            self._prompted = None
             self._command("ABORT")
         if not self.busy:
             self._end()
@@ -383,10 +371,6 @@ class TerminalMonitor:
         """When to call `advance` next [s]; infinity for not before a line comes."""
         if self.state.work is not None:
             return self._checked_at
-        watched = self._dialogue.due if isinstance(self._dialogue, WatchDialogue) else math.inf
-        return min(
-            self._shared.next_deadline(),
-            self._control_due,
-            watched,
-            self._checked_at + self._shared.fault_poll_interval,
-        )
+        asked = math.inf if self._dialogue is None else self._asked.due
+        polled = self._checked_at + self._shared.control.fault_poll_interval
+        return min(self._shared.next_deadline(), self._control_due, asked, polled)

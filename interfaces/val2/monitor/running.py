@@ -1,15 +1,19 @@
-"""DO, EXECUTE, ABORT, PANIC, PROCEED, RETRY, NEXT, XSTEP, STATUS; AT, UNDO and TIMELINE, ours."""
+"""What runs and moves, and its settings: DO to STATUS, AT and TIMELINE; switches, parameters, speed, signals."""
 
 from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Iterable
+from functools import partial
 from typing import Final
 
-from interfaces.val2.controller import ControllerStatus
+from interfaces.val2 import forms
+from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.state import Style, TerminalState, integer, named, pieces
+from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, integer, named, pieces, unique
+from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
 from interfaces.val2.statements import timed
 from interfaces.val2.syntax import BLANK, Expression, Instruction
 
@@ -51,14 +55,14 @@ def execute(state: TerminalState, rest: str) -> None:
 
 
 def xstep(state: TerminalState, rest: str) -> None:
-    """XSTEP; XSTEP program(arguments), cycles, step begins one."""
+    """XSTEP; XSTEP program, cycles, step begins one."""
     if not rest:
-        state.controller.xstep(now=state.now)
+        state.controller.proceed(single=True, now=state.now)
         return
     name, arguments, cycles, step = _program(state, rest)
     if arguments:
         raise ValError("Invalid argument", f"{rest}: XSTEP gives a program no arguments")
-    state.controller.xstep(name, cycles=cycles, step=step, now=state.now)
+    state.controller.execute(name, cycles=cycles, step=step, single=True, now=state.now)
 
 
 def next_(state: TerminalState, rest: str) -> None:
@@ -66,7 +70,7 @@ def next_(state: TerminalState, rest: str) -> None:
     steps = integer(rest, 1, "the number of steps")
     if not 1 <= steps <= 10_000:
         raise ValError("Invalid argument", f"{rest}: 1 to 10000 steps")
-    state.controller.xstep(now=state.now)
+    state.controller.proceed(single=True, now=state.now)
     state.steps = steps - 1
 
 
@@ -98,27 +102,26 @@ def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ..
 
 def abort(state: TerminalState, _rest: str) -> None:
     """ABORT."""
-    controller = state.controller
-    if not (controller.running or controller.doing) and _stands(state):
+    controller, stands = state.controller, False
+    # Refusals are reported elsewhere.
+    with contextlib.suppress(ValError):
+        stands = not (controller.running or controller.doing) and controller.arm.settled(now=state.now)
+    if stands:
         raise ValError("No program running")
     controller.abort(now=state.now)
 
 
-def _stands(state: TerminalState) -> bool:
-    """Whether the arm has nothing to do; refusals are reported elsewhere."""
-    try:
-        return state.controller.arm.settled(now=state.now)
-    except ValError:
-        return False
-
-
 def panic(state: TerminalState, _rest: str) -> None:
     """PANIC: stop, power off."""
-    controller = state.controller
-    controller.switch(POWER, False)
-    with contextlib.suppress(ValError):
-        controller.abort(now=state.now)
+    _turn(state, POWER, False)
     state.say("*Arm power off* ENABLE POWER turns it on again", style=Style.ERROR)
+
+
+def _turn(state: TerminalState, name: str, on: bool) -> None:
+    state.controller.switch(name, on)
+    if name == POWER and not on:
+        with contextlib.suppress(ValError):
+            state.controller.abort(now=state.now)
 
 
 def timeline(state: TerminalState, _rest: str) -> None:
@@ -133,16 +136,19 @@ def timeline(state: TerminalState, _rest: str) -> None:
 
 def status(state: TerminalState, _rest: str) -> None:
     """STATUS."""
-    controller = state.controller
-    current = controller.status()
-    here, there = controller.arm.here(now=state.now), controller.arm.destination(now=state.now)
-    moves = not all(abs(a - b) < 1e-6 for a, b in zip(here.joints.joints, there.joints.joints, strict=True))
+    controller, arm = state.controller, state.controller.arm
+    current, doing = controller.status(), controller.status().state.name.lower()
+    if current.program:
+        left = "for ever" if current.cycles_left < 0 else f"{current.cycles_left}"
+        why = f" ({current.word})" if current.word else ""
+        doing = f"{current.program}, step {current.step}: {doing}{why}, cycles left: {left}"
+    here, there = arm.here(now=state.now).joints.joints, arm.destination(now=state.now).joints.joints
     state.say(
         *layout.table([
-            ("Program", _program_line(current)),
-            ("Monitor speed", f"{layout.number(controller.arm.monitor_speed())} %"),
+            ("Program", doing),
+            ("Monitor speed", f"{layout.number(arm.monitor_speed())} %"),
             ("Power", "on" if controller.switches[POWER] else "off"),
-            ("Arm", "moves" if moves else "stands"),
+            ("Arm", "stands" if all(abs(a - b) < 1e-6 for a, b in zip(here, there, strict=True)) else "moves"),
             ("Session time", f"{layout.fixed(state.now, 3)} s"),
         ])
     )  # fmt: skip
@@ -150,10 +156,91 @@ def status(state: TerminalState, _rest: str) -> None:
         state.say(f"{'':{2 * depth}}called from {name}, step {step}")
 
 
-def _program_line(current: ControllerStatus) -> str:
-    word = current.state.name.lower()
-    if not current.program:
-        return word
-    left = "for ever" if current.cycles_left < 0 else f"{current.cycles_left}"
-    why = f" ({current.word})" if current.word else ""
-    return f"{current.program}, step {current.step}: {word}{why}, cycles left: {left}"
+def turn(state: TerminalState, rest: str, *, on: bool) -> None:
+    """ENABLE switch, ..; DISABLE switch, .."""
+    if not rest:
+        raise ValError("Missing argument", f"one of {', '.join(sorted(state.controller.switches))}")
+    for name in _matched(rest, state.controller.switches, "switch"):
+        _turn(state, name, on)
+
+
+def _matched(rest: str, known: Iterable[str], kind: str) -> list[str]:
+    """The names that beginnings between commas stand for."""
+    return [unique(piece.upper(), known, kind) for piece in pieces(rest)]
+
+
+def switch(state: TerminalState, rest: str) -> None:
+    """SWITCH: which are on."""
+    switches = state.controller.switches
+    names = _matched(rest, switches, "switch") or sorted(switches)
+    state.say(*layout.table([(name, "ON" if switches[name] else "OFF") for name in names]))
+
+
+def parameter(state: TerminalState, rest: str) -> None:
+    """PARAMETER; PARAMETER name; PARAMETER name = value."""
+    parameters = state.controller.parameters
+    given, value = halves(rest)
+    names = _matched(given, parameters, "parameter") or sorted(parameters)
+    if value is None:
+        state.say(*layout.table([(name, f"= {layout.number(parameters[name])}") for name in names]))
+        return
+    if not given or len(names) != 1:
+        raise ValError("Invalid argument", "PARAMETER name = value")
+    wanted, row = state.number(value), forms.PARAMETERS.get(names[0])
+    if row is not None and not row.low <= wanted <= row.high:
+        allowed = f"{layout.number(row.low)} to {layout.number(row.high)} {row.unit}"
+        raise ValError("Invalid argument", f"{names[0]} is {allowed}")
+    parameters[names[0]] = wanted
+
+
+def speed(state: TerminalState, rest: str) -> None:
+    """SPEED; SPEED percent: the monitor speed."""
+    arm = state.controller.arm
+    if rest in {"", "?"}:
+        state.say(f"Monitor speed {layout.number(arm.monitor_speed())} %")
+        return
+    wanted = state.number(rest)
+    arm.set_monitor_speed(wanted, now=state.now)
+    if wanted > MOST_PERCENT:
+        state.say(f"*Warning* SPEED {layout.number(wanted)} % counts as {MOST_PERCENT:g} %", style=Style.NOTE)
+
+
+def signal(state: TerminalState, rest: str) -> None:
+    """SIGNAL n, -m: on, off; inputs too, in the place of what would set them."""
+    if not rest:
+        io(state, rest)
+    numbers = [state.number(piece) for piece in pieces(rest)]
+    for number in [number for number in numbers if legal(number)]:
+        state.controller.signals.force(number)
+
+
+def io(state: TerminalState, _rest: str) -> None:
+    """IO: a table of all signals, 1 for on."""
+    signals = state.controller.signals
+    for title, numbers in (("Outputs", OUTPUTS), ("Inputs", INPUTS), ("Internal", INTERNAL)):
+        states = ["1" if on else "0" for on in signals.states(numbers)]
+        eights = " ".join("".join(states[k : k + 8]) for k in range(0, len(states), 8))
+        state.say(f"{title:8}  {numbers[0]:4} {eights} {numbers[-1]}")
+
+
+def calibrate(state: TerminalState, _rest: str) -> Dialogue:
+    """CALIBRATE: the virtual arm knows where it is, so nothing moves."""
+    if not state.controller.switches[POWER]:
+        raise ValError("Arm power off", "ENABLE POWER first")
+    said = partial(state.say, "Calibrated: nothing had to move", style=Style.NOTE)
+    yield from state.confirm("Are you sure", said)
+
+
+def show_setting(state: TerminalState, word: str) -> bool:
+    """What `word ?` asks for: `COARSE ?`, `FINE ?`, a switch, a parameter; whether there's such a state."""
+    controller = state.controller
+    if word in {"COARSE", "FINE"}:
+        fine, percent = controller.arm.tolerance()
+        state.say(f"{'FINE' if fine else 'COARSE'} {layout.number(percent)} %")
+    elif word in controller.switches:
+        state.say(f"{word} is {'ON' if controller.switches[word] else 'OFF'}")
+    elif word in controller.parameters:
+        state.say(f"{word} = {layout.number(controller.parameters[word])}")
+    else:
+        return False
+    return True

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import math
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Final
-
-from typing_extensions import override
+from typing import Final, TypeAlias
 
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
@@ -17,13 +16,12 @@ from interfaces.val2.monitor.files import Files
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.syntax import Expression, Number, Step, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
+from vrs.errors import VrsError
 
 NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9._]*")
 """A name without its prefix."""
-_PLAIN: Final = re.compile(r"[#$]?[A-Za-z*?][A-Za-z0-9._*?]*(\[[-0-9, *]*\])?")
 _WORD: Final = re.compile(r"\s*([A-Za-z][A-Za-z0-9._]*)\s*(.*)", re.DOTALL)
 _INTEGER: Final = re.compile(r"\s*[-+]?\d{1,9}\s*")
-_OPENING, _CLOSING = "([", ")]"
 
 
 def split_word(text: str) -> tuple[str, str]:
@@ -32,22 +30,17 @@ def split_word(text: str) -> tuple[str, str]:
     return (found[1], found[2].strip()) if found else ("", text.strip())
 
 
-def pieces(text: str, separator: str = ",") -> list[str]:
-    """What stands between separators, but for those within brackets or quotes; none of an empty text."""
-    return [piece.strip() for piece in _pieces(text, separator)] if text.strip() else []
-
-
-def _pieces(text: str, separator: str) -> Iterator[str]:
-    depth, quoted, begin = 0, False, 0
-    for index, letter in enumerate(text):
-        if letter == '"':
-            quoted = not quoted
-        elif not quoted:
-            depth += (letter in _OPENING) - (letter in _CLOSING)
-            if letter == separator and depth == 0:
-                yield text[begin:index]
-                begin = index + 1
-    yield text[begin:]
+def pieces(text: str) -> list[str]:
+    """What stands between commas, but for those within brackets or quotes; none of an empty text."""
+    found, depth, quoted = [""], 0, False
+    for letter in text:
+        quoted ^= letter == '"'
+        depth += 0 if quoted else (letter in "([") - (letter in ")]")
+        if letter == "," and depth == 0 and not quoted:
+            found.append("")
+        else:
+            found[-1] += letter
+    return [piece.strip() for piece in found] if text.strip() else []
 
 
 def halves(text: str) -> tuple[str, str | None]:
@@ -86,8 +79,14 @@ def integer(text: str, default: int, what: str) -> int:
     return int(text)
 
 
+def begun(word: str, names: Iterable[str]) -> list[str]:
+    """The names, upper case, that a word is the beginning of; of STORE, STOREL, STOREP it's STORE alone."""
+    found = sorted((name for name in names if word and name.startswith(word)), key=lambda name: (len(name), name))
+    return found[:1] if found and all(name.startswith(found[0]) for name in found) else found
+
+
 def unique(word: str, names: Iterable[str], kind: str) -> str:
-    """The name that a word is the beginning of; of STORE, STOREL, STOREP it's STORE.
+    """The name that a word is the beginning of.
 
     Args:
         word: Upper case.
@@ -97,17 +96,13 @@ def unique(word: str, names: Iterable[str], kind: str) -> str:
     Raises:
         ValError: If none or several begin with it.
     """
-    found = sorted((name for name in names if name.startswith(word)), key=lambda name: (len(name), name))
-    if not word or not found:
-        raise ValError(f"Invalid {kind}", word)
-    if found[0] != word and not all(name.startswith(found[0]) for name in found):
-        raise ValError(f"Ambiguous {kind}", f"{word}: {', '.join(sorted(found))}")
-    return found[0]
-
-
-def is_pattern(text: str) -> bool:
-    """Whether a text is a name, of an element of an array too, in which `*` and `?` may stand for others."""
-    return _PLAIN.fullmatch(text) is not None
+    match begun(word, names):
+        case [name]:
+            return name
+        case []:
+            raise ValError(f"Invalid {kind}", word)
+        case several:
+            raise ValError(f"Ambiguous {kind}", f"{word}: {', '.join(sorted(several))}")
 
 
 def nothing(rest: str, name: str) -> None:
@@ -145,48 +140,31 @@ class OutputText:
     style: Style
 
 
-class Dialogue:
-    """Takes the next lines in place of commands."""
+class Expects(enum.Enum):
+    """What the next line of a terminal is."""
 
-    @property
-    def prompt(self) -> str:
-        """What it asks."""
-        return ""
-
-    def line(self, text: str) -> Dialogue | None:
-        """Take a line; what takes the next one, None for commands.
-
-        Raises:
-            ValError: If it can't be taken; then the same is asked again.
-        """
-        raise NotImplementedError
-
-    def leave(self, *, kept: bool) -> None:
-        """End without a line: the input has ended (kept), or Ctrl-C was pressed."""
+    COMMAND = "command"
+    STEP = "step"
+    """A line of a program."""
+    ANSWER = "answer"
+    """The answer to a question of a command or a program."""
 
 
-class Confirm(Dialogue):
-    """Asks before something is destroyed: Y does it, all else doesn't."""
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What a command asks."""
 
-    def __init__(self, question: str, act: Callable[[], None]) -> None:
-        """Ask.
+    prompt: str = ""
+    expects: Expects = Expects.ANSWER
+    answers: frozenset[str] = frozenset()
+    """The lines that answer it, upper case, where a command is expected; all others are one."""
+    due: float = math.inf
+    """When it's over without a line [s]."""
 
-        Args:
-            question: What would happen.
-            act: Does it.
-        """
-        self._question, self._act = question, act
 
-    @property
-    @override
-    def prompt(self) -> str:
-        return f"{self._question} (Y/N)? "
-
-    @override
-    def line(self, text: str) -> Dialogue | None:
-        if text.strip().upper() in {"Y", "YES"}:
-            self._act()
-        return None
+Dialogue: TypeAlias = Generator[Question, str | None, None]
+"""A command that asks. It's sent the lines that answer, None when a question is due; at the end of the input it's
+thrown `EOFError`, and Ctrl-C closes it."""
 
 
 @dataclass(slots=True)
@@ -231,6 +209,31 @@ class TerminalState:
             text = re.sub(r"line \d+, column", "column", text)
         self.say(text, style=Style.ERROR)
 
+    @contextlib.contextmanager
+    def guarded(self) -> Iterator[None]:
+        """Say what goes wrong within."""
+        try:
+            yield
+        except ValError as error:
+            self.fail(error)
+        except VrsError as error:
+            self.fail(ValError("Not possible", str(error)))
+
+    def confirm(self, question: str, act: Callable[[], None]) -> Dialogue:
+        """Ask before something is destroyed: Y does it, all else doesn't; where it fails it's asked again.
+
+        Args:
+            question: What would happen; empty where nothing is asked.
+            act: Does it.
+        """
+        if not question:
+            act()
+            return
+        while ((yield Question(f"{question} (Y/N)? ")) or "").strip().upper() in {"Y", "YES"}:
+            with self.guarded():
+                act()
+                return
+
     def work_on(self, *, allowed: bool) -> None:
         """Do a slice of what a command does; it's dropped where that isn't allowed any more."""
         done = 0
@@ -252,9 +255,21 @@ class TerminalState:
             self.work.close()
         self.work = None
 
-    def in_use(self) -> set[str]:
-        """The programs that run."""
-        return {name for name, _ in self.controller.status().stack} if self.controller.running else set()
+    def refuse_in_use(self, *programs: str) -> None:
+        """Refuse to change programs that run.
+
+        Raises:
+            ValError: If one does.
+        """
+        running = [name for name, _ in self.controller.status().stack] if self.controller.running else []
+        for name in programs:
+            if name in running:
+                raise ValError("Program in use", name)
+
+    def here(self, variable: Variable) -> Location:
+        """Where the arm is, as a variable keeps it."""
+        place = self.controller.arm.here(now=self.now)
+        return place.joints if variable.prefix == "#" else place.tool
 
     def padded(self, part: str) -> str:
         """A part of the line with blanks before it, so that columns are those of the line."""

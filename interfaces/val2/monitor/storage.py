@@ -11,71 +11,50 @@ from typing import Any, Final, TypeVar
 from interfaces.val2.errors import ValError
 from interfaces.val2.memory import MOST_VALUES, Memory
 from interfaces.val2.monitor import layout
-from interfaces.val2.monitor.state import (
-    Confirm,
-    Dialogue,
-    Style,
-    TerminalState,
-    as_location,
-    halves,
-    is_pattern,
-    named,
-    nothing,
-    pieces,
-)
+from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, named, nothing, pieces
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
 from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file
 from interfaces.val2.syntax import Instruction, Program, Variable
-from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
+from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
 T = TypeVar("T")
 _TYPES: Final[dict[str, Any]] = {"locations": (Transformation, PrecisionPoint), "reals": float, "strings": str}
 """Types of values, by the parts of files that hold them."""
+_WORDS: Final = {"programs": "program name", "locations": "location", "reals": "value", "strings": "value"}
+"""What one of them is called that there isn't."""
+_PATTERN: Final = re.compile(r"[#$]?[A-Za-z*?][A-Za-z0-9._*?]*(\[[-0-9, *]*\])?")
+"""A name, of an element of an array too, in which `*` and `?` may stand for others."""
 
 
-def listp(state: TerminalState, rest: str) -> None:
+def list_programs(state: TerminalState, rest: str) -> None:
     """LISTP: programs with their steps."""
-    programs = state.controller.memory.programs
-    for name in chosen(dict(sorted(programs.items())), rest, "program"):
-        head, *steps, end = print_program(programs[name]).splitlines()
+    programs = _programs(state, rest)
+    for program in programs.values():
+        head, *steps, end = print_program(program).splitlines()
         state.say(head, *layout.numbered(steps), end)
-    if not programs and not rest:
+    if not programs:
         state.say("No programs")
 
 
-def listl(state: TerminalState, rest: str) -> None:
-    """LISTL: locations."""
-    state.say_all(layout.locations(chosen(locations(state), rest, "location")), "No locations")
-
-
-def listr(state: TerminalState, rest: str) -> None:
-    """LISTR: reals, or an expression."""
-    known: dict[str, Any] = dict(state.controller.memory.listing("real"))
-    if _computed(rest) or _product(rest, known):
+def list_values(state: TerminalState, rest: str, *, kind: str) -> None:
+    """LISTL, LISTR, LISTS, by the kind: `locations`, `reals` or `strings`; of the last two an expression, too."""
+    # Precision points come last.
+    entries = sorted(_entries(state.controller.memory, kind).items(), key=lambda entry: entry[0].startswith("#"))
+    known = {name: entry.value for name, entry in entries}
+    computed = not all(_PATTERN.fullmatch(piece) for piece in pieces(rest))
+    if kind == "reals" and (computed or _product(rest, known)):
         state.say(layout.number(state.number(rest)))
-        return
-    state.say_all(layout.reals(chosen(known, rest, "value")), "No reals")
-
-
-def lists(state: TerminalState, rest: str) -> None:
-    """LISTS: strings, or an expression."""
-    if _computed(rest):
+    elif kind == "strings" and computed:
         value = state.value(rest)
         if not isinstance(value, str):
             raise ValError("Invalid argument", f"{rest}: a string is wanted")
         state.say(f'"{layout.visible(value)}"')
-        return
-    known: dict[str, Any] = dict(state.controller.memory.listing("string"))
-    state.say_all(layout.strings(chosen(known, rest, "value")), "No strings")
+    else:
+        state.say_all(layout.values(chosen(known, rest, _WORDS[kind])), f"No {kind}")
 
 
-def _computed(rest: str) -> bool:
-    """Whether there's something to compute, not names alone."""
-    return not all(is_pattern(piece) for piece in pieces(rest))
-
-
-def _product(rest: str, known: Mapping[str, float]) -> bool:
+def _product(rest: str, known: Iterable[str]) -> bool:
     """Whether a `*` multiplies: no name is meant by it, and it's between two operands."""
     if "*" not in rest or any(matcher(piece).fullmatch(name) for piece in pieces(rest) for name in known):
         return False
@@ -86,10 +65,8 @@ def _product(rest: str, known: Mapping[str, float]) -> bool:
     return True
 
 
-def locations(state: TerminalState) -> dict[str, Location]:
-    """All locations by name."""
-    listing = state.controller.memory.listing
-    return {name: as_location(value, name) for name, value in [*listing("location"), *listing("point")]}
+def _programs(state: TerminalState, rest: str) -> dict[str, Program]:
+    return chosen(dict(sorted(state.controller.memory.programs.items())), rest, _WORDS["programs"])
 
 
 def chosen(known: Mapping[str, T], rest: str, kind: str) -> dict[str, T]:
@@ -110,7 +87,7 @@ def chosen(known: Mapping[str, T], rest: str, kind: str) -> dict[str, T]:
         wanted = matcher(piece)
         some = {name: value for name, value in known.items() if wanted.fullmatch(name)}
         if not some:
-            raise ValError(f"Undefined {kind}{' name' * (kind == 'program')}", piece)
+            raise ValError(f"Undefined {kind}", piece)
         found |= some
     return found
 
@@ -124,17 +101,12 @@ def matcher(pattern: str) -> re.Pattern[str]:
 
 def directory(state: TerminalState, rest: str) -> None:
     """DIRECTORY: programs in memory."""
-    programs = chosen(dict(sorted(state.controller.memory.programs.items())), rest, "program")
-    state.say_all(_directory(programs), "No programs")
-
-
-def _directory(programs: Mapping[str, Program]) -> list[str]:
     rows = []
-    for name, program in programs.items():
+    for name, program in _programs(state, rest).items():
         comment = f";{program.comment}" if program.comment else ""
         parameters = ", ".join(variable.name for variable in program.parameters)
         rows.append((f".PROGRAM {name}({parameters})", _counted(len(program.steps), "step"), comment))
-    return layout.table(rows) if rows else []
+    state.say_all(layout.table(rows), "No programs")
 
 
 def free(state: TerminalState, _rest: str) -> None:
@@ -175,10 +147,7 @@ def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None,
     entries = source.values
     if len(entries) > MOST_MEANWHILE and state.controller.running:
         raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
-    running = state.in_use()
-    for program in source.programs:
-        if program.name in running:
-            raise ValError("Program in use", program.name)
+    state.refuse_in_use(*(program.name for program in source.programs))
     memory = state.controller.memory
     yield from _set_all(memory, entries)
     memory.programs.update({program.name: program for program in source.programs})
@@ -207,7 +176,7 @@ def _set_all(memory: Memory, entries: Sequence[NamedValue]) -> Generator[int, No
         raise
 
 
-def store(state: TerminalState, rest: str, *, parts: str) -> Dialogue | None:
+def store(state: TerminalState, rest: str, *, parts: str) -> Dialogue:
     """STORE, STOREP, STOREL, STORER, STORES.
 
     Args:
@@ -224,10 +193,7 @@ def store(state: TerminalState, rest: str, *, parts: str) -> Dialogue | None:
         counts = [(len(source.programs), "program"), (len(source.values), "value")]
         state.say(f"{path.name}: {', '.join(_counted(*count) for count in counts)}")
 
-    if path.exists():
-        return Confirm(f"{path.name} exists. Write over it", write)
-    write()
-    return None
+    yield from state.confirm(f"{path.name} exists. Write over it" if path.exists() else "", write)
 
 
 def _counted(many: int, what: str) -> str:
@@ -240,7 +206,7 @@ def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFi
     if parts in {"", "programs"}:
         programs = dict(memory.programs)
         if names:
-            programs = _called(programs, chosen(programs, names, "program"))
+            programs = _called(programs, chosen(programs, names, _WORDS["programs"]))
             used = {variable.name for variable in _variables(tuple(programs.values()))}
     values = {}
     for kind in _TYPES:
@@ -283,43 +249,29 @@ def _variables(node: object) -> Iterator[Variable]:
             yield from _variables(getattr(node, field.name))
 
 
-def delete_programs(state: TerminalState, rest: str) -> Dialogue:
-    """DELETE, DELETEP."""
-    if not rest:
-        raise ValError("Missing argument", "which programs?")
-    programs = state.controller.memory.programs
-    doomed = chosen(dict(programs), rest, "program")
-    for name in doomed:
-        if name in state.in_use():
-            raise ValError("Program in use", name)
-
-    def act() -> None:
-        for name in doomed:
-            programs.pop(name, None)
-
-    return Confirm(f"Delete {_listed(doomed)}", act)
-
-
-def delete_values(state: TerminalState, rest: str, *, kind: str) -> Dialogue:
-    """DELETEL, DELETER, DELETES, by the kind: `locations`, `reals` or `strings`."""
+def delete(state: TerminalState, rest: str, *, kind: str) -> Dialogue:
+    """DELETE, DELETEP, DELETEL, DELETER, DELETES, by the kind: `programs`, `locations`, `reals` or `strings`."""
     if not rest:
         raise ValError("Missing argument", f"which {kind}?")
     memory = state.controller.memory
-    doomed = chosen(_entries(memory, kind), rest, "location" if kind == "locations" else "value")
+    known: Mapping[str, Any] = dict(memory.programs) if kind == "programs" else _entries(memory, kind)
+    doomed = chosen(known, rest, _WORDS[kind])
+    if kind == "programs":
+        state.refuse_in_use(*doomed)
 
     def act() -> None:
-        for entry in doomed.values():
-            memory.delete(entry.variable)
+        for name, one in doomed.items():
+            if kind == "programs":
+                memory.programs.pop(name, None)
+            else:
+                memory.delete(one.variable)
 
-    return Confirm(f"Delete {_listed(doomed)}", act)
+    listed = list(doomed)
+    some = ", ".join(listed) if len(listed) <= 4 else f"{listed[0]} .. {listed[-1]}, {len(listed)} in all"
+    yield from state.confirm(f"Delete {some}", act)
 
 
-def _listed(names: Iterable[str]) -> str:
-    listed = list(names)
-    return ", ".join(listed) if len(listed) <= 4 else f"{listed[0]} .. {listed[-1]}, {len(listed)} in all"
-
-
-def put(state: TerminalState, rest: str, *, keep: bool) -> Dialogue | None:
+def put(state: TerminalState, rest: str, *, keep: bool) -> Dialogue:
     """COPY new=old, RENAME new=old."""
     given, old = halves(rest)
     if old is None:
@@ -328,18 +280,13 @@ def put(state: TerminalState, rest: str, *, keep: bool) -> Dialogue | None:
     programs = state.controller.memory.programs
     if old not in programs:
         raise ValError("Undefined program name", old)
-    for one in (new, *(() if keep else (old,))):
-        if one in state.in_use():
-            raise ValError("Program in use", one)
+    state.refuse_in_use(new, *(() if keep else (old,)))
 
     def act() -> None:
         program = programs[old] if keep else programs.pop(old)
         programs[new] = replace(program, name=new)
 
-    if new in programs and new != old:
-        return Confirm(f"{new} exists. Replace it", act)
-    act()
-    return None
+    yield from state.confirm(f"{new} exists. Replace it" if new in programs and new != old else "", act)
 
 
 def zero(state: TerminalState, _rest: str) -> Dialogue:
@@ -350,4 +297,4 @@ def zero(state: TerminalState, _rest: str) -> Dialogue:
         state.controller.cell = ()
         state.say("Memory is empty", style=Style.NOTE)
 
-    return Confirm("Delete all programs and values. Are you sure", act)
+    yield from state.confirm("Delete all programs and values. Are you sure", act)

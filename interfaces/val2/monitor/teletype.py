@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from interfaces.timer import Turning
@@ -49,7 +49,11 @@ class Input:
         lines: list[str] = []
         for byte in data:
             if self._command:
-                self._negotiate(byte, lines)
+                if self._command == 1 and byte in _INTERRUPTS:
+                    self._line.clear()
+                    lines.append(INTERRUPT)
+                begun = 3 if byte == _SB else 2 if _WILL <= byte <= _DONT else 0
+                self._command = (begun, 0, 4 if byte == _IAC else 3, 0 if byte == _SE else 3)[self._command - 1]
             elif byte == _IAC and self._telnet:
                 self._command = 1
             else:
@@ -67,13 +71,10 @@ class Input:
 
     def _take(self, byte: int, lines: list[str]) -> None:
         after, self._after_return = self._after_return, byte == 13
-        if byte == 10 and after:
-            return
         if byte in {10, 13}:
-            lines.append(self._taken())
+            lines += [] if byte == 10 and after else [self._taken()]
         elif byte == 3 and self._telnet:
-            self._line.clear()
-            self._overlong = False
+            self._taken()
             lines.append(INTERRUPT)
         elif byte in _BACKSPACES and self._telnet:
             del self._line[-1:]
@@ -83,23 +84,10 @@ class Input:
             self._line.append(byte)
 
     def _taken(self) -> str:
-        text = OVERLONG if self._overlong else self._line.decode("utf-8", errors="replace")
+        text = OVERLONG if self._overlong else self.begun
         self._line.clear()
         self._overlong = False
         return text
-
-    def _negotiate(self, byte: int, lines: list[str]) -> None:
-        if self._command == 1:
-            if byte in _INTERRUPTS:
-                self._line.clear()
-                lines.append(INTERRUPT)
-            self._command = 3 if byte == _SB else 2 if _WILL <= byte <= _DONT else 0
-        elif self._command == 2:
-            self._command = 0
-        elif self._command == 3:
-            self._command = 4 if byte == _IAC else 3
-        else:
-            self._command = 0 if byte == _SE else 3
 
 
 class Output:
@@ -130,19 +118,80 @@ class Output:
             said: What was said since.
             prompt: What is asked now; empty for nothing.
         """
-        text = "".join(piece.text for piece in said)
-        out = ""
+        out = text = "".join(piece.text for piece in said)
         if self._prompt is not None and (text or prompt != self._prompt):
-            out = "\n"
+            out = f"\n{text}"
             self._prompt, self._within = None, False
         if text:
-            out += text
             self._within = not text.endswith("\n")
         if prompt and self._prompt is None and not (prompt == RUNNING and self._starred):
             out += "\n" if self._within and len(prompt) == 1 else ""
             out += prompt
             self._prompt, self._within, self._starred = prompt, True, prompt == RUNNING
-        return out.replace("\n", self._newline) if self._newline != "\n" else out
+        return out.replace("\n", self._newline)
+
+
+class LineTerminal:
+    """A monitor at a line of bytes, without the line: bytes in, texts out."""
+
+    def __init__(
+        self,
+        send: Callable[[str], object],
+        monitor: TerminalMonitor | None = None,
+        *,
+        newline: str = "\n",
+        piped: bool = False,
+        at_once: int = sys.maxsize,
+    ) -> None:
+        """Begin.
+
+        Args:
+            send: Sends a text.
+            monitor: Whose terminal it is; None for one that comes later.
+            newline: What ends lines.
+            piped: Whether lines wait until the monitor takes them, and are echoed; else it's telnet.
+            at_once: How many lines are taken in one turn.
+        """
+        self.send, self.monitor = send, monitor
+        self._newline, self._piped, self._at_once = newline, piped, at_once
+        self._input, self._output = Input(telnet=not piped), Output(newline)
+        self.lines: deque[str] = deque()
+        """Lines that wait to be taken."""
+        self.ended = self.end_announced = False
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes; none at the end of the input."""
+        self.lines.extend(self._input.feed(data) if data else self._input.end())
+        self.ended |= not data
+
+    def advance(self, *, now: float) -> None:
+        """Do what is due, and what was typed."""
+        monitor = self.monitor
+        assert monitor is not None
+        monitor.advance(now=now)
+        self.give()
+        for _ in range(min(self._at_once, len(self.lines))):
+            if monitor.done or (self._piped and not monitor.takes(self.lines[0])):
+                break
+            text = self.lines.popleft()
+            interrupts = text == INTERRUPT and not self._piped
+            if interrupts or self._piped:
+                self.send(f"{'' if interrupts else text}{self._newline}")
+            self._output.took()
+            if interrupts:
+                monitor.interrupt(now=now)
+            else:
+                monitor.line(text, now=now)
+            self.give()
+        if self.ended and not self.lines and not self.end_announced:
+            self.end_announced = True
+            monitor.end_of_input(now=now)
+            self.give()
+
+    def give(self) -> None:
+        """Send what was said, and the prompt."""
+        if self.monitor is not None:
+            self.send(self._output.give(self.monitor.output(), self.monitor.prompt))
 
 
 _READ: Final = 65_536
@@ -163,11 +212,8 @@ class Pipe:
             source: File descriptor.
         """
         self._monitor, self._clock, self._source = monitor, clock, source
-        self._input, self._output = Input(telnet=False), Output()
-        self._lines: deque[str] = deque()
+        self._terminal = LineTerminal(sys.stdout.write, monitor, piped=True)
         self._room = threading.Event()
-        self._room.set()
-        self._ended = self._told = False
         self._done = asyncio.Event()
         self._turning = Turning(clock, self._turn)
 
@@ -184,53 +230,31 @@ class Pipe:
 
     def interrupt(self) -> None:
         """Ctrl-C: once for what is under way; when nothing is, for the end."""
-        monitor = self._monitor
-        if not monitor.busy:
-            self._lines.clear()
-            monitor.leave(now=self._clock.now())
-        monitor.interrupt(now=self._clock.now())
+        if not self._monitor.busy:
+            self._terminal.lines.clear()
+            self._monitor.leave(now=self._clock.now())
+        self._monitor.interrupt(now=self._clock.now())
         self._turning.soon()
 
     def _read(self, loop: asyncio.AbstractEventLoop) -> None:
         """Read in a thread of its own: standard input may be a file, for which a loop can't wait."""
-        while True:
+        data = b"\0"
+        while data:
             self._room.wait()
             data = os.read(self._source, _READ)
+            self._room.clear()
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(self._came, data)
-            if not data:
-                return
 
     def _came(self, data: bytes) -> None:
-        self._lines.extend(self._input.feed(data) if data else self._input.end())
-        self._ended = not data
-        if len(self._lines) > _MOST:
-            self._room.clear()
+        self._terminal.feed(data)
         self._turning.soon()
 
     def _turn(self, now: float) -> float:
-        monitor = self._monitor
-        monitor.advance(now=now)
-        self._give()
-        while self._lines and monitor.takes(self._lines[0]) and not monitor.done:
-            text = self._lines.popleft()
-            if len(self._lines) <= _MOST:
-                self._room.set()
-            self._echo(text)
-            monitor.line(text, now=now)
-            self._give()
-        if self._ended and not self._lines and not self._told:
-            self._told = True
-            monitor.end_of_input(now=now)
-            self._give()
-        if monitor.done:
-            self._done.set()
-        return monitor.next_deadline()
-
-    def _echo(self, text: str) -> None:
-        sys.stdout.write(f"{text}\n")
-        self._output.took()
-
-    def _give(self) -> None:
-        sys.stdout.write(self._output.give(self._monitor.output(), self._monitor.prompt))
+        self._terminal.advance(now=now)
         sys.stdout.flush()
+        if len(self._terminal.lines) <= _MOST:
+            self._room.set()
+        if self._monitor.done:
+            self._done.set()
+        return self._monitor.next_deadline()

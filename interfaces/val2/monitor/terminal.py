@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import shutil
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
@@ -22,15 +21,13 @@ from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.lexers import Lexer
 from prompt_toolkit.styles import Style
-from pygments.token import Token, _TokenType
+from pygments.token import Token
 
 from interfaces.timer import Turning
-from interfaces.val2.errors import ValError
 from interfaces.val2.lexer import Val2Lexer
-from interfaces.val2.monitor import commands
-from interfaces.val2.monitor.completion import hint, suggestions
+from interfaces.val2.monitor.commands import command_named, hint
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.monitor.state import OutputText
+from interfaces.val2.monitor.state import Expects, OutputText
 from vrs.clock import Clock
 
 if TYPE_CHECKING:
@@ -78,34 +75,25 @@ class LineLexer(Lexer):
 
     def lex_document(self, document: Document) -> Callable[[int], StyleAndTextTuples]:
         """The pieces of each line."""
-        lines = document.lines
-
-        def line(number: int) -> StyleAndTextTuples:
-            return self.pieces(lines[number]) if number < len(lines) else []
-
-        return line
+        lines = [self.pieces(line) for line in document.lines]
+        return lambda number: lines[number] if number < len(lines) else []
 
     def pieces(self, text: str) -> StyleAndTextTuples:
         """A line in pieces, each with its class."""
-        if self._monitor.edits:
+        if self._monitor.expects is Expects.STEP:
             return self._coloured(text)
-        if not self._monitor.takes_commands:
-            return [("", text)]
         bare = text.lstrip()
         word = bare.split(None, 1)[0] if bare else ""
-        try:
-            commands.command_named(word)
-        except ValError:
+        if self._monitor.expects is Expects.ANSWER or command_named(word) is None:
             return [("", text)]
         end = len(text) - len(bare) + len(word)
         return [("class:command", text[:end]), *self._coloured(text[end:])]
 
     def _coloured(self, text: str) -> StyleAndTextTuples:
-        return [(_class(kind), piece) for kind, piece in self._lexer.get_tokens(text)]
-
-
-def _class(kind: _TokenType) -> str:
-    return next((name for family, name in _CLASSES if kind in family), "")
+        return [
+            (next((name for family, name in _CLASSES if kind in family), ""), piece)
+            for kind, piece in self._lexer.get_tokens(text)
+        ]
 
 
 _ROWS: Final = 8
@@ -132,12 +120,9 @@ class _Completer(Completer):
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
         """What may complete the line."""
-        if not self._monitor.takes_commands and not self._monitor.edits:
-            return
         if not complete_event.completion_requested and not document.text_before_cursor.strip():
             return
-        state = self._monitor.state
-        fragment, found = suggestions(document.text_before_cursor, state, program=self._monitor.edits)
+        fragment, found = self._monitor.suggestions(document.text_before_cursor)
         for one in found:
             yield Completion(one.word, -len(fragment), display_meta=one.help)
 
@@ -192,9 +177,9 @@ class Terminal:
             # Between two lines, too: what is typed then isn't to be shown twice.
             with self._session.input.raw_mode():
                 while not self._monitor.done:
-                    self._print()
+                    self._write()
                     await self._next()
-                self._print()
+                self._write()
         finally:
             self._turning.stop()
             self._monitor.leave(now=self._clock.now())
@@ -209,65 +194,51 @@ class Terminal:
             self._monitor.interrupt(now=self._clock.now())
         else:
             self._partial = ""
-            if not self._monitor.done:
-                self._monitor.line(text, now=self._clock.now())
+            self._monitor.line(text, now=self._clock.now())
         self._turn(self._clock.now())
 
     def _turn(self, now: float) -> float:
-        monitor = self._monitor
+        monitor, app = self._monitor, self._session.app
         monitor.advance(now=now)
         self._said += monitor.output()
-        app = self._session.app
         if app.is_running:
             if monitor.done:
                 if not app.is_done:
                     app.exit(result="")
             elif self._said:
                 asyncio.ensure_future(run_in_terminal(self._write))  # noqa: RUF006 - the application keeps it
-            elif self._prompt() != self._shown:
+            elif self._partial + monitor.prompt != self._shown:
                 app.invalidate()
         return monitor.next_deadline()
 
-    def _print(self) -> None:
-        self._said += self._monitor.output()
-        self._write()
-
     def _write(self) -> None:
         """Write whole lines of what was said; the rest stands before the prompt."""
-        said, self._said = self._said, []
-        pieces: StyleAndTextTuples = [("class:typed", self._partial)] if self._partial else []
-        pieces += [(f"class:{piece.style}", piece.text) for piece in said]
-        self._partial = ""
+        said = [*self._said, *self._monitor.output()]
+        pieces = [("class:typed", self._partial), *((f"class:{piece.style}", piece.text) for piece in said)]
+        self._said, self._partial = [], ""
         while pieces and not pieces[-1][1].endswith("\n"):
-            kind, text, *_ = pieces.pop()
+            kind, text = pieces.pop()
             whole, newline, rest = text.rpartition("\n")
             self._partial = rest + self._partial
             if newline:
                 pieces.append((kind, whole + newline))
         if pieces:
-            app = self._session.app
-            print_formatted_text(FormattedText(pieces), end="", style=style(), output=app.output)
-
-    def _prompt(self) -> str:
-        return self._partial + self._monitor.prompt
+            output = self._session.app.output
+            print_formatted_text(FormattedText(pieces), end="", style=style(), output=output)
 
     def _message(self) -> StyleAndTextTuples:
-        self._shown = self._prompt()
-        kind = "running" if self._monitor.prompt == "*" else "prompt"
-        between = "\n" if self._partial and len(self._monitor.prompt) == 1 else ""
-        return [("class:typed", self._partial + between), (f"class:{kind}", self._monitor.prompt)]
+        prompt = self._monitor.prompt
+        self._shown = self._partial + prompt
+        kind = "running" if prompt == "*" else "prompt"
+        between = "\n" if self._partial and len(prompt) == 1 else ""
+        return [("class:typed", self._partial + between), (f"class:{kind}", prompt)]
 
     def _toolbar(self) -> StyleAndTextTuples:
-        document = self._session.default_buffer.document
-        if not (self._monitor.takes_commands or self._monitor.edits):
+        if self._monitor.expects is Expects.ANSWER:
             return [("", " ")]
-        width = shutil.get_terminal_size().columns
-        with contextlib.suppress(OSError):
-            width = self._session.app.output.get_size().columns
-        said = hint(document.text_before_cursor, program=self._monitor.edits)
-        return [
-            ("class:hint", (said or "Tab completes, HELP explains, Ctrl-C is ABORT, Ctrl-D leaves")[: width - 1])
-        ]
+        text = self._session.default_buffer.document.text_before_cursor
+        said = hint(text, program=self._monitor.expects is Expects.STEP)
+        return [("class:hint", said or "Tab completes, HELP explains, Ctrl-C is ABORT, Ctrl-D leaves")]
 
     def _keys(self) -> KeyBindings:
         keys = KeyBindings()
@@ -298,10 +269,8 @@ def _history(path: Path | None) -> History:
     """Lines of earlier sessions; none where they can't be kept."""
     if path is None:
         return InMemoryHistory()
-    try:
+    with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a"):
-            pass
-    except OSError:
-        return InMemoryHistory()
-    return FileHistory(str(path))
+            return FileHistory(str(path))
+    return InMemoryHistory()

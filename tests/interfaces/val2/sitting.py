@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import Control, Free, SharedController
+from interfaces.val2.monitor.control import Control, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.motion import arm_for
@@ -38,7 +38,7 @@ class Sitting:
         parameters: dict[str, float] = {}
         self.arm = arm_for(self.engine, parameters=parameters)
         self.controller = Controller(self.arm, parameters=parameters)
-        self.shared = SharedController(self.controller, Free() if control is None else control)
+        self.shared = SharedController(self.controller, Control() if control is None else control)
         self.files = Files(directory)
         self.now = 0.0
         self.monitor = self.terminal(queues_commands=queues_commands)

@@ -22,8 +22,8 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.completion import hint, suggestions
-from interfaces.val2.monitor.control import Free, SharedController
+from interfaces.val2.monitor.commands import hint, suggestions
+from interfaces.val2.monitor.control import Control, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.terminal import Keyboard, LineLexer, Terminal, style
@@ -130,7 +130,7 @@ class Keys:
         arm = arm_for(self.engine)
         self.controller = Controller(arm, parameters=arm.parameters)
         self.clock = WallClock()
-        self.monitor = TerminalMonitor(SharedController(self.controller, Free()), Files(tmp_path), "a test")
+        self.monitor = TerminalMonitor(SharedController(self.controller, Control()), Files(tmp_path), "a test")
         self.source, self.said = source, []
         say = self.monitor.output
 

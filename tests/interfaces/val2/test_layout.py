@@ -18,7 +18,7 @@ def test_nothing_is_never_below_zero(value: float, decimals: int, shown: str) ->
 
 def test_a_text_stays_on_its_line() -> None:
     assert layout.visible("a\x1b[2J\r\n\u202eé b") == "a·[2J···é b"
-    assert layout.strings({"$x": "a\nb"}) == ['$x = "a·b"']
+    assert layout.values({"$x": "a\nb"}) == ['$x = "a·b"']
 
 
 def test_a_variable_is_written_with_its_indices() -> None:

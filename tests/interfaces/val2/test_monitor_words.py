@@ -36,7 +36,7 @@ def test_what_several_begin_with_or_may_not_be_abbreviated_is_refused(word):
 
 
 def test_every_unique_beginning_is_taken():
-    names = [one.name for one in COMMANDS.values() if not one.whole]
+    names = [one.name for one in COMMANDS.values() if one.act is not None]
     for name in names:
         for end in range(1, len(name) + 1):
             others = [other for other in names if other.startswith(name[:end]) and other != name]

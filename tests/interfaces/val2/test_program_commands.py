@@ -120,12 +120,12 @@ def test_abort_between_steps_gives_up_none() -> None:
 def test_single_steps() -> None:
     rig = Rig()
     rig.load(".PROGRAM main()\n x = 1\n CALL f()\n MOVE NULL\n TYPE x\n.END\n.PROGRAM f()\n x = 2\n.END\n")
-    rig.controller.xstep("main", now=0.0)
+    rig.controller.execute("main", single=True, now=0.0)
     rig.advance()
     steps = []
     while rig.controller.status().state is ProgramState.PAUSED:
         steps.append((rig.controller.status().program, rig.controller.status().step))
-        rig.controller.xstep(now=rig.now)
+        rig.controller.proceed(single=True, now=rig.now)
         rig.advance()
     assert steps[:3] == [("main", 2), ("f", 1), ("f", 1)]
     assert rig.typed() == " 2\n"

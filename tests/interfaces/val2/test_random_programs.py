@@ -99,7 +99,7 @@ def test_random_programs(seed: int) -> None:
                 case 2:
                     rig.controller.retry(now=rig.now)
                 case 3:
-                    rig.controller.xstep(now=rig.now)
+                    rig.controller.proceed(single=True, now=rig.now)
                 case 4:
                     rig.controller.answer(rng.choice(("1,2", "x", "")), now=rig.now)
                 case 5:

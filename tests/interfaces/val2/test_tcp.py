@@ -14,14 +14,16 @@ import time
 
 import pytest
 
+from interfaces.messages.control import Role
 from interfaces.stream import sockets
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import Free, SharedController
+from interfaces.val2.monitor.control import Control, SharedController
 from interfaces.val2.monitor.files import Files
-from interfaces.val2.monitor.monitor import LONGEST, OVERLONG, TerminalMonitor
+from interfaces.val2.monitor.monitor import LONGEST, OVERLONG
 from interfaces.val2.monitor.state import OutputText, Style
 from interfaces.val2.monitor.teletype import INTERRUPT, Input, Output
 from interfaces.val2.motion import arm_for
+from interfaces.val2.rooms import TerminalRoom
 from interfaces.val2.tcp import MOST, TOKEN_TRIES, UNREAD, TcpTerminalServer
 from robots import puma560
 from tests.memory import values_held
@@ -90,6 +92,13 @@ CLIENTS = []
 """To be closed in the end."""
 
 
+class Tokens:
+    """What tokens open."""
+
+    def refusal(self, role, token):
+        return "" if token == "secret" or (token == "look" and role is Role.VIEWER) else "no"
+
+
 class Client:
     """A terminal."""
 
@@ -127,15 +136,9 @@ async def door_here(tmp_path):
     engine = Engine(MODEL, q=MODEL.poses["ready"], clock=ManualClock(0.0))
     arm, clock = arm_for(engine), WallClock()
     controller = Controller(arm, parameters=arm.parameters)
-    shared = SharedController(controller, Free())
+    shared = SharedController(controller, Control())
 
-    def terminal(token):
-        rights = {"secret": "", "look": "this token only looks"}
-        return (
-            TerminalMonitor(shared, Files(tmp_path), "a test", read_only=rights[token]) if token in rights else None
-        )
-
-    door = TcpTerminalServer(shared, clock, terminal)
+    door = TcpTerminalServer(TerminalRoom(shared, clock, Files(tmp_path), "a test"), Tokens())
     async with door.listening(sockets.bind("127.0.0.1", 0)):
         door.controller, door.engine = controller, engine
         yield door
