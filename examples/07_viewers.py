@@ -6,9 +6,10 @@ import numpy as np
 
 from interfaces import Supervisor, Viewer
 from interfaces.clients.ports import MemoryTransport, RemotePort
-from interfaces.engine_server.site import Site, drive
+from interfaces.engine_server.site import Site
 from interfaces.link import Channel, ConstantDelay
 from interfaces.messages import FrameStatus, ViewForm
+from interfaces.runtime.laboratory import run_parts
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 
@@ -37,7 +38,7 @@ now = 0.0
 for k in range(12):
     target = JointTarget(home + rng.uniform(-0.4, 0.4, 6))
     supervisor.issue(MotionCommand(target, speed=0.3), now=now, execute_in=0.05)
-    now = drive(parts, now=now, until=now + 0.5)
+    now = run_parts(parts, now=now, until=now + 0.5)
     if k == 7:
         other.seek(1.0, now=now)
         other.play(now=now, rate=0.5)
@@ -52,8 +53,8 @@ print(f"who scrubbed back is {other.mode} at {other.history[-1].t:.2f} s, while 
 
 joiner = Viewer(connect(), rate=50)
 parts.append(joiner)
-now = drive(parts, now=now, until=now + 1.0)
+now = run_parts(parts, now=now, until=now + 1.0)
 print(f"a late joiner has {len(joiner.timeline or ())} of {len(site.engine.timeline)} segments")
 begin, done = now, other.go_live(now=now)
-now = drive(parts, now=now, until=done + 0.04)
+now = run_parts(parts, now=now, until=done + 0.04)
 print(f"live again after {done - begin:.2f} s: {other.mode}, {other.history[-1].age:.2f} s old")

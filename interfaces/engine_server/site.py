@@ -1,10 +1,9 @@
-"""What runs near an engine, under a clock that is shifted by D; and the loop that drives parts in virtual time."""
+"""What runs near an engine, under a clock that is shifted by D."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal
@@ -13,20 +12,6 @@ from interfaces.messages import Order, Refusal
 from vrs.clock import ManualClock
 from vrs.commands import finite
 from vrs.engine import Engine
-from vrs.errors import InvalidValueError
-
-PATIENCE = 1000
-"""Turns without any time passing, after which something is wrong."""
-
-
-class SitePart(Protocol):
-    """Anything that a driver moves on, in the users' time."""
-
-    def advance(self, *, now: float) -> object:
-        """Do what is due at now [s]."""
-
-    def next_deadline(self) -> float | None:
-        """When it wants to be called next [s]; None for not before something arrives."""
 
 
 def earliest(*times: float | None) -> float | None:
@@ -100,35 +85,3 @@ class Site:
         """When the next frame is due [s], in the users' time; None without a broadcaster that has begun."""
         times = [broadcaster.next_deadline() for broadcaster in self._broadcasters]
         return min((t - self.D for t in times if t is not None), default=None)
-
-
-def drive(parts: Sequence[SitePart], *, now: float, until: float, most: int = 10_000_000) -> float:
-    """Run parts in virtual time: at each deadline, those that are due advance in turn, until all are quiet.
-
-    Args:
-        parts: Sites first, then transports, then clients.
-        now: Users' time to begin at [s].
-        until: Users' time to end at [s].
-        most: Most turns.
-
-    Returns:
-        The users' time reached: `until`.
-
-    Raises:
-        InvalidValueError: If the parts don't come to `until` within that many turns.
-    """
-    due: Sequence[SitePart] = parts
-    again = 0
-    for _ in range(most):
-        for part in due:
-            part.advance(now=now)
-        deadlines = [math.inf if (t := part.next_deadline()) is None else t for part in parts]
-        upcoming = min(deadlines, default=math.inf)
-        if upcoming > now:
-            if now >= until:
-                return now
-            now, again = min(upcoming, until), 0
-        elif (again := again + 1) > PATIENCE:
-            raise InvalidValueError("deadline", upcoming, f"after {now} s, when its part has advanced")
-        due = parts if now >= until else [part for part, t in zip(parts, deadlines, strict=True) if t <= now]
-    raise InvalidValueError("turns", most, "enough to come to the end")

@@ -13,7 +13,6 @@ from interfaces.link.delays import (
     TraceDelay,
     delay_profile,
 )
-from interfaces.link.delivery import Bundle, Repeater, RepeatReceiver
 from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, LinkTotals, Stream, direction
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
 from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord, Totals
@@ -33,7 +32,6 @@ from interfaces.link.round_trip import (
 
 __all__ = [
     "BernoulliLoss",
-    "Bundle",
     "Channel",
     "ClockEstimate",
     "ClockEvidence",
@@ -68,8 +66,6 @@ __all__ = [
     "Probe",
     "ProbeConfig",
     "RelativeDelays",
-    "RepeatReceiver",
-    "Repeater",
     "RoundTrip",
     "RoundTripEstimator",
     "RouteDelay",

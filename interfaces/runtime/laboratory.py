@@ -1,16 +1,17 @@
-"""The laboratory driver: both sites and the link in virtual time, as fast as the processor goes."""
+"""Virtual time: the loop that everything runs in there, and the laboratory, both sites and the link in it."""
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import count
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from interfaces.link import Lane, Link, LinkConditions
+from interfaces.engine_server.site import earliest
+from interfaces.link import Link, LinkConditions
 from interfaces.messages.sites import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import JointReference, RobotSite
@@ -19,6 +20,51 @@ from vrs.commands import finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array
+
+PATIENCE = 1000
+"""Turns without any time passing, after which something is wrong."""
+
+
+class VirtualPart(Protocol):
+    """Anything that runs in virtual time."""
+
+    def advance(self, *, now: float) -> object:
+        """Do what is due at now [s]."""
+
+    def next_deadline(self) -> float | None:
+        """When it wants to be called next [s]; None for not before something arrives."""
+
+
+def run_parts(parts: Sequence[VirtualPart], *, now: float, until: float) -> float:
+    """Let virtual time pass: at each deadline the parts that are due have their turn, until all are quiet.
+
+    At the beginning and at the end all have a turn.
+
+    Args:
+        parts: In the order of their turns: sites first, then transports, then clients.
+        now: Time to begin at [s].
+        until: Time to end at [s].
+
+    Returns:
+        The time reached: `until`.
+
+    Raises:
+        InvalidValueError: If the parts don't become quiet.
+    """
+    due, again = parts, 0
+    while True:
+        for part in due:
+            part.advance(now=now)
+        deadlines = [math.inf if (t := part.next_deadline()) is None else t for part in parts]
+        upcoming = min(deadlines, default=math.inf)
+        if upcoming > now:
+            if now >= until:
+                return now
+            now, again = min(upcoming, until), 0
+        elif (again := again + 1) > PATIENCE:
+            raise InvalidValueError("deadline", upcoming, f"after {now} s, when its part has advanced")
+        due = parts if now >= until else [part for part, t in zip(parts, deadlines, strict=True) if t <= now]
+
 
 _BLOCK = 100
 """Ticks that are passed together while nothing needs to know where the body is."""
@@ -98,31 +144,35 @@ class Laboratory:
 
     def run(self, until: float) -> None:
         """Let time pass until `until` [s]."""
-        while True:
-            at_robot = self.robot.next_deadline()
-            there, back = _time(self.link.forward), _time(self.link.backward)
-            planned = self._agenda[0][0] if self._agenda else math.inf
-            now = max(min(self.operator.next_deadline(), at_robot, there, back, planned), self.now)
-            if now > until:
-                break
-            self._pass(now, at_once=self._body is not None and (at_robot <= now or planned <= now))
-            for delivery in self.link.forward.receive(now) if there <= now else ():
-                for entry in delivery.payload.entries:
-                    self.arrivals.setdefault((delivery.payload.epoch, entry.number), now)
-                self.robot.receive(delivery.payload, now=now)
-            for answer in self.link.backward.receive(now) if back <= now else ():
-                self.operator.receive(answer.payload, now=now)
-            while self._agenda and self._agenda[0][0] <= now:
-                heapq.heappop(self._agenda)[2](now)
-            for orders in self.operator.advance(now=now):
-                self.link.forward.send(orders, now)
-            for report in self.robot.advance(now=now):
-                for number, receipt in report.receipts:
-                    self.answers.setdefault((report.epoch, number), receipt)
-                if report.halted:
-                    self.halts.setdefault(report.epoch, (now, report.halted))
-                self.link.backward.send(report, now)
+        run_parts([self], now=self.now, until=until)
         self._pass(until, at_once=True)
+
+    def next_deadline(self) -> float | None:
+        """When something happens next [s]."""
+        sites = self.operator.next_deadline(), self.robot.next_deadline()
+        return earliest(*sites, self.link.next_deadline(), self._agenda[0][0] if self._agenda else None)
+
+    def advance(self, *, now: float) -> None:
+        """Let everything happen that happens at now [s]."""
+        # The robot's site, and what is planned, may ask where the body is.
+        asked = self.robot.next_deadline() <= now or (bool(self._agenda) and self._agenda[0][0] <= now)
+        self._pass(now, at_once=self._body is not None and asked)
+        for delivery in self.link.forward.receive(now):
+            for entry in delivery.payload.entries:
+                self.arrivals.setdefault((delivery.payload.epoch, entry.number), now)
+            self.robot.receive(delivery.payload, now=now)
+        for answer in self.link.backward.receive(now):
+            self.operator.receive(answer.payload, now=now)
+        while self._agenda and self._agenda[0][0] <= now:
+            heapq.heappop(self._agenda)[2](now)
+        for orders in self.operator.advance(now=now):
+            self.link.forward.send(orders, now)
+        for report in self.robot.advance(now=now):
+            for number, receipt in report.receipts:
+                self.answers.setdefault((report.epoch, number), receipt)
+            if report.halted:
+                self.halts.setdefault(report.epoch, (now, report.halted))
+            self.link.backward.send(report, now)
 
     def _pass(self, now: float, *, at_once: bool = False) -> None:
         """Let time pass in which nothing happens.
@@ -197,9 +247,3 @@ class Laboratory:
     def measured(self) -> Array:
         """Measured joints [rad], (k, n)."""
         return self.reference.q if self._body is None else np.concatenate(self._measured)
-
-
-def _time(way: Lane[Any]) -> float:
-    """When something happens on one direction of the link [s]; infinity for never."""
-    t = way.next_deadline()
-    return math.inf if t is None else t

@@ -20,6 +20,7 @@ from typing_extensions import override
 
 from interfaces.engine_server.site import engine_time
 from interfaces.link.delays import share_of
+from interfaces.link.delivery import Incoming
 from interfaces.link.round_trip import RelativeDelays, WindowConfig
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
@@ -88,37 +89,27 @@ class AdaptiveOffset:
 
 
 WAITING_MOST = 4096
-"""Most entries that wait for earlier ones."""
+"""So far ahead of the one that's missing entries are kept."""
 
 
 class ReceivedLog:
     """Which entries came, and up to when the timeline is complete with those that were carried out."""
 
     def __init__(self, complete_until: float) -> None:
-        self.executed = 0
         self.complete_until = complete_until
-        self._waiting: dict[int, LogEntry] = {}
-        self._early: set[int] = set()
+        self._entries: Incoming[LogEntry] = Incoming(WAITING_MOST)
         self._claims: deque[tuple[int, float]] = deque(maxlen=WAITING_MOST)
+
+    @property
+    def executed(self) -> int:
+        """Number of the newest entry before which none is missing."""
+        return self._entries.count
 
     def due(self, entries: tuple[LogEntry, ...], *, as_they_come: bool) -> list[LogEntry]:
         """Entries to be carried out now, each once."""
-        new = [e for e in entries if e.number > self.executed and e.number not in self._early]
-        if as_they_come:
-            due = list({e.number: e for e in new}.values())
-            self._early.update(e.number for e in due)
-            while self.executed + 1 in self._early:
-                self._early.remove(self.executed + 1)
-                self.executed += 1
-            return due
-        for entry in new:
-            if len(self._waiting) < WAITING_MOST:
-                self._waiting.setdefault(entry.number, entry)
-        due = []
-        while self.executed + 1 in self._waiting:
-            self.executed += 1
-            due.append(self._waiting.pop(self.executed))
-        return due
+        new = {entry.number: entry for entry in entries if self._entries.expects(entry.number)}
+        in_order = [due for entry in entries for due in self._entries.take(entry.number, (entry,))]
+        return list(new.values()) if as_they_come else in_order
 
     def claim(self, newest: int, complete_until: float) -> None:
         """A message said that with all entries up to the newest nothing changes before a time."""

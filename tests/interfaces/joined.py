@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from interfaces.clients.ports import LocalPort, MemoryTransport
-from interfaces.engine_server.site import Site, drive
+from interfaces.engine_server.site import Site
 from interfaces.link import BernoulliLoss, Channel, Conditions, ConstantDelay, GammaDelay, Service
+from interfaces.runtime.laboratory import run_parts
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 
@@ -49,7 +50,7 @@ class Joined:
         return client
 
     def run(self, seconds: float) -> None:
-        self.now = drive(self.parts, now=self.now, until=self.now + seconds)
+        self.now = run_parts(self.parts, now=self.now, until=self.now + seconds)
 
 
 def constant(seconds: float) -> ConstantDelay:

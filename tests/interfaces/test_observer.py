@@ -12,8 +12,9 @@ from interfaces.clients.observer import PENDING
 from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.forecasts import Forecasts
 from interfaces.engine_server.journal import Journal
-from interfaces.engine_server.site import Site, drive, engine_time
+from interfaces.engine_server.site import Site, engine_time
 from interfaces.messages import Answer, Frame, FrameStatus
+from interfaces.runtime.laboratory import run_parts
 from tests.interfaces.joined import HOME, MODEL, Joined, bad, constant, place, to
 from tests.memory import values_held
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Stop
@@ -276,7 +277,7 @@ class TestDriver:
                 return -1.0
 
         with pytest.raises(InvalidValueError, match="deadline"):
-            drive([Restless()], now=0.0, until=1.0)
+            run_parts([Restless()], now=0.0, until=1.0)
 
     def test_the_clock_of_an_engine_never_runs_back(self):
         site = Site(Engine(MODEL, clock=ManualClock(0.0)))

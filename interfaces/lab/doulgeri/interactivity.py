@@ -8,12 +8,12 @@ import numpy as np
 
 from interfaces import Designer, Viewer
 from interfaces.clients.playhead import FASTEST, QUICKEST, Mode
-from interfaces.engine_server.site import SitePart
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.messages import ViewForm
+from interfaces.runtime.laboratory import VirtualPart
 from vrs import JointTarget, MotionCommand, Timeline
 from vrs.commands import Cancel, Command, InsertVia, Resume, Retime, ScaleTime, Stop
 
@@ -46,7 +46,7 @@ class InteractiveSession:
             ViewForm.FRAMES: Viewer(self.joined.connect(D_F, D_B), rate=RATE, form=ViewForm.FRAMES),
         }
         self.other = Viewer(self.joined.connect(D_F, D_B), rate=RATE)
-        clients: tuple[SitePart, ...] = (self.designer, *self.viewers.values(), self.other)
+        clients: tuple[VirtualPart, ...] = (self.designer, *self.viewers.values(), self.other)
         for client in clients:
             self.joined.add(client)
         self.joined.run(1.0)

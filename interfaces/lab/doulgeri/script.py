@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from interfaces.clients.ports import MemoryTransport, RemotePort
-from interfaces.engine_server.site import Site, SitePart, drive
+from interfaces.engine_server.site import Site
 from interfaces.link import Channel, ConstantDelay
-from interfaces.runtime.laboratory import Laboratory
+from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
 from interfaces.teleop import JointReference
 from robots import puma560
 from robots.onboard.playout import PlayState
@@ -94,7 +94,7 @@ class ScriptedSite:
         self.site = Site(Engine(MODEL, q=q, clock=ManualClock(D)), D=D)
         self.engine = self.site.engine
         self.now = 0.0
-        self._parts: list[SitePart] = [self.site]
+        self._parts: list[VirtualPart] = [self.site]
 
     def connect(self, there: float, back: float) -> RemotePort:
         """A port to the site over a link with constant delays [s]."""
@@ -104,13 +104,13 @@ class ScriptedSite:
         self._parts.append(transport)
         return transport.port
 
-    def add(self, client: SitePart) -> None:
+    def add(self, client: VirtualPart) -> None:
         """Drive a client too."""
         self._parts.append(client)
 
     def run(self, until: float) -> None:
         """Let time pass until `until` [s]."""
-        self.now = drive(self._parts, now=self.now, until=until)
+        self.now = run_parts(self._parts, now=self.now, until=until)
 
 
 def played(lab: Laboratory) -> tuple[PlayState, JointReference]:

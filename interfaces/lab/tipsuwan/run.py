@@ -9,6 +9,7 @@ from typing import Annotated, Final, NamedTuple, Protocol
 
 import numpy as np
 
+from interfaces.engine_server.site import earliest
 from interfaces.lab.tipsuwan.predictive import PredictiveConfig, PredictiveController
 from interfaces.link import Channel, Conditions, ConstantDelay, DelayProfile, Echo, HeavyTailedDelay, Probe
 from interfaces.link.delays import CORRELATION_TIME
@@ -22,6 +23,7 @@ from interfaces.middleware import (
     MiddlewareConfig,
     default_network,
 )
+from interfaces.runtime.laboratory import run_parts
 from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.robot import BareBody, MobileRobot
 from robots.onboard.curve import Curve
@@ -314,6 +316,7 @@ class _NetworkRun:
         self._setting = setting
         self._robot = ActionAgent(setting.agent)
         self._end = curve.at(curve.length)
+        self._now = 0.0
 
     def whole(self) -> DriveTrace:
         period = self._setting.agent.period
@@ -339,17 +342,14 @@ class _NetworkRun:
 
     def _until(self, now: float) -> None:
         """Let everything happen that happens on the network and at its other end by now [s]."""
-        while True:
-            t = math.inf
-            for part in (self._there, self._back, self._driver):
-                due = part.next_deadline()
-                if due is not None and due < t:
-                    t = due
-            if t > now:
-                return
-            self._at(t)
+        self._now = run_parts([self], now=self._now, until=now)
 
-    def _at(self, now: float) -> None:
+    def next_deadline(self) -> float | None:
+        """When something happens next [s]."""
+        return earliest(self._there.next_deadline(), self._back.next_deadline(), self._driver.next_deadline())
+
+    def advance(self, *, now: float) -> None:
+        """Let everything happen that happens at now [s]."""
         driver, there, back, robot = self._driver, self._there, self._back, self._robot
         for sent in there.receive(now):
             echo = robot.receive(sent.payload, now=now)

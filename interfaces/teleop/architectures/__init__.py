@@ -23,8 +23,6 @@ from interfaces.teleop.architectures.sites import (
     ArchitectureRobotSite,
     DriveController,
     PositionSource,
-    Receiver,
-    Sender,
     Transport,
 )
 from interfaces.teleop.architectures.surroundings import Aim, OperatorSurroundings, RobotSurroundings, Sonar
@@ -43,9 +41,7 @@ __all__ = [
     "OperatorSurroundings",
     "PlayerConfig",
     "PositionSource",
-    "Receiver",
     "RobotSurroundings",
-    "Sender",
     "Sonar",
     "TimelineController",
     "Transport",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import enum
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from interfaces.link.conditions import Service
+from interfaces.link.delivery import Incoming, Outgoing
 from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.operator import CommandRecord
@@ -19,7 +19,7 @@ from vrs.mobile.model import advanced, braking, limited
 from vrs.segment import ArcSegment, known_arc
 
 MOST_EARLY = 36_000
-"""Most arcs that wait for those before them; what comes beyond is left out, and repeated by the sender."""
+"""So far ahead of the one that's missing arcs are kept; what comes beyond is left out, and repeated."""
 
 
 class Transport(enum.StrEnum):
@@ -39,76 +39,6 @@ class Transport(enum.StrEnum):
     def service(self) -> Service:
         """What the link promises about order."""
         return Service.IN_ORDER if self is Transport.STREAM else Service.DATAGRAM
-
-
-class Sender:
-    """Makes packets of the arcs that the operator has driven."""
-
-    def __init__(self, transport: Transport) -> None:
-        """Start with nothing to send."""
-        self._repeats = transport is Transport.DATAGRAMS
-        self._arcs: deque[ArcSegment] = deque()
-        self._first = 0
-
-    @property
-    def count(self) -> int:
-        """Arcs added so far."""
-        return self._first + len(self._arcs)
-
-    def add(self, arc: ArcSegment) -> None:
-        """Take the next arc."""
-        self._arcs.append(arc)
-
-    def acknowledge(self, count: int) -> None:
-        """Take it that the robot has the first `count` arcs; what it said before may be more."""
-        while self._first < min(count, self.count):
-            self._arcs.popleft()
-            self._first += 1
-
-    def packet(self, complete_until: float, tail: Sequence[ArcSegment] = ()) -> ArcPacket:
-        """Make a packet of what the robot may lack.
-
-        Args:
-            complete_until: Up to when the path is final [s].
-            tail: The braking after it.
-        """
-        arcs, half = tuple(self._arcs), MOST_REPEATED // 2
-        runs = [(self._first, arcs)] if arcs else []
-        if not self._repeats:
-            self.acknowledge(self.count)
-        elif len(arcs) > MOST_REPEATED:
-            runs = [(self._first, arcs[:half]), (self.count - half, arcs[-half:])]
-        return ArcPacket(tuple(runs), complete_until, tuple(tail))
-
-
-class Receiver:
-    """Gives the arcs in their order, each once, as soon as all before it are there."""
-
-    def __init__(self) -> None:
-        """Start with none."""
-        self._early: dict[int, ArcSegment] = {}
-        self.count = 0
-        """Arcs given so far, to be acknowledged."""
-
-    def receive(self, packet: ArcPacket) -> list[ArcSegment]:
-        """Take in a packet; return the arcs whose turn it is."""
-        taken: list[ArcSegment] = []
-        for first, arcs in packet.runs:
-            start = max(self.count - first, 0)
-            if first <= self.count:
-                taken += arcs[start:]
-                self.count += len(arcs[start:])
-            else:
-                room = MOST_EARLY - len(self._early)
-                self._early.update((first + k, arc) for k, arc in enumerate(arcs[: max(room, 0)]))
-        while self._early:
-            arc = self._early.pop(self.count, None)
-            if arc is None:
-                self._early = {k: early for k, early in self._early.items() if k > self.count}
-                break
-            taken.append(arc)
-            self.count += 1
-        return taken
 
 
 class DriveController(Protocol):
@@ -171,7 +101,8 @@ class ArchitectureOperatorSite:
         """The virtual robot: what the operator's commands make, without corrections."""
         self.estimator = PostureEstimator(posture, gain=gain, period=model.period)
         """Where the real robot is thought to be after all commands."""
-        self._sender = Sender(transport)
+        self._transport = transport
+        self._arcs: Outgoing[ArcSegment] = Outgoing()
         self._end = posture
         self._model = model
         self.surroundings = surroundings
@@ -209,20 +140,35 @@ class ArchitectureOperatorSite:
             self.listener(CommandRecord(self._clock.now(), command, receipt, refused=False))
         self.estimator.command(v, w)
         arc = known_arc(start, period, self._end, v, w, receipt.command_id)
-        self._sender.add(arc)
+        self._arcs.add(arc)
         self._end = Posture(*advanced(self._end, v, w, period))
-        return self._sender.packet(arc.end, self._tail(arc))
+        return self._packet(arc.end, self._tail(arc))
 
     def repeat(self) -> ArcPacket:
         """What goes to the robot while the operator gives no command."""
-        return self._sender.packet(self.engine.timeline.end)
+        return self._packet(self.engine.timeline.end)
 
     def receive(self, report: ArchitectureReport, *, now: float) -> None:
         """Correct the estimate, repeat no more what has arrived, and learn what changed around the robot [s]."""
         if self.surroundings is not None and report.seen_at is not None:
             self.surroundings.receive(report.cells, report.seen_at, now=now)
-        self._sender.acknowledge(report.received)
+        self._arcs.acknowledge(report.received)
         self.estimator.feedback(report.executed, report.posture, report.number)
+
+    def _packet(self, complete_until: float, tail: Sequence[ArcSegment] = ()) -> ArcPacket:
+        """Make a packet of what the robot may lack; arcs are numbered from 0 in it.
+
+        Args:
+            complete_until: Up to when the path is final [s].
+            tail: The braking after it.
+        """
+        first, arcs, half = self._arcs.acknowledged, tuple(self._arcs.waiting.values()), MOST_REPEATED // 2
+        runs = [(first, arcs)] if arcs else []
+        if self._transport is Transport.STREAM:
+            self._arcs.acknowledge(self._arcs.count)
+        elif len(arcs) > MOST_REPEATED:
+            runs = [(first, arcs[:half]), (self._arcs.count - half, arcs[-half:])]
+        return ArcPacket(tuple(runs), complete_until, tuple(tail))
 
     def _tail(self, arc: ArcSegment) -> list[ArcSegment]:
         """How the virtual robot brakes, unless the operator goes on."""
@@ -258,7 +204,7 @@ class ArchitectureRobotSite:
         self.controller = controller
         self._surroundings = surroundings
         self._position, self._limits, self._period = position, limits, period
-        self._receiver = Receiver()
+        self._arcs: Incoming[ArcSegment] = Incoming(MOST_EARLY)
         self._drive = Drive(0.0, 0.0)
         self._reports = 0
         self.posture = position.posture()
@@ -266,7 +212,8 @@ class ArchitectureRobotSite:
 
     def receive(self, packet: ArcPacket, *, now: float) -> None:
         """Take in a packet [s]."""
-        self.controller.receive(self._receiver.receive(packet), packet, now=now)
+        due = [arc for first, arcs in packet.runs for arc in self._arcs.take(first + 1, arcs)]
+        self.controller.receive(due, packet, now=now)
 
     def drive(self, *, now: float) -> Drive:
         """What to drive for the next period."""
@@ -280,7 +227,7 @@ class ArchitectureRobotSite:
     def report(self, *, now: float) -> ArchitectureReport:
         """What goes back to the operator now [s]."""
         self._reports += 1
-        done = self._reports, self.controller.executed, self.posture, self._receiver.count
+        done = self._reports, self.controller.executed, self.posture, self._arcs.count
         if self._surroundings is None:
             return ArchitectureReport(*done)
         return ArchitectureReport(*done, now, self._surroundings.supervisor.changes(now=now))

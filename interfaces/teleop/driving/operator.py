@@ -8,6 +8,7 @@ from collections.abc import Callable
 from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
+from interfaces.link.delivery import Outgoing
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.messages.drive_sites import (
     HALT,
@@ -170,8 +171,7 @@ class DrivingOperator:
         """How far the robot is with what it does by itself; None before it has said."""
         self.sight: SensedPoints | None = None
         """What it saw last."""
-        self._errands: list[Errand] = []
-        self._errand = 0
+        self._errands: Outgoing[Errand] = Outgoing()
         self._later: tuple[tuple[float, tuple[RobotTask, ...]], ...] = ()
         """What it's to be told when the next drive has begun, and when that was given [s]."""
         self._now = now
@@ -245,7 +245,8 @@ class DrivingOperator:
     def doing(self) -> Doing:
         """What the real robot does by itself, as far as is known; something, while it may have been told to."""
         report = self.report
-        if self.cause is HaltCause.BY_ITSELF and any(not errand.task.stops for errand in self._errands):
+        told = any(not errand.task.stops for errand in self._errands.waiting.values())
+        if told and self.cause is HaltCause.BY_ITSELF:
             return Doing.JOBS
         return Doing.NOTHING if report is None else report.doing
 
@@ -277,9 +278,8 @@ class DrivingOperator:
         """Send errands, until the robot has them; one that stops everything overrules what it hasn't heard yet."""
         for task in tasks:
             if task.halt is not None:
-                self._errands.clear()
-            self._errand += 1
-            self._errands.append(Errand(self._errand, task))
+                self._errands.waiting.clear()
+            self._errands.add(Errand(self._errands.count + 1, task))
         self._prompt = True
 
     @property
@@ -294,7 +294,7 @@ class DrivingOperator:
         if report is None or not self.stands:
             return self.stands
         knows = bool(report.halted) or (report.echo is not None and 0 < self._over <= report.echo[0])
-        if report.doing is not Doing.NOTHING or (self._errands and report.epoch == self.epoch):
+        if report.doing is not Doing.NOTHING or (self._errands.waiting and report.epoch == self.epoch):
             return False
         return is_still(report.drive) and (knows or report.epoch != self.epoch or not self.epochs)
 
@@ -305,12 +305,12 @@ class DrivingOperator:
             return self.gone or HaltCause.NOT_MET.value
         if self.halted is None:
             return ""
-        if report.doing is not Doing.NOTHING and not self._errands:
+        if report.doing is not Doing.NOTHING and not self._errands.waiting:
             self.halted = Halt(HaltCause.BY_ITSELF)
             return ""
         if not self.done:
             return MOVING
-        self._errands.clear()
+        self._errands.waiting.clear()
         self.epoch += 1
         self.epochs += 1
         self.halted, self._wish, self._until = None, STAND, -math.inf
@@ -363,7 +363,7 @@ class DrivingOperator:
                 start=None if start is None else Posture(*map(normal, start)),
                 runs=tuple((first, arc_rows(arcs)) for first, arcs in packet.runs),
                 tail=arc_rows(packet.tail),
-                errands=tuple(self._errands[:ERRANDS]),
+                errands=tuple(islice(self._errands.waiting.values(), ERRANDS)),
             ),
         )
 
@@ -416,15 +416,16 @@ class DrivingOperator:
                 self.round_trips.add(self.round_trip, now=now)
         if report.epoch != self.epoch:
             return
-        self._errands = [errand for errand in self._errands if errand.number > report.errand]
+        self._errands.acknowledge(report.errand)
         if report.halted:
             # What it was told and hasn't begun isn't to begin after a stop.
-            self._errands = [errand for errand in self._errands if errand.task.stops]
+            waiting = self._errands.waiting
+            self._errands.waiting = {number: errand for number, errand in waiting.items() if errand.task.stops}
             if self.cause is HaltCause.BY_ITSELF:
                 self.halted = None
             self.halt(Halt(HaltCause.REPORTED, report.halted))
         elif self.cause is HaltCause.BY_ITSELF:
-            if not self._errands and report.doing is Doing.NOTHING:
+            if not self._errands.waiting and report.doing is Doing.NOTHING:
                 # The next drive begins where it has come to.
                 self.halted = Halt(HaltCause.STOPPED)
         elif report.report is not None:

@@ -5,70 +5,116 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.messages.drive_sites import MOST_REPEATED, ArcPacket
-from interfaces.teleop.architectures.sites import Receiver, Sender, Transport
+from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.teleop.architectures import ArchitectureOperatorSite, ArchitectureRobotSite, Transport
+from robots import ipr
+from robots.onboard.driving import IPR_LIMITS, STAND, Posture
 from vrs.segment import ArcSegment
+
+START = Posture(0.0, 0.0, 0.0)
+T = 0.1
 
 
 def arc(k: int) -> ArcSegment:
     return ArcSegment(0.1 * k, 0.1, (0.01 * k, 0.0, 0.0), 0.1, 0.0, k)
 
 
+class Taking:
+    """A controller that stands, and writes down which commands it got; a robot that stays where it is."""
+
+    def __init__(self):
+        self.taken = []
+        self.executed = 0
+
+    def receive(self, arcs, packet, *, now):
+        self.taken += [arc.command_id for arc in arcs]
+
+    def control(self, posture, *, now, v_before):
+        return STAND
+
+    def posture(self):
+        return START
+
+
+class Both:
+    """Both sites, and how far the operator has driven."""
+
+    def __init__(self, transport: Transport = Transport.DATAGRAMS) -> None:
+        self.operator = ArchitectureOperatorSite(ipr.model("ipr", period=T), START, transport)
+        self.controller = Taking()
+        self.robot = ArchitectureRobotSite(self.controller, self.controller, IPR_LIMITS, period=T)
+        self.driven = 0
+
+    def drive(self) -> ArcPacket:
+        self.driven += 1
+        return self.operator.drive(0.1, 0.0, now=T * (self.driven - 1))
+
+    def arrive(self, packet: ArcPacket) -> None:
+        self.robot.receive(packet, now=0.0)
+
+    def acknowledge(self, count: int) -> None:
+        report = ArchitectureReport(1, 0, START, max(count, 0))
+        self.operator.receive(report, now=T * self.driven)
+
+    @property
+    def count(self) -> int:
+        return self.robot.report(now=0.0).received
+
+    @property
+    def all_taken(self) -> bool:
+        return self.controller.taken == list(range(1, self.driven + 1)) and self.count == self.driven
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_any_packet_makes_up_for_those_that_were_lost_or_overtaken(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    sender, receiver = Sender(Transport.DATAGRAMS), Receiver()
+    both = Both()
     underway: list[tuple[float, ArcPacket]] = []
-    taken: list[ArcSegment] = []
     for k in range(300):
-        if k < 280:
-            sender.add(arc(k))
+        packet = both.drive() if k < 280 else both.operator.repeat()
         if k >= 295 or rng.random() < 0.6:
-            underway.append((k + float(rng.exponential(8.0)), sender.packet(0.1 * k)))
+            underway.append((k + float(rng.exponential(8.0)), packet))
         for entry in sorted((found for found in underway if found[0] <= k), key=lambda found: found[0]):
             underway.remove(entry)
-            taken += receiver.receive(entry[1])
+            both.arrive(entry[1])
         if rng.random() < 0.3:
-            sender.acknowledge(receiver.count - int(rng.integers(0, 20)))
+            both.acknowledge(both.count - int(rng.integers(0, 20)))
     for _, packet in underway:
-        taken += receiver.receive(packet)
-    assert [found.command_id for found in taken] == list(range(280))
-    assert receiver.count == 280
+        both.arrive(packet)
+    assert both.driven == 280
+    assert both.all_taken
 
 
 def test_a_stream_carries_each_arc_once() -> None:
-    sender, receiver = Sender(Transport.STREAM), Receiver()
+    both = Both(Transport.STREAM)
     for k in range(5):
-        sender.add(arc(k))
-        packet = sender.packet(0.1 * (k + 1))
-        assert [len(arcs) for _, arcs in packet.runs] == [1]
-        assert [found.command_id for found in receiver.receive(packet)] == [k]
-    assert sender.packet(0.5).runs == ()
+        packet = both.drive()
+        assert [(first, len(arcs)) for first, arcs in packet.runs] == [(k, 1)]
+        both.arrive(packet)
+        assert both.all_taken
+    assert both.operator.repeat().runs == ()
 
 
 def test_a_long_silence_is_made_up_for_from_both_ends() -> None:
-    sender, receiver = Sender(Transport.DATAGRAMS), Receiver()
-    for k in range(3 * MOST_REPEATED):
-        sender.add(arc(k))
-    taken: list[ArcSegment] = []
+    both = Both()
+    for _ in range(3 * MOST_REPEATED):
+        both.drive()
     for _ in range(8):
-        packet = sender.packet(0.0)
+        packet = both.operator.repeat()
         assert sum(len(arcs) for _, arcs in packet.runs) <= MOST_REPEATED
-        taken += receiver.receive(packet)
-        sender.acknowledge(receiver.count)
-    assert [found.command_id for found in taken] == list(range(3 * MOST_REPEATED))
+        both.arrive(packet)
+        both.acknowledge(both.count)
+    assert both.all_taken
 
 
 def test_what_is_acknowledged_isn_t_sent_again_and_old_acknowledgements_change_nothing() -> None:
-    sender = Sender(Transport.DATAGRAMS)
-    for k in range(10):
-        sender.add(arc(k))
-    sender.acknowledge(7)
-    sender.acknowledge(3)
-    sender.acknowledge(99)
-    assert sender.packet(1.0).runs == ()
-    sender.add(arc(10))
-    assert [first for first, _ in sender.packet(1.1).runs] == [10]
+    both = Both()
+    for _ in range(10):
+        both.drive()
+    for count in (7, 3, 99):
+        both.acknowledge(count)
+    assert both.operator.repeat().runs == ()
+    assert [first for first, _ in both.drive().runs] == [10]
 
 
 def test_a_packet_says_what_it_takes_on_the_wire() -> None:

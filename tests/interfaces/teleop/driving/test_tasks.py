@@ -122,6 +122,20 @@ def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None
     assert rig.operator.doing is Doing.NOTHING
 
 
+def test_a_stop_overrules_what_the_robot_hasnt_heard_yet_and_the_numbers_go_on() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.operator.order(RobotTask(go=THERE), RobotTask(go=FAR))
+    (told,) = rig.operator.advance(now=rig.now)
+    rig.operator.stop()
+    (stopped,) = rig.operator.advance(now=rig.now)
+    assert [(errand.number, errand.task.go) for errand in told.errands] == [(1, THERE), (2, FAR)]
+    assert [(errand.number, errand.task) for errand in stopped.errands] == [(3, HALT)]
+    rig.run(1.0)
+    assert rig.autonomy.doing is Doing.NOTHING
+    assert stands(rig)
+
+
 @pytest.mark.parametrize(
     "job", [MoveJob(2, THERE), VoiceJob(2, "A long text that takes a while. " * 6), WaitJob(2, 30.0), WaitJob(2)]
 )
