@@ -78,8 +78,9 @@ class Receipt(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     superseded_names: Names = field(default=(), name="superseded")
     """Ids of commands that won't arrive any more, wholly or in part."""
     hindrance: Text = ""
-    """Of a steering input that's accepted: what keeps the arm from going as asked, a singularity or a joint's limit,
-    and what leads away from it.
+    """Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it.
+
+    That's a singularity or a joint's limit.
     """
 
     @property

@@ -203,7 +203,7 @@ function map(x, where) {
  * @property {boolean} [undone] boolean (false). Whether it was taken back or cancelled.
  * @property {Array<number>} [shifted] any number × number (none). Ids of commands whose moves now come at another time.
  * @property {Array<number>} [superseded] any number × number (none). Ids of commands that won't arrive any more, wholly or in part.
- * @property {string} [hindrance] text (empty). Of a steering input that's accepted: what keeps the arm from going as asked, a singularity or a joint's limit, and what leads away from it.
+ * @property {string} [hindrance] text (empty). Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it. That's a singularity or a joint's limit.
  */
 /**
  * Server: What became of an order; again when a later command changed that.
