@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.moves import MODEL
+from interfaces.messages import recording as m
 from interfaces.recording import RecordingWriter
-from interfaces.recording import messages as m
 from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose, virtual_pose

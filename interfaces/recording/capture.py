@@ -19,9 +19,7 @@ from interfaces.engine_server.journal import difference
 from interfaces.link import PacketRecord
 from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
-from interfaces.messages.sites import Report, Sample
-from interfaces.recording.channels import Message
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     Anchor,
     ChangeEntry,
     CommandEntry,
@@ -33,6 +31,8 @@ from interfaces.recording.messages import (
     VirtualSample,
     segment_entries,
 )
+from interfaces.messages.sites import Report, Sample
+from interfaces.recording.channels import Message
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
 from interfaces.teleop import CommandRecord, Correction, OperatorSite
 from interfaces.teleop.operator import SiteObserver

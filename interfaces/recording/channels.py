@@ -13,8 +13,8 @@ from typing import Any, Final, TypeAlias
 
 import msgspec
 
+from interfaces.messages import recording as m
 from interfaces.messages.fields import json_schema
-from interfaces.recording import messages as m
 from interfaces.recording.poses import FrameTransforms, RealPose, VirtualPose
 
 _ENDLESS = 2**63 - 1

@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 
 from interfaces.messages.fields import plain
+from interfaces.messages.recording import Anchor, CommandEntry
 from interfaces.recording.history import arm_timeline
-from interfaces.recording.messages import Anchor, CommandEntry
 from interfaces.recording.poses import quaternions
 from interfaces.recording.recording import ARM, Recording
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE

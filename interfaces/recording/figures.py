@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
+from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandEntry
 from interfaces.recording.history import arm_timeline
-from interfaces.recording.messages import COLLISION, OWN, Anchor, CommandEntry
 from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.run_recorders import extras_of

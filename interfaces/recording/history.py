@@ -11,7 +11,7 @@ import numpy as np
 
 from interfaces.engine_server.journal import SAME, changed, first_unlike
 from interfaces.messages import Change
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     ArcChange,
     ArcEntry,
     ArcHistory,

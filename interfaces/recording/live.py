@@ -13,11 +13,11 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.messages import fields
+from interfaces.messages.recording import Begin, End, EventEntry, RealSample
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import Begin, End, EventEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.messages.recording import Anchor, CommandEntry
 from interfaces.runs.twin_run import correction_text
 from vrs.commands import DriveCommand, Motion, MotionCommand
 from vrs.ledger import Receipt, Status

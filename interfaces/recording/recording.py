@@ -14,10 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from interfaces.recording.errors import Damage
-from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
-from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     Anchor,
     Begin,
     CellsEntry,
@@ -31,6 +28,9 @@ from interfaces.recording.messages import (
     ReceiptEntry,
     RoomEntry,
 )
+from interfaces.recording.errors import Damage
+from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
 from interfaces.runs.twin_run import CommandPacket, RunEvent
 from vrs.errors import FormatError, InvalidValueError

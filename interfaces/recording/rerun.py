@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
+from interfaces.messages.recording import Anchor, CommandEntry, Late
 from interfaces.recording import capture, history
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
-from interfaces.recording.messages import Anchor, CommandEntry, Late
 from interfaces.recording.recording import Recording
 from robots.ipr.model import Ipr
 from robots.ipr.model import model as ipr_model

@@ -16,15 +16,10 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link import PacketRecord
+from interfaces.messages import recording as d
 from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
-from interfaces.recording import messages as d
-from interfaces.recording.capture import Capture
-from interfaces.recording.channels import Message
-from interfaces.recording.errors import RecordingError
-from interfaces.recording.history import edit_entries, whole_entries
-from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     COLLISION,
     Begin,
     CommandEntry,
@@ -36,6 +31,11 @@ from interfaces.recording.messages import (
     grid_facts,
     room_entry,
 )
+from interfaces.recording.capture import Capture
+from interfaces.recording.channels import Message
+from interfaces.recording.errors import RecordingError
+from interfaces.recording.history import edit_entries, whole_entries
+from interfaces.recording.mcap_file import Sink
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, link_transforms, placed_pose, real_pose
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness

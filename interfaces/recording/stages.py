@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from interfaces.clients.appearance import link_shapes
-from interfaces.recording.messages import grid_of, room_of
+from interfaces.messages.recording import grid_of, room_of
 from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import ARM, Recording
 from interfaces.recording.rerun import mobile_model

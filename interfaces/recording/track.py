@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from interfaces.messages import recording as d
 from interfaces.messages.fields import rich
-from interfaces.recording import messages as d
+from interfaces.messages.recording import RealSample, VirtualSample
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.mcap_reading import NUMBERS, Blocks
-from interfaces.recording.messages import RealSample, VirtualSample
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 

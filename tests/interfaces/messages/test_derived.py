@@ -101,7 +101,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from interfaces.messages import control
-from interfaces.recording import messages
+from interfaces.messages import recording
 
 
 class State(control.State, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):
@@ -111,7 +111,7 @@ class State(control.State, frozen=True, omit_defaults=True, gc=False, eq=False, 
     """Of the motors, as {0} has it [°C]."""
 
 
-class Event(messages.EventEntry, frozen=True):
+class Event(recording.EventEntry, frozen=True):
     """An event, warm."""
 
     warmth: Annotated[float, Meta(ge=-50, le=150)] = 20.0

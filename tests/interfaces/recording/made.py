@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from interfaces.engine_server.journal import difference
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     Begin,
     ChangeEntry,
     CommandEntry,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from interfaces.messages import recording as m
 from interfaces.recording import Recording, RecordingWriter
-from interfaces.recording import messages as m
 from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
 from interfaces.recording.poses import link_transforms, real_pose, virtual_pose

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
+from interfaces.messages.recording import HistoryEntry
 from interfaces.recording.capture import Paced
 from interfaces.recording.figures import summary
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import HistoryEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import RunRecorder

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import zstandard
 
-from interfaces.recording import messages as m
+from interfaces.messages import recording as m
 from interfaces.recording import open_recording
 from interfaces.recording.history import Chain
 from interfaces.recording.mcap_reading import HEAD, MAGIC, MARK, MARK_AT, NUMBERS, head_of

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
-from interfaces.recording import messages as m
+from interfaces.messages import recording as m
 from interfaces.recording.export import tables, write_csv, write_parquet
 from interfaces.recording.recording import open_recording
 from interfaces.report.html import render

@@ -17,9 +17,9 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Message, Statistics
 from mcap.stream_reader import StreamReader
 
+from interfaces.messages import recording as m
 from interfaces.messages.fields import rich
 from interfaces.recording import RecordingWriter, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.channels import CHANNELS, RecordingChannel
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.poses import quaternions

@@ -16,12 +16,12 @@ from interfaces import connect
 from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, TraceDelay, delay_profile
 from interfaces.messages.control import DirectionConditions, Impair
+from interfaces.messages.recording import EventEntry, HistoryEntry, ReceiptEntry
 from interfaces.messages.sites import Report
 from interfaces.recording import Recorder
 from interfaces.recording.figures import figures, summary
 from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import EventEntry, HistoryEntry, ReceiptEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import REAL

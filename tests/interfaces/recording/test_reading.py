@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.messages import recording as m
 from interfaces.recording import RecordingWriter, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.mcap_reading import FileSource
 from tests.interfaces.recording import recorded
 from vrs.errors import FormatError, InvalidValueError, NonFiniteTimeError, VrsError

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from interfaces.messages import recording as m
 from interfaces.recording import Recorder, RecordingError, RecordingWriter, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.mcap_file import Sink
 from tests.interfaces.recording import recorded
 from tests.interfaces.recording.disks import Disk, Failing, Hanging, Slow

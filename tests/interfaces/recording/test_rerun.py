@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.messages.recording import Anchor, CommandEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from robots import puma560
