@@ -1,14 +1,16 @@
 """Messages of a recording, as they stand in the file: of arms, of mobile robots, of commands and links.
 
-All that a file may hold is here, rooms as well: a reader finds each message and what it is made of in one place.
+All that a file may hold is here: a reader finds each message and what it is made of in one place.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from copy import copy
+from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 from msgspec import Meta, field
@@ -27,31 +29,33 @@ from interfaces.messages.fields import (
     Wire,
     Word,
 )
-from interfaces.messages.segments import MOST_POWERS
+from interfaces.messages.segments import MOST_POWERS, placed, written
+from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.mobile import Grid
-from vrs.model import Array, frozen_array
+from vrs.model import Array
 from vrs.notes import rough_in
-from vrs.segment import PolynomialSegment, known_segment
+from vrs.record import set_field
+from vrs.segment import ArcSegment, PolynomialSegment, known_arc, known_segment
 from vrs.timeline import Timeline
 
-if TYPE_CHECKING:
-    from robots.bullet.rooms import Block, Column, Door, Room
-
-Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
-"""[m]."""
-Size = Annotated[float, Meta(gt=0, le=1e6)]
-"""[m]."""
 Place = Annotated[list[Length], Meta(min_length=2, max_length=2)]
 """x, y [m]."""
-Posture = Annotated[list[Length], Meta(min_length=3, max_length=3)]
-"""x, y [m], θ [rad]."""
+if TYPE_CHECKING:
+    Posture: TypeAlias = tuple[float, float, float]
+else:
+    Posture = Annotated[tuple[Length, ...], Meta(min_length=3, max_length=3)]
+    """x, y [m], θ [rad]."""
 Speed = Annotated[float, Meta(ge=-1e3, le=1e3)]
 """[m/s] or [rad/s]."""
 Cells = Annotated[tuple[Annotated[int, Meta(ge=0, le=4095)], ...], Meta(max_length=131_072)]
 """Of the virtual environment, two numbers a cell: along x, along y."""
+
+
+class Entry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
+    """A message of a channel that has several kinds."""
 
 
 class GridFacts(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -98,87 +102,16 @@ class ThingEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     end: Finite | None = None
 
 
-class PersonEntry(Wire, frozen=True, omit_defaults=True, gc=False):
-    """Somebody who walks."""
-
-    name: Word
-    radius: Size
-    height: Size
-    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
-    x: Annotated[list[Length], Meta(min_length=1, max_length=1000)]
-    y: Annotated[list[Length], Meta(min_length=1, max_length=1000)]
-    repeat: bool = False
-
-
-class DoorEntry(Wire, frozen=True, omit_defaults=True, gc=False):
-    """A door that opens and closes."""
-
-    name: Word
-    sliding: bool
-    x: Length
-    y: Length
-    length: Size
-    angle: Length
-    thickness: Size
-    height: Size
-    swing: Length
-    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
-    shares: Annotated[list[Annotated[float, Meta(ge=0, le=1)]], Meta(min_length=1, max_length=1000)]
-    repeat: bool = False
-
-
-class RoomEntry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind", tag="room"):
+class RoomEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="room"):
     """Where it was: written at the beginning, and once more at the end."""
 
     name: Word
     length: Size
     width: Size
-    things: Annotated[tuple[ThingEntry, ...], Meta(max_length=1000)] = ()
+    things: Annotated[tuple[ThingEntry, ...], Meta(max_length=MOST_THINGS)] = ()
     """Blocks, then columns."""
-    people: Annotated[tuple[PersonEntry, ...], Meta(max_length=1000)] = ()
-    doors: Annotated[tuple[DoorEntry, ...], Meta(max_length=1000)] = ()
-
-
-class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):
-    """An arc at constant speeds."""
-
-    duration: Seconds
-    posture: Posture
-    """At its start."""
-    v: Speed
-    """[m/s]."""
-    w: Speed
-    """[rad/s]."""
-    command_id: CommandId | None = None
-    """None for standing."""
-    start: Time | None = None
-    """[s]; None where the arc before ends."""
-
-
-class ArcHistory(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="arcs"):
-    """A part of the whole timeline with an edit; as `HistoryEntry`."""
-
-    edit: Count
-    at: Time
-    version: Count
-    initial: Posture
-    start: Time
-    total: Count
-    index: Count
-    segments: tuple[ArcEntry, ...] = ()
-
-
-class ArcChange(Wire, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="drive"):
-    """An edit of the timeline: its first `first` arcs stay, these follow."""
-
-    edit: Number
-    base: Count
-    at: Time
-    version: Count
-    first: Count
-    segments: tuple[ArcEntry, ...] = ()
-    end: Time
-    command_id: CommandId | None = None
+    people: Annotated[tuple[Person, ...], Meta(max_length=MOST_THINGS)] = ()
+    doors: Annotated[tuple[Door, ...], Meta(max_length=MOST_THINGS)] = ()
 
 
 class PostureSample(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -244,26 +177,15 @@ class CellsEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     gone: Cells = ()
 
 
-DriveMessage: TypeAlias = (
-    RoomEntry | ArcHistory | ArcChange | VirtualPosture | RealPosture | MeasuredPosture | EstimatedPosture
-    | CellsEntry
-)  # fmt: skip
-"""What a mobile robot's recording has besides."""
-
-
 FORMAT = "vrs-recording/1"
 """Name and version of what the messages mean."""
 OWN = "the robot's own"
 """`Begin.offset` and `Begin.link_loss` of a robot that somebody else started: it alone knows them."""
 COLLISION = "collision"
-"""`EventEntry.kind` of collisions."""
+"""`RunEvent.kind` of collisions."""
 
-_Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
 Site: TypeAlias = Literal["virtual", "real"]
-
-
-class Entry(Wire, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
-    """A message of a channel that has several kinds."""
+Direction: TypeAlias = Literal["forward", "backward"]
 
 
 class Late(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -338,11 +260,11 @@ class End(Entry, frozen=True, omit_defaults=True, gc=False, tag="end"):
     """What the run's summary holds besides what can be computed from the recording."""
 
 
-class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="command"):
-    """A command as the operator's engine took it, rejected ones too."""
+class CommandRecord(Entry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="command"):
+    """A command that the operator's engine was given, and what became of it; rejected ones too."""
 
     number: Number
-    """Counts commands and anchors, from 1."""
+    """Counts a recording's commands and anchors, from 1; 0 where it isn't in one yet."""
     at: Time
     """The engine's clock, exactly [s]."""
     command: Command | None = None
@@ -377,28 +299,118 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         return Known(self.receipt, command, profile, rough_in(self.receipt.reason))
 
 
+UNSAID = -math.inf
+"""Start of segments whose entries don't say when: where those before them end."""
+
+
 class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """A segment: a row of `dof` numbers a power, ascending, one row after the other."""
 
     duration: Seconds
-    coefficients: _Numbers
+    coefficients: Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
     command_id: CommandId | None = None
     start: Time | None = None
     """[s]; None where the segment before ends."""
 
+    @classmethod
+    def of(cls, segment: PolynomialSegment, start: float | None = None) -> SegmentEntry:
+        """What stands in the file for a segment."""
+        return cls(segment.duration, segment.coefficients.ravel().tolist(), segment.command_id, start)
 
-class Anchor(Entry, frozen=True, omit_defaults=True, gc=False, tag="anchor", kw_only=True):
+    def segment(self, start: float, dof: int) -> PolynomialSegment:
+        """The segment that it stands for.
+
+        Raises:
+            InvalidValueError: If the coefficients don't fit the joints.
+        """
+        count = len(self.coefficients)
+        if not dof or count % dof or count > dof * MOST_POWERS:
+            raise InvalidValueError("coefficients", f"{count} numbers", f"1 to {MOST_POWERS} rows of {dof}")
+        a: Array = np.array(self.coefficients).reshape(-1, dof)
+        a.flags.writeable = False
+        return known_segment(start, self.duration, a, self.command_id)
+
+
+class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):
+    """An arc at constant speeds."""
+
+    duration: Seconds
+    posture: Posture
+    """At its start."""
+    v: Speed
+    """[m/s]."""
+    w: Speed
+    """[rad/s]."""
+    command_id: CommandId | None = None
+    """None for standing."""
+    start: Time | None = None
+    """[s]; None where the arc before ends."""
+
+    @classmethod
+    def of(cls, arc: ArcSegment, start: float | None = None) -> ArcEntry:
+        """What stands in the file for an arc."""
+        return cls(arc.duration, arc.posture, arc.v, arc.w, arc.command_id, start)
+
+    def segment(self, start: float, _dof: int) -> ArcSegment:
+        """The arc that it stands for."""
+        return known_arc(start, self.duration, self.posture, self.v, self.w, self.command_id)
+
+
+if TYPE_CHECKING:
+    Arcs: TypeAlias = tuple[ArcSegment, ...]
+    Polynomials: TypeAlias = tuple[PolynomialSegment, ...]
+else:
+    Arcs = tuple[ArcEntry, ...]
+    Polynomials = tuple[SegmentEntry, ...]
+
+
+class SegmentedEntry(Entry, frozen=True, omit_defaults=True, gc=False, eq=False):
+    """An entry with segments: it holds them as they are, and is written with an entry for each."""
+
+    row: ClassVar[type[SegmentEntry | ArcEntry]] = SegmentEntry
+
+    @property
+    def dof(self) -> int:
+        """Joints of the segments."""
+        return len(self.initial)  # type: ignore[attr-defined]
+
+    def __post_init__(self) -> None:
+        given = self.segments  # type: ignore[attr-defined]
+        if given and type(given[0]) is self.row:
+            dof = self.dof
+            found = placed(given, UNSAID, lambda row, start: row.segment(start, dof))
+            set_field(self, "segments", tuple(found))
+
+    def as_written(self) -> Self:
+        """The same as it stands in the file; the start of the first segment is always given."""
+        message = copy(self)
+        set_field(message, "segments", written(self.segments, self.row.of, UNSAID))  # type: ignore[attr-defined]
+        return message
+
+
+S = TypeVar("S", PolynomialSegment, ArcSegment)
+
+
+def following(segments: Iterable[S], start: float) -> Iterator[S]:
+    """Segments as they're held, from a time [s] on where they don't say when."""
+    for segment in segments:
+        at = start if segment.start == UNSAID else segment.start
+        yield segment if segment.start == at else replace(segment, start=at)
+        start = at + segment.duration
+
+
+class Anchor(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="anchor", kw_only=True):
     """The virtual robot joined the real one's plan, because the two had parted."""
 
     number: Number
     at: Time
-    initial: Joints
+    initial: Array
     start: Time
     version: Count
-    segments: tuple[SegmentEntry, ...] = ()
+    segments: Polynomials = ()
     end: Time
     """Until when it takes to come back [s]."""
-    error: Joints
+    error: Array
     """By how much the virtual robot was off [rad], (n,)."""
     reason: Text
     timeline_version: Count | None = None
@@ -411,8 +423,7 @@ class Anchor(Entry, frozen=True, omit_defaults=True, gc=False, tag="anchor", kw_
         Raises:
             InvalidValueError: If it's none.
         """
-        segments = segments_of(len(self.initial), self.start, self.segments)
-        return Timeline(self.initial, self.start, segments, self.version)
+        return Timeline(self.initial, self.start, following(self.segments, self.start), self.version)
 
 
 class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receipt"):
@@ -423,26 +434,33 @@ class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receip
     receipt: Receipt
 
 
-class PacketEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
-    """A command on its way across the link, as `interfaces.runs.twin_run.CommandPacket`."""
+class CommandPacket(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
+    """A motion command on its way across the link."""
 
     number: Number
     """Place in the order of sending, from 1."""
     command_id: Number
+    """Id that the operator's engine gave the command, from 1."""
     sent: Time
+    """User time of sending [s]."""
     arrived: Time | None = None
+    """User time at which it first arrived [s]; None when it never did."""
     real_id: Number | None = None
+    """Id that the real robot's engine gave the command; None when it never arrived."""
     lost: bool = False
+    """Whether the link lost the first message with it; later messages repeat it."""
 
 
-class HistoryEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="history", kw_only=True):
+class HistoryEntry(
+    SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="history", kw_only=True
+):
     """A part of the whole timeline with an edit, as the virtual robot shows it."""
 
     edit: Count
     at: Time
     """The engine's clock when the timeline was that [s]."""
     version: Count
-    initial: Joints
+    initial: Array
     """Before the start of the timeline [rad]."""
     start: Time
     """Origin of the timeline [s]."""
@@ -450,10 +468,19 @@ class HistoryEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="histor
     """Segments of the whole."""
     index: Count
     """Number of the first segment of this part, from 0."""
-    segments: tuple[SegmentEntry, ...] = ()
+    segments: Polynomials = ()
 
 
-class ChangeEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="change", kw_only=True):
+class ArcHistory(HistoryEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="arcs", kw_only=True):
+    """The same of a mobile robot."""
+
+    row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
+    initial: Posture  # type: ignore[assignment]
+    """Before the start of the timeline."""
+    segments: Arcs = ()  # type: ignore[assignment]
+
+
+class ChangeEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change", kw_only=True):
     """An edit of the timeline, as `interfaces.messages.Change`."""
 
     edit: Number
@@ -464,9 +491,24 @@ class ChangeEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="change"
     """Of the timeline afterwards."""
     first: Count
     dof: Count
-    segments: tuple[SegmentEntry, ...] = ()
+    segments: Polynomials = ()
     tail: Count | None = None
     tail_start: Time
+    end: Time
+    command_id: CommandId | None = None
+
+
+class ArcChange(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="drive", kw_only=True):
+    """The same of a mobile robot: the first `first` arcs stay, these follow."""
+
+    row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
+    dof: ClassVar[int] = 3
+    edit: Number
+    base: Count
+    at: Time
+    version: Count
+    first: Count
+    segments: Arcs = ()
     end: Time
     command_id: CommandId | None = None
 
@@ -494,7 +536,7 @@ class RealSample(Wire, frozen=True, omit_defaults=True, gc=False):
 class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """A packet of the link whose fate is known."""
 
-    direction: Literal["forward", "backward"]
+    direction: Direction
     sent: Time
     arrived: Time | None = None
     """[s]; None where it was lost, or still on its way when the recording ended."""
@@ -504,78 +546,21 @@ class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """[byte]; 0 where that wasn't recorded."""
 
 
-class EventEntry(Wire, frozen=True, omit_defaults=True, gc=False):
-    """Something that happened, as `interfaces.runs.twin_run.RunEvent`."""
+class RunEvent(Wire, frozen=True, omit_defaults=True, gc=False, order=True):
+    """Something that happened to the real robot or the link."""
 
     t: Time
+    """User time [s]."""
     kind: Word
+    """`payload`, `release`, `late`, `lost`, `slowed`, `waited`, `corrected`, `halted`, `diverged`, `unfinished`."""
     text: Text
-
-
-def segment_entries(segments: Sequence[PolynomialSegment]) -> tuple[SegmentEntry, ...]:
-    """Segments for the file; the first one's start is always given."""
-    end: float | None = None
-    found = []
-    for segment in segments:
-        start = None if segment.start == end else segment.start
-        coefficients: list[float] = segment.coefficients.ravel().tolist()
-        found.append(SegmentEntry(segment.duration, coefficients, segment.command_id, start))
-        end = segment.start + segment.duration
-    return tuple(found)
-
-
-def segments_of(dof: int, start: float, entries: Sequence[SegmentEntry]) -> tuple[PolynomialSegment, ...]:
-    """The segments that entries stand for.
-
-    Args:
-        dof: Joints.
-        start: Start of the first where it doesn't say so itself [s].
-        entries: As they stand in the file.
-
-    Raises:
-        InvalidValueError: If the coefficients don't fit the joints.
-    """
-    found = []
-    for entry in entries:
-        start = start if entry.start is None else entry.start
-        count = len(entry.coefficients)
-        if not dof or count % dof or count > dof * MOST_POWERS:
-            raise InvalidValueError("coefficients", f"{count} numbers", f"1 to {MOST_POWERS} rows of {dof}")
-        a: Array = np.array(entry.coefficients).reshape(-1, dof)
-        a.flags.writeable = False
-        found.append(known_segment(start, entry.duration, a, entry.command_id))
-        start += entry.duration
-    return tuple(found)
-
-
-def joints(values: list[float]) -> Array:
-    """A read-only array of a message's joints."""
-    return frozen_array(values)
+    """What happened, one line."""
 
 
 def room_entry(room: Room) -> RoomEntry:
     """A room for the file."""
-    people = tuple(
-        PersonEntry(
-            one.name,
-            one.radius,
-            one.height,
-            list(one.times),
-            [x for x, _ in one.places],
-            [y for _, y in one.places],
-            one.repeat,
-        )
-        for one in room.people
-    )
-    things = tuple(_thing_entry(one) for one in room.things)
-    return RoomEntry(room.name, room.length, room.width, things, people, tuple(map(_door_entry, room.doors)))
-
-
-def _door_entry(door: Door) -> DoorEntry:
-    return DoorEntry(
-        door.name, door.kind.value == "sliding", door.x, door.y, door.length, door.angle, door.thickness,
-        door.height, door.swing, list(door.times), list(door.shares), door.repeat,
-    )  # fmt: skip
+    things = tuple(map(_thing_entry, room.things))
+    return RoomEntry(room.name, room.length, room.width, things, room.people, room.doors)
 
 
 def _thing_entry(thing: Block | Column) -> ThingEntry:
@@ -591,39 +576,29 @@ def room_of(entry: RoomEntry, where: str) -> Room:
     Raises:
         FormatError: If a thing or somebody in it makes no sense.
     """
-    from robots.bullet.rooms import Door, DoorKind, Person, Room
-
     things = [_thing(one, where) for one in entry.things]
-    people = []
     for one in entry.people:
         if not _ascend(one.times) or not len(one.times) == len(one.x) == len(one.y):
             raise FormatError(where, f"{one.name!r} in its room walks no path")
-        places = tuple(zip(one.x, one.y, strict=True))
-        repeats = one.repeat and len(one.times) > 1
-        people.append(Person(one.name, one.radius, one.height, tuple(one.times), places, repeats))
-    doors = []
     for leaf in entry.doors:
         if not _ascend(leaf.times) or len(leaf.times) != len(leaf.shares):
             raise FormatError(where, f"{leaf.name!r} in its room has no timetable")
-        kind = DoorKind.SLIDING if leaf.sliding else DoorKind.HINGED
-        doors.append(Door(
-            leaf.name, kind, leaf.x, leaf.y, leaf.length, leaf.angle, leaf.thickness, leaf.height, leaf.swing,
-            tuple(leaf.times), tuple(leaf.shares), leaf.repeat and len(leaf.times) > 1,
-        ))  # fmt: skip
-    blocks = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is None)
-    columns = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is not None)
-    size = entry.name, entry.length, entry.width
-    moving = {"people": tuple(people), "doors": tuple(doors)}
-    return Room(*size, blocks=blocks, columns=columns, **moving)  # type: ignore[arg-type]
+    return Room(
+        entry.name,
+        entry.length,
+        entry.width,
+        blocks=tuple(thing for thing in things if isinstance(thing, Block)),
+        columns=tuple(thing for thing in things if isinstance(thing, Column)),
+        people=entry.people,
+        doors=entry.doors,
+    )
 
 
-def _ascend(times: list[float]) -> bool:
+def _ascend(times: tuple[float, ...]) -> bool:
     return all(a < b for a, b in pairwise(times))
 
 
 def _thing(entry: ThingEntry, where: str) -> Block | Column:
-    from robots.bullet.rooms import Block, Column
-
     start = -math.inf if entry.start is None else entry.start
     end = math.inf if entry.end is None else entry.end
     if entry.radius is not None:

@@ -56,7 +56,7 @@ class RecordingChannel:
 
 
 _SESSION = m.Begin, m.Dropped, m.End
-_COMMANDS = m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry
+_COMMANDS = m.CommandRecord, m.Anchor, m.ReceiptEntry, m.CommandPacket, m.GivenEntry
 CHANNELS: Final = (
     RecordingChannel("/session", "vrs.Session", _SESSION, (*_SESSION, m.RoomEntry), many=False),
     RecordingChannel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
@@ -75,7 +75,7 @@ CHANNELS: Final = (
         "/tf", "foxglove.FrameTransforms", (FrameTransforms,), (FrameTransforms,), "FrameTransforms.json"
     ),
     RecordingChannel("/link", "vrs.Packet", (m.LinkEntry,), (m.LinkEntry,)),
-    RecordingChannel("/events", "vrs.Event", (m.EventEntry,), (m.EventEntry,), many=False),
+    RecordingChannel("/events", "vrs.Event", (m.RunEvent,), (m.RunEvent,), many=False),
     RecordingChannel("/virtual/posture", "vrs.VirtualPosture", (), (m.VirtualPosture,)),
     RecordingChannel("/real/posture", "vrs.RealPosture", (), (m.RealPosture,)),
     RecordingChannel("/real/measured", "vrs.MeasuredPosture", (), (m.MeasuredPosture,)),
@@ -88,9 +88,10 @@ NUMBER_OF: Final = {kind: number for number, channel in enumerate(CHANNELS, 1) f
 """Number of the channel of a kind of message."""
 
 Message: TypeAlias = (
-    m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.GivenEntry
+    m.Begin | m.Dropped | m.End | m.CommandRecord | m.Anchor | m.ReceiptEntry | m.CommandPacket | m.GivenEntry
     | m.HistoryEntry | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms
-    | m.LinkEntry | m.EventEntry | m.DriveMessage
+    | m.LinkEntry | m.RunEvent | m.RoomEntry | m.ArcHistory | m.ArcChange | m.VirtualPosture | m.RealPosture
+    | m.MeasuredPosture | m.EstimatedPosture | m.CellsEntry
 )  # fmt: skip
 """What can be recorded."""
 

@@ -12,17 +12,19 @@ import msgspec
 import numpy as np
 
 from interfaces.messages.fields import plain
-from interfaces.messages.recording import Anchor, CommandEntry
+from interfaces.messages.recording import Anchor, CommandRecord
 from interfaces.recording.history import arm_timeline
 from interfaces.recording.poses import quaternions
 from interfaces.recording.recording import ARM, Recording
-from interfaces.recording.track import ESTIMATED, MEASURED, REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE
+from interfaces.recording.track import ESTIMATED, MEASURED
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import ArcTimeline
 from vrs.model import Array
 
 RADIANS = "rad"
 _POSE = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""))
+_POSTURE = (("x_m", "m"), ("y_m", "m"), ("theta_rad", "rad"))
+_DRIVE = (("v_m_per_s", "m/s"), ("w_rad_per_s", "rad/s"))
 _STAMPS = ("issued_at", "asked_at", "execute_at", "end")
 
 
@@ -46,21 +48,6 @@ class RecordingTable(NamedTuple):
     columns: tuple[TableColumn, ...]
 
 
-def arm_tables(recording: Recording) -> tuple[RecordingTable, ...]:
-    """An arm's tables; see `tables`."""
-    return (
-        _virtual(recording),
-        _real(recording),
-        commands_table(recording),
-        receipts_table(recording),
-        _segments(recording),
-        edits_table(recording),
-        _packets(recording),
-        link_table(recording),
-        events_table(recording),
-    )
-
-
 def table(name: str, *columns: TableColumn | Sequence[TableColumn]) -> RecordingTable:
     """A table of columns, and of lists of them."""
     found: list[TableColumn] = []
@@ -78,39 +65,42 @@ def _joints(name: str, q: Array) -> list[TableColumn]:
     return [TableColumn(f"{name}{i}_rad", RADIANS, float, column.tolist()) for i, column in enumerate(q.T, start=1)]
 
 
-def _pose(X: Array) -> list[TableColumn]:
-    """Position and unit quaternion of poses, (k, 4, 4); NaN where they aren't known."""
-    known = np.isfinite(X).all(axis=(1, 2))
-    values = np.full((len(X), 7), np.nan)
-    values[known, :3], values[known, 3:] = X[known, :3, 3], quaternions(X[known, :3, :3])
-    return [
-        TableColumn(name, unit, float, column.tolist())
-        for (name, unit), column in zip(_POSE, values.T, strict=True)
-    ]
+def _columns(names: tuple[tuple[str, str], ...], values: Array) -> list[TableColumn]:
+    pairs = zip(names, values.T, strict=True)
+    return [TableColumn(name, unit, float, column.tolist()) for (name, unit), column in pairs]
 
 
 def _tool(recording: Recording, q: Array) -> list[TableColumn]:
-    X = np.full((len(q), 4, 4), np.nan)
+    """Position and unit quaternion of an arm's tool; NaN where the joints aren't known."""
+    if recording.kind is not ARM:
+        return []
+    values = np.full((len(q), len(_POSE)), np.nan)
     known = np.isfinite(q).all(axis=1)
     if known.any():
-        X[known] = recording.model.forward(q[known])
-    return _pose(X)
+        X = recording.model.forward(q[known])
+        values[known, :3], values[known, 3:] = X[:, :3, 3], quaternions(X[:, :3, :3])
+    return _columns(_POSE, values)
+
+
+def _state(recording: Recording, q: Array) -> list[TableColumn]:
+    return _joints("q", q) if recording.kind is ARM else _columns(_POSTURE, q)
 
 
 def _virtual(recording: Recording) -> RecordingTable:
-    t = recording.track(VIRTUAL).t
+    t = recording.track(recording.kind.virtual).t
     q = recording.virtual(t)
-    return table("virtual", seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
+    return table("virtual", seconds("t", t.tolist()), _state(recording, q), _tool(recording, q))
 
 
 def _real(recording: Recording) -> RecordingTable:
-    track = recording.track(REAL)
+    track = recording.track(recording.kind.real)
+    told = track.reference
     return table(
         "real",
         seconds("t", track.t.tolist()),
         seconds("play", track.play.tolist()),
-        _joints("q", track.q),
-        _joints("reference", track.reference),
+        _state(recording, track.q),
+        _joints("reference", told) if recording.kind is ARM else _columns(_DRIVE, told),
         _tool(recording, track.q),
     )
 
@@ -118,7 +108,7 @@ def _real(recording: Recording) -> RecordingTable:
 def commands_table(recording: Recording) -> RecordingTable:
     """What the operator's engine was told."""
     entries = recording.commands
-    receipts = [entry.receipt if isinstance(entry, CommandEntry) else None for entry in entries]
+    receipts = [entry.receipt if isinstance(entry, CommandRecord) else None for entry in entries]
 
     def told(name: str) -> list[Any]:
         return [None if receipt is None else getattr(receipt, name) for receipt in receipts]
@@ -137,25 +127,25 @@ def commands_table(recording: Recording) -> RecordingTable:
         TableColumn("status", "", str, [None if status is None else str(status) for status in told("status")]),
         [seconds(name, told(name)) for name in _STAMPS],
         _joints("q", q),
-        TableColumn("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
+        TableColumn("refused", "", bool, [isinstance(entry, CommandRecord) and entry.refused for entry in entries]),
         TableColumn("reason", "", str, [_reason(entry) for entry in entries]),
         TableColumn("content", "", str, [_content(entry) for entry in entries]),
     )
 
 
-def _kind(entry: CommandEntry | Anchor) -> str:
+def _kind(entry: CommandRecord | Anchor) -> str:
     if isinstance(entry, Anchor):
         return "correction"
     return "undo" if entry.command is None else str(entry.command.__struct_config__.tag)
 
 
-def _reason(entry: CommandEntry | Anchor) -> str:
+def _reason(entry: CommandRecord | Anchor) -> str:
     if isinstance(entry, Anchor):
         return entry.reason
     return "" if entry.receipt is None else entry.receipt.reason
 
 
-def _content(entry: CommandEntry | Anchor) -> str | None:
+def _content(entry: CommandRecord | Anchor) -> str | None:
     """A command as JSON."""
     if isinstance(entry, Anchor) or entry.command is None:
         return None
@@ -262,52 +252,6 @@ def events_table(recording: Recording) -> RecordingTable:
     )
 
 
-_POSTURE = (("x_m", "m"), ("y_m", "m"), ("theta_rad", "rad"))
-_DRIVE = (("v_m_per_s", "m/s"), ("w_rad_per_s", "rad/s"))
-
-
-def mobile_tables(recording: Recording) -> tuple[RecordingTable, ...]:
-    """All tables of a recording: `docs/recording.md` describes their columns.
-
-    Raises:
-        FormatError: If a message in it makes no sense.
-    """
-    return (
-        _virtual_postures(recording),
-        _real_postures(recording),
-        _postures(recording, "measured", MEASURED),
-        _postures(recording, "estimated", ESTIMATED),
-        commands_table(recording),
-        receipts_table(recording),
-        _arcs(recording),
-        edits_table(recording),
-        link_table(recording),
-        events_table(recording),
-        _environment(recording),
-    )
-
-
-def _columns(names: tuple[tuple[str, str], ...], values: Array) -> list[TableColumn]:
-    pairs = zip(names, values.T, strict=True)
-    return [TableColumn(name, unit, float, column.tolist()) for (name, unit), column in pairs]
-
-
-def _virtual_postures(recording: Recording) -> RecordingTable:
-    t = recording.track(VIRTUAL_POSTURE).t
-    return table("virtual", seconds("t", t.tolist()), _columns(_POSTURE, recording.virtual(t)))
-
-
-def _real_postures(recording: Recording) -> RecordingTable:
-    track = recording.track(REAL_POSTURE)
-    return table(
-        "real",
-        seconds("t", track.t.tolist()),
-        seconds("play", track.play.tolist()),
-        _columns(_POSTURE, track.q),
-        _columns(_DRIVE, track.reference),
-    )
-
-
 def _postures(recording: Recording, name: str, topic: str) -> RecordingTable:
     track = recording.track(topic)
     return table(name, seconds("t", track.t.tolist()), _columns(_POSTURE, track.q))
@@ -349,9 +293,23 @@ def tables(recording: Recording) -> tuple[RecordingTable, ...]:
     """A recording's tables: `docs/recording.md` describes their columns.
 
     Raises:
-        FormatError: If the recording's robot isn't known.
+        FormatError: If the recording's robot isn't known, or a message in it makes no sense.
     """
-    return arm_tables(recording) if recording.kind is ARM else mobile_tables(recording)
+    arm = recording.kind is ARM
+    thought = () if arm else (("measured", MEASURED), ("estimated", ESTIMATED))
+    return (
+        _virtual(recording),
+        _real(recording),
+        *(_postures(recording, name, topic) for name, topic in thought),
+        commands_table(recording),
+        receipts_table(recording),
+        (_segments if arm else _arcs)(recording),
+        edits_table(recording),
+        *((_packets(recording),) if arm else ()),
+        link_table(recording),
+        events_table(recording),
+        *(() if arm else (_environment(recording),)),
+    )
 
 
 def write_csv(found: Iterable[RecordingTable], folder: Path) -> tuple[Path, ...]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandEntry
-from interfaces.recording.history import arm_timeline
+from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandPacket, CommandRecord, RunEvent
+from interfaces.recording.history import AnyTimeline, arm_timeline
 from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.run_recorders import extras_of
@@ -27,7 +27,7 @@ from interfaces.recording.track import (
 )
 from interfaces.runs.drive_run import DriveCase, DriveRun, facts_of, row_of
 from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
-from interfaces.runs.twin_run import ADAPTIVE, CommandPacket, RunEvent, TwinRun, TwinSamples, carried_out, waits
+from interfaces.runs.twin_run import ADAPTIVE, TwinRun, TwinSamples, carried_out, waits
 from interfaces.teleop import Correction
 from interfaces.teleop.architectures import Transport
 from robots.ipr.robot import Collision
@@ -35,7 +35,7 @@ from robots.onboard.playout import PlayoutConfig
 from vrs.comparison import PathMatch, match_paths, measured_rows, resample
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt, Status
-from vrs.model import Array, frozen_array
+from vrs.model import Array
 from vrs.timeline import Timeline
 
 MOST = 36_000
@@ -148,7 +148,7 @@ def figures(recording: Recording) -> RunFigures:
     reading = _Reading(recording)
     run = reading.run()
     attributions, offsets = reading.extras()
-    return RunFigures(run, attributions, offsets, (*reading.damage(), *reading.missing))
+    return RunFigures(run, attributions, offsets, (*_damage(recording), *reading.missing))
 
 
 def twin_run(recording: Recording) -> TwinRun:
@@ -171,6 +171,27 @@ def summary(recording: Recording) -> Json:
     return value | {"missing": list(missing)} if missing else value
 
 
+def _damage(recording: Recording) -> list[str]:
+    """What is missing from the file."""
+    found = []
+    if recording.damage:
+        found.append(f"the recording is damaged: {recording.damage}")
+    if recording.dropped:
+        counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(recording.dropped.items()))
+        found.append(f"messages for which the disk was too slow: {counts}")
+    return found
+
+
+def _shown(recording: Recording, again: Rerun, until: float, missing: list[str]) -> AnyTimeline:
+    """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
+    if not again.missing and not again.difference:
+        return again.timeline
+    missing.append(f"the virtual robot is as its recorded edits have it, since {again.difference or again.missing}")
+    if recording.certain < until:
+        missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
+    return recording.timeline
+
+
 class _Reading:
     """Puts a run together, and notes what is missing."""
 
@@ -178,16 +199,6 @@ class _Reading:
         self.recording, self.begin, self.end = recording, recording.session, recording.end
         self.missing: list[str] = []
         self._live = self.begin.driver == "live"
-
-    def damage(self) -> tuple[str, ...]:
-        """What is missing from the file."""
-        found = []
-        if self.recording.damage:
-            found.append(f"the recording is damaged: {self.recording.damage}")
-        if self.recording.dropped:
-            counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(self.recording.dropped.items()))
-            found.append(f"messages for which the disk was too slow: {counts}")
-        return tuple(found)
 
     def extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
         """What the recording was closed with."""
@@ -206,7 +217,7 @@ class _Reading:
         play, q_real, q_reference = self._real(track, t)
         measured = measured_rows(q_real)
         again = rerun(recording)
-        shown = self._shown(again)
+        shown = arm_timeline(_shown(recording, again, math.inf, self.missing))
         corrections = self._corrections()
         alone = self._alone() if corrections else shown
         if not np.isfinite(q_reference).all():
@@ -220,12 +231,7 @@ class _Reading:
         answers, messages = recording.receipts("real"), recording.messages()
         return TwinRun(
             model=model,
-            title=begin.title,
-            seed=0 if begin.seed is None else begin.seed,
-            delay=begin.delay,
-            offset=begin.offset,
-            service=begin.service,
-            link_loss=begin.link_loss,
+            session=begin,
             t=t,
             play=play,
             q_virtual=alone.sample(t),
@@ -287,25 +293,15 @@ class _Reading:
         reference = np.where(np.isfinite(reference), reference, shown.sample(play))
         return TwinSamples(t, alone.sample(t), shown.sample(t), alone.sample(play), q, reference)
 
-    def _shown(self, again: Rerun) -> Timeline:
-        """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
-        if not again.missing and not again.difference:
-            return arm_timeline(again.timeline)
-        why = again.difference or again.missing
-        self.missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
-        if self.recording.certain < math.inf:
-            self.missing.append(f"edits of the virtual robot's timeline after {self.recording.certain:.3f} s")
-        return arm_timeline(self.recording.timeline)
-
     def _corrections(self) -> tuple[Correction, ...]:
         anchors = (entry for entry in self.recording.commands if isinstance(entry, Anchor))
-        return tuple(Correction(made.at, made.end, frozen_array(made.error), made.reason) for made in anchors)
+        return tuple(Correction(made.at, made.end, made.error, made.reason) for made in anchors)
 
-    def _taken(self) -> list[tuple[CommandEntry, Receipt | None]]:
+    def _taken(self) -> list[tuple[CommandRecord, Receipt | None]]:
         """The commands that were carried out, with their receipts."""
         found = []
         for entry in self.recording.commands:
-            if isinstance(entry, CommandEntry):
+            if isinstance(entry, CommandRecord):
                 receipt = entry.receipt
                 if receipt is None or receipt.status is not Status.REJECTED:
                     found.append((entry, receipt))
@@ -324,7 +320,7 @@ class _Reading:
         # The operator's site doesn't know when a command reached the robot, but when it left the emulated link.
         messages = messages[np.argsort(messages[:, 0], kind="stable")]
         known = {receipt.command_id for receipt in answers}
-        found = []
+        found = list[CommandPacket]()
         for entry, receipt in self._taken():
             if receipt is None:
                 continue
@@ -334,6 +330,7 @@ class _Reading:
             answered = receipt.command_id in known
             found.append(
                 CommandPacket(
+                    len(found) + 1,
                     receipt.command_id,
                     entry.at,
                     float(there.min()) if answered and len(there) else None,
@@ -405,9 +402,7 @@ def driven(recording: Recording) -> Driven:
     Raises:
         FormatError: If the recording has too little of it: no samples of the real robot, no known robot.
     """
-    missing: list[str] = []
-    if recording.damage:
-        missing.append(f"the recording is damaged: {recording.damage}")
+    missing = _damage(recording)
     track = recording.track(REAL_POSTURE)
     t = _drive_grid(recording, track)
     missing += not_measured(track, t)
@@ -472,15 +467,7 @@ def _drive_grid(recording: Recording, track: SampleTrack) -> Array:
 
 def _virtual_postures(recording: Recording, t: Array, missing: list[str]) -> Array:
     """Postures of the virtual robot: as the commands make them, which is exact, or by its recorded edits."""
-    again = rerun(recording)
-    timeline = again.timeline
-    if again.missing or again.difference:
-        why = again.difference or again.missing
-        missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
-        timeline = recording.timeline
-        if recording.certain < t[-1]:
-            missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
-    virtual = timeline.sample(t)
+    virtual = _shown(recording, rerun(recording), float(t[-1]), missing).sample(t)
     if not matchable(virtual):
         raise FormatError(str(recording.path), f"its virtual robot drives further than {FARTHEST:g} m")
     return virtual

@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Literal
@@ -18,21 +19,20 @@ from interfaces.messages.recording import (
     Anchor,
     Begin,
     CellsEntry,
-    CommandEntry,
+    CommandPacket,
+    CommandRecord,
     Dropped,
     End,
-    EventEntry,
     GivenEntry,
     LinkEntry,
-    PacketEntry,
     ReceiptEntry,
     RoomEntry,
+    RunEvent,
 )
 from interfaces.recording.errors import Damage
-from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
-from interfaces.runs.twin_run import CommandPacket, RunEvent
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.model import Array, RobotModel, frozen_array
@@ -216,9 +216,9 @@ class Recording:
         return start, last
 
     @property
-    def commands(self) -> tuple[CommandEntry | Anchor, ...]:
+    def commands(self) -> tuple[CommandRecord | Anchor, ...]:
         """What the operator's engine was told, in order; numbers are missing where blocks are."""
-        return tuple(entry for entry in self._commands() if isinstance(entry, CommandEntry | Anchor))
+        return tuple(entry for entry in self._commands() if isinstance(entry, CommandRecord | Anchor))
 
     def receipts(self, site: Literal["virtual", "real"]) -> tuple[Receipt, ...]:
         """The newest truth about each command at a site, by command id."""
@@ -227,17 +227,15 @@ class Recording:
             if isinstance(entry, ReceiptEntry):
                 if entry.site == site:
                     found[entry.receipt.command_id] = entry.receipt
-            elif isinstance(entry, CommandEntry | GivenEntry) and site == "virtual" and entry.receipt is not None:
+            elif isinstance(entry, CommandRecord | GivenEntry) and site == "virtual" and entry.receipt is not None:
                 found[entry.receipt.command_id] = entry.receipt
         return tuple(found[command_id] for command_id in sorted(found))
 
     @property
     def packets(self) -> tuple[CommandPacket, ...]:
         """Commands on their way across the link, in the order of sending; what is newest about each."""
-        found = {entry.number: entry for entry in self._commands() if isinstance(entry, PacketEntry)}
-        return tuple(
-            CommandPacket(e.command_id, e.sent, e.arrived, e.real_id, e.lost) for _, e in sorted(found.items())
-        )
+        found = {entry.number: entry for entry in self._commands() if isinstance(entry, CommandPacket)}
+        return tuple(found[number] for number in sorted(found))
 
     @property
     def given(self) -> tuple[Known, ...]:
@@ -251,17 +249,16 @@ class Recording:
         except InvalidValueError as error:
             raise FormatError(str(self.path), f"a command from before it: {error}") from None
 
-    def _commands(self) -> list[CommandEntry | Anchor | ReceiptEntry | PacketEntry | GivenEntry]:
+    def _commands(self) -> list[CommandRecord | Anchor | ReceiptEntry | CommandPacket | GivenEntry]:
         return self.logs["/commands"].entries()
 
     @property
     def events(self) -> tuple[RunEvent, ...]:
         """What else happened, by time."""
-        entries: list[EventEntry] = self.logs["/events"].entries()
-        return tuple(RunEvent(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
+        return tuple(sorted(self.logs["/events"].entries(), key=attrgetter("t")))
 
     @property
-    def changes(self) -> tuple[AnyHistory | AnyChange, ...]:
+    def changes(self) -> tuple[AnyEdit, ...]:
         """The messages about the timeline, as they stand in the file."""
         return tuple(self.logs["/timeline"].entries())
 

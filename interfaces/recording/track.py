@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from interfaces.messages import recording as d
 from interfaces.messages.fields import rich
-from interfaces.messages.recording import RealSample, VirtualSample
+from interfaces.messages.recording import RealSample
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.mcap_reading import NUMBERS, Blocks
 from vrs.errors import FormatError, InvalidValueError
@@ -82,12 +82,9 @@ VIRTUAL, REAL = "/virtual/joints", "/real/joints"
 VIRTUAL_POSTURE, REAL_POSTURE = "/virtual/posture", "/real/posture"
 MEASURED, ESTIMATED = "/real/measured", "/virtual/estimated"
 _DECODERS: dict[str, msgspec.json.Decoder[Any]] = {
-    VIRTUAL: msgspec.json.Decoder(list[VirtualSample]),
-    REAL: msgspec.json.Decoder(list[RealSample]),
-    VIRTUAL_POSTURE: msgspec.json.Decoder(list[d.VirtualPosture]),
-    REAL_POSTURE: msgspec.json.Decoder(list[d.RealPosture]),
-    MEASURED: msgspec.json.Decoder(list[d.MeasuredPosture]),
-    ESTIMATED: msgspec.json.Decoder(list[d.EstimatedPosture]),
+    channel.topic: msgspec.json.Decoder(list[channel.kinds[0]])  # type: ignore[name-defined]
+    for channel in CHANNELS
+    if channel.topic in {VIRTUAL, REAL, VIRTUAL_POSTURE, REAL_POSTURE, MEASURED, ESTIMATED}
 }
 
 

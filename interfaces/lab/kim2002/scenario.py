@@ -110,15 +110,15 @@ def home(rng: np.random.Generator) -> Room:
     room = place("home")
     front = replace(room.doors[0], times=(0.0, OPENS, OPENS + 2.0), shares=(0.0, 0.0, 1.0))
     inside = tuple(replace(door, times=(0.0,), shares=(1.0,), repeat=False) for door in room.doors[1:])
-    guest = Person("guest", 0.2, 1.7, (0.0, BROUGHT - 12, BROUGHT - 8, KEY, KEY + 4), (
-        (4.8, 7.95), (4.8, 7.95), (4.8, 7.3), (4.8, 7.3), (4.8, 7.95)))  # fmt: skip
+    times = 0.0, BROUGHT - 12, BROUGHT - 8, KEY, KEY + 4
+    guest = Person("guest", 0.2, 1.7, times, (4.8,) * 5, (7.95, 7.95, 7.3, 7.3, 7.95))
     speed, late = float(rng.uniform(0.4, 0.7)), float(rng.uniform(-1.5, 1.5))
-    places = ((1.5, 2.6), (1.55, 4.2), (2.35, 4.7), (3.1, 4.05))
-    times = [0.0]
-    for a, b in pairwise(places):
-        times.append(times[-1] + math.dist(a, b) / speed)
-    begins = KEY + _MEETS + late - times[2]
-    walker = Person("passer-by", 0.22, 1.7, tuple(t + begins for t in times), places)
+    x, y = (1.5, 1.55, 2.35, 3.1), (2.6, 4.2, 4.7, 4.05)
+    reached = [0.0]
+    for a, b in pairwise(zip(x, y, strict=True)):
+        reached.append(reached[-1] + math.dist(a, b) / speed)
+    begins = KEY + _MEETS + late - reached[2]
+    walker = Person("passer-by", 0.22, 1.7, tuple(t + begins for t in reached), x, y)
     return replace(room, doors=(front, *inside), people=(guest, walker))
 
 

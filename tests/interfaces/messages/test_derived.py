@@ -111,7 +111,7 @@ class State(control.State, frozen=True, omit_defaults=True, gc=False, eq=False, 
     """Of the motors, as {0} has it [°C]."""
 
 
-class Event(recording.EventEntry, frozen=True):
+class Event(recording.RunEvent, frozen=True):
     """An event, warm."""
 
     warmth: Annotated[float, Meta(ge=-50, le=150)] = 20.0

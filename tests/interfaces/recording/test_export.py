@@ -139,9 +139,9 @@ def test_what_was_refused_taken_back_lost_or_sent_again_is_told(tmp_path):
     messages, _, _ = recorded.motion(1.5)
     move = MotionCommand(JointTarget(recorded.HOME))
     messages += [
-        (1.5, m.CommandEntry(3, 1.5, None, None)),
-        (1.5, m.CommandEntry(4, 1.5, move, None, refused=True)),
-        (1.5, m.PacketEntry(3, 7, 1.5, 1.6, 5)),
+        (1.5, m.CommandRecord(3, 1.5, None, None)),
+        (1.5, m.CommandRecord(4, 1.5, move, None, refused=True)),
+        (1.5, m.CommandPacket(3, 7, 1.5, 1.6, 5)),
     ]
     path = recorded.write(tmp_path / "run.mcap", messages, end=1.5)
     with open_recording(path) as recording:

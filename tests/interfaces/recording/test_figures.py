@@ -102,7 +102,7 @@ READY
     recorder.finish()
     with open_recording(tmp_path / "run.mcap") as recording:
         assert to_json(summary(recording)) == to_json(summarize(played.run))
-        assert recording.session.title == played.run.title
+        assert recording.session.title == played.run.session.title
 
 
 def test_what_other_runs_said_comes_back(tmp_path):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from interfaces.messages.recording import ArcChange
 from interfaces.recording.history import Chain, changed_arcs, edit_entries, whole, whole_entries
