@@ -378,8 +378,7 @@ class SegmentedEntry(Entry, frozen=True, omit_defaults=True, gc=False, eq=False)
         given = self.segments  # type: ignore[attr-defined]
         if given and type(given[0]) is self.row:
             dof = self.dof
-            found = placed(given, UNSAID, lambda row, start: row.segment(start, dof))
-            set_field(self, "segments", tuple(found))
+            set_field(self, "segments", tuple([row.segment(start, dof) for start, row in placed(given, UNSAID)]))
 
     def as_written(self) -> Self:
         """The same as it stands in the file; the start of the first segment is always given."""

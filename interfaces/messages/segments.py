@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias
 
@@ -91,7 +91,10 @@ def rows(segments: Sequence[PolynomialSegment], packed: bool) -> tuple[int, floa
 
 
 def _packed(segment: PolynomialSegment, start: float | None = None) -> tuple[Any, ...]:
-    row = segment.duration, segment.command_id, segment.coefficients.astype(_DOUBLE, copy=False).tobytes()
+    a = segment.coefficients
+    # Looking costs less than a conversion that has nothing to do.
+    data = (a if a.dtype is _DOUBLE else a.astype(_DOUBLE)).tobytes()
+    row = segment.duration, segment.command_id, data
     return row if start is None else (*row, start)
 
 
@@ -110,20 +113,18 @@ def written(segments: Iterable[Any], row: Callable[..., Any], end: float) -> tup
     """
     found = []
     for segment in segments:
-        start = segment.start
-        found.append(row(segment) if start == end else row(segment, start))
-        end = start + segment.duration
+        found.append(row(segment) if segment.start == end else row(segment, segment.start))
+        end = segment.start + segment.duration
     return tuple(found)
 
 
-def placed(rows: Iterable[Any], start: float, segment: Callable[[Any, float], Any]) -> list[Any]:
-    """The opposite: the segments that rows stand for, each made of its row and its start [s]."""
-    found = []
+def placed(rows: Iterable[Any], start: float) -> Iterator[tuple[float, Any]]:
+    """The opposite: each row with its start, where none is given the end of the one before [s]."""
     for row in rows:
-        start = start if row.start is None else row.start
-        found.append(segment(row, start))
+        if row.start is not None:
+            start = row.start
+        yield start, row
         start += row.duration
-    return found
 
 
 def segments_of(dof: int, start: float, wires: Iterable[SegmentRow]) -> tuple[PolynomialSegment, ...]:
@@ -132,14 +133,12 @@ def segments_of(dof: int, start: float, wires: Iterable[SegmentRow]) -> tuple[Po
     Raises:
         InvalidValueError: If the coefficients don't fit the joints, or aren't finite.
     """
-
-    def segment(wire: SegmentRow, start: float) -> PolynomialSegment:
+    found = []
+    for at, wire in placed(wires, start):
         given = wire.coefficients
         a = coefficients_from_bytes(given, dof) if isinstance(given, bytes) else coefficients_from_lists(given, dof)
-        return known_segment(start, wire.duration, a, wire.command_id)
-
-    found: list[PolynomialSegment] = placed(wires, start, segment)
-    if found and not np.isfinite(np.concatenate([segment.coefficients.ravel() for segment in found])).all():
+        found.append(known_segment(at, wire.duration, a, wire.command_id))
+    if found and not np.isfinite(np.concatenate([segment.coefficients for segment in found])).all():
         raise InvalidValueError("coefficients", "NaN or infinity", "finite")
     return tuple(found)
 
