@@ -43,8 +43,9 @@ def messages() -> list[MessageDescription]:
 
 
 def recorded() -> list[MessageDescription]:
-    """The messages of a recording."""
-    return [described(kind) for channel in CHANNELS for kind in channel.kinds]
+    """The messages of a recording; one without a tag is called as its channel."""
+    found = ((channel, described(kind)) for channel in CHANNELS for kind in channel.kinds)
+    return [one if one.tag else one._replace(name=channel.topic) for channel, one in found]
 
 
 def parts(message: MessageDescription) -> Iterator[MessageDescription]:
@@ -372,7 +373,7 @@ def _sizes(kind: Any) -> str:
 
 # The documents' tables.
 
-MARKED = re.compile(r"<!-- (fields|messages|roles|words)(?:: ([\w -]+))? -->\n.*?<!-- end -->", re.S)
+MARKED = re.compile(r"<!-- (fields|messages|roles|topics|words)(?:: ([\w ./-]+))? -->\n.*?<!-- end -->", re.S)
 
 
 def document(text: str, found: Iterable[MessageDescription]) -> str:
@@ -394,7 +395,10 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         elif what == "words":
             rows = _words_table(choices[name])
         elif what == "fields":
-            rows = _fields_table(name, tables[name], tags)
+            first, *inner = name.split(".")
+            rows = _fields_table(name, _part(tables[first], inner), tags)
+        elif what == "topics":
+            rows = _topics_table(tags)
         else:
             rows = _messages_table([tables[one] for one in name.split()], tags)
         head = f"<!-- {what}{f': {name}' if name else ''} -->"
@@ -402,6 +406,23 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         return "\n".join([head, "", *rows, "", "<!-- end -->"])
 
     return MARKED.sub(table, text)
+
+
+def _part(message: MessageDescription, inner: list[str]) -> MessageDescription:
+    """What stands in a field of a field of a message, and so on."""
+    for name in inner:
+        *_, message = _within(next(field.type for field in message.fields if field.name == name))
+    return message
+
+
+def _topics_table(tags: dict[str, str]) -> list[str]:
+    rows = ["| topic | message | of | |", "|---|---|---|---|"]
+    for channel in CHANNELS:
+        for kind in channel.kinds:
+            one = described(kind)
+            of = " and ".join(["an arm"] * (kind in channel.arm) + ["a mobile robot"] * (kind in channel.mobile))
+            rows.append(_row(f"`{channel.topic}`", f"`{one.tag or channel.schema}`", of, _told(one.text, tags)))
+    return rows
 
 
 def _fields_table(name: str, message: MessageDescription, tags: dict[str, str]) -> list[str]:
@@ -423,8 +444,9 @@ def _row(*cells: str) -> str:
 
 
 def _told(text: str, tags: dict[str, str]) -> str:
-    """A docstring as the protocol's document has it: messages have other names there."""
-    return re.sub(r"`(\w+)`", lambda match: f"`{tags.get(match[1], match[1])}`", text).removesuffix(".")
+    """A docstring as documents have it: messages have other names there, and what is None is left out."""
+    text = re.sub(r"`(\w+)`", lambda match: f"`{tags.get(match[1], match[1])}`", text).removesuffix(".")
+    return re.sub(r"\bNone\b", lambda match: "absent" if match.start() else "Absent", text)
 
 
 def _words_table(kind: type[enum.Enum]) -> list[str]:
