@@ -388,6 +388,8 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
     choices = {one.cls.__name__: one.cls for part in _each(known) for field in part.fields
                for one in alternatives(field.type) if isinstance(one, kinds.EnumType)}  # fmt: skip
 
+    apart = {_map_of(_part(name, tables)): f"`{name}`" for _, name in MARKED.findall(text) if "." in name}
+
     def table(match: re.Match[str]) -> str:
         what, name = match[1], match[2]
         if what == "roles":
@@ -395,8 +397,7 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         elif what == "words":
             rows = _words_table(choices[name])
         elif what == "fields":
-            first, *inner = name.split(".")
-            rows = _fields_table(name, _part(tables[first], inner), tags)
+            rows = _fields_table(name, _part(name, tables), tags, apart)
         elif what == "topics":
             rows = _topics_table(tags)
         else:
@@ -408,26 +409,33 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
     return MARKED.sub(table, text)
 
 
-def _part(message: MessageDescription, inner: list[str]) -> MessageDescription:
-    """What stands in a field of a field of a message, and so on."""
-    for name in inner:
-        *_, message = _within(next(field.type for field in message.fields if field.name == name))
+def _part(name: str, tables: dict[str, MessageDescription]) -> MessageDescription:
+    """A message, or what stands in a field of one, as in `begin.drive`."""
+    first, *inner = name.split(".")
+    message = tables[first]
+    for step in inner:
+        *_, message = _within(next(field.type for field in message.fields if field.name == step))
     return message
 
 
 def _topics_table(tags: dict[str, str]) -> list[str]:
-    rows = ["| topic | message | of | |", "|---|---|---|---|"]
+    rows = ["| topic | message | robot | |", "|---|---|---|---|"]
     for channel in CHANNELS:
         for kind in channel.kinds:
             one = described(kind)
-            of = " and ".join(["an arm"] * (kind in channel.arm) + ["a mobile robot"] * (kind in channel.mobile))
+            of = "mobile" if kind not in channel.arm else "any" if kind in channel.mobile else "arm"
             rows.append(_row(f"`{channel.topic}`", f"`{one.tag or channel.schema}`", of, _told(one.text, tags)))
     return rows
 
 
-def _fields_table(name: str, message: MessageDescription, tags: dict[str, str]) -> list[str]:
+def _fields_table(name: str, message: MessageDescription, tags: dict[str, str], apart: dict[str, str]) -> list[str]:
     rows = [f"| `{name}` | | |", "|---|---|---|"]
-    rows += [_row(f"`{field.name}`", _what(field), _told(field.text, tags)) for field in message.fields]
+    for field in message.fields:
+        what = _what(field)
+        for part, heading in apart.items():
+            # A part that has a table of its own is called as that.
+            what = what.replace(part, heading)
+        rows.append(_row(f"`{field.name}`", what, _told(field.text, tags)))
     return rows
 
 
@@ -525,12 +533,18 @@ def _one_what(kind: kinds.Type) -> str:
             return f"[{', '.join(f'`{field.encode_name}`' for field in fields)}]"
         case kinds.DictType(_, item):
             return f"map of {_several(item)}"
+        case kinds.AnyType():
+            return "anything"
     inner = described(kind)
     if inner.is_array:
         return f"[{', '.join(f'`{field.name}`' for field in inner.fields)}]"
     if inner.tag:
         return f"`{inner.tag}`"
-    names = (f"`{field.name}`" + ("" if field.required else f" ({_default(field)})") for field in inner.fields)
+    return _map_of(inner)
+
+
+def _map_of(part: MessageDescription) -> str:
+    names = (f"`{field.name}`" + ("" if field.required else f" ({_default(field)})") for field in part.fields)
     return "map of " + ", ".join(names)
 
 
@@ -543,7 +557,7 @@ def _real(kind: kinds.FloatType) -> str:
     low, high = bounds(kind)
     if kind.gt is not None:
         return f"real > {_figure(kind.gt)}" + ("" if high in {None, 1e9} else f" up to {_figure(high)}")
-    if (low, high) in {(None, None), (-1e9, 1e9)}:
+    if (low, high) in {(None, None), (-1e9, 1e9), (-sys.float_info.max, sys.float_info.max)}:
         return "real"
     if high in {None, 1e9}:
         return f"real ≥ {_figure(low)}"

@@ -62,18 +62,23 @@ class GridFacts(Wire, frozen=True, omit_defaults=True, gc=False):
     """The cells of the virtual environment."""
 
     shape: Annotated[list[Annotated[int, Meta(ge=1, le=4096)]], Meta(min_length=2, max_length=2)]
+    """Cells along x and along y."""
     cell: Size
     """Side of a cell [m]."""
     origin: Place
+    """Lower left corner of the first cell [m]."""
 
 
 class DriveFacts(Wire, frozen=True, omit_defaults=True, gc=False):
     """How a mobile robot's run was set up."""
 
     body: Literal["ipr", "micro", "bare"]
+    """Which robot of its family."""
     architecture: Word
+    """By its name, as `vrs lab --architecture` takes it."""
     transport: Literal["stream", "datagrams"]
     operator: Word
+    """Who drove, as `vrs lab --operator` takes it."""
     length: Seconds
     """For how long the operator drove [s]."""
     period: Seconds
@@ -81,25 +86,35 @@ class DriveFacts(Wire, frozen=True, omit_defaults=True, gc=False):
     position: Word
     """What told the real robot where it was."""
     grid: GridFacts | None = None
-    """None where there was no virtual environment."""
+    """Of the virtual environment; None where there was none."""
 
 
 class ThingEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """A block, or a column where it has a radius."""
 
     name: Word
+    """A wall's begins with `wall`."""
     x: Length
+    """Of its middle [m]."""
     y: Length
+    """[m]."""
     height: Size
+    """[m]."""
     length: Size | None = None
+    """Along its own first axis [m]; None of a column."""
     width: Size | None = None
+    """Across [m]; None of a column."""
+    # Written even where it's zero: a plain default is left out only where it's the very same object.
     angle: Finite = field(default_factory=float)
-    """Written even where it's zero: a plain default is left out only where it's the very same object."""
+    """Of its first axis [rad]."""
     radius: Size | None = None
+    """Of a column [m]; None of a block."""
     known: bool = True
+    """Whether the operator's map has it."""
     start: Finite | None = None
-    """It stands there from then on [s]; None for ever."""
+    """It stands there from then on [s]; None: it always did."""
     end: Finite | None = None
+    """It stands there until then [s]; None: for ever."""
 
 
 class RoomEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="room"):
@@ -107,19 +122,26 @@ class RoomEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="room"):
 
     name: Word
     length: Size
+    """Along x [m]."""
     width: Size
+    """Along y [m]."""
     things: Annotated[tuple[ThingEntry, ...], Meta(max_length=MOST_THINGS)] = ()
-    """Blocks, then columns."""
+    """Blocks, walls among them, then columns."""
     people: Annotated[tuple[Person, ...], Meta(max_length=MOST_THINGS)] = ()
+    """With the paths that they walk."""
     doors: Annotated[tuple[Door, ...], Meta(max_length=MOST_THINGS)] = ()
+    """With their timetables."""
 
 
 class PostureSample(Wire, frozen=True, omit_defaults=True, gc=False):
     """Where a robot is, or is thought to be, at a time."""
 
     t: Time
+    """User time [s]."""
     x: Length
+    """[m]."""
     y: Length
+    """[m]."""
     theta: Length
     """[rad]."""
 
@@ -130,19 +152,19 @@ class PostureSample(Wire, frozen=True, omit_defaults=True, gc=False):
 
 
 class VirtualPosture(PostureSample, frozen=True, omit_defaults=True, gc=False):
-    """The virtual robot as it's shown: a comfort for other readers, ours compute it."""
+    """The virtual robot as it's shown, 20 times a second: a comfort for other readers, ours compute it."""
 
     edit: Count = 0
     """Number of the newest edit."""
 
 
 class RealPosture(PostureSample, frozen=True, omit_defaults=True, gc=False, kw_only=True):
-    """The real robot, truly; and what it's told to drive from then on."""
+    """The real robot, truly, 20 times a second; and what it's told to drive from then on."""
 
     v: Speed
-    """[m/s]."""
+    """What it's told to drive [m/s]."""
     w: Speed
-    """[rad/s]."""
+    """What it's told to turn [rad/s]."""
     D: Finite | None = None
     """How far behind the operator it wants to be [s]; None where the architecture has no such thing."""
 
@@ -173,8 +195,11 @@ class CellsEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """Cells of the virtual environment, beside the known map, that came and went since the entry before."""
 
     t: Time
+    """User time [s]."""
     added: Cells = ()
+    """Two numbers a cell: along x, along y."""
     gone: Cells = ()
+    """Two numbers a cell: along x, along y."""
 
 
 FORMAT = "vrs-recording/1"
@@ -194,9 +219,11 @@ class Late(Wire, frozen=True, omit_defaults=True, gc=False):
     newest: Count
     """Highest command id given out."""
     qd_max: Joints
-    """Limits in force [rad/s], and so on."""
+    """Limit of speed in force [rad/s]."""
     qdd_max: Joints
+    """Of acceleration [rad/s²]."""
     qddd_max: Joints
+    """Of jerk [rad/s³]."""
     steered: Number | None = None
     """The command that the next steering input goes on with."""
     steered_at: Time = 0.0
@@ -204,28 +231,35 @@ class Late(Wire, frozen=True, omit_defaults=True, gc=False):
 
 
 class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_only=True):
-    """How the run was set up; repeated now and then, so that no damage makes a recording nameless."""
+    """How the run was set up; repeated every 10 s, the first counts: no damage makes a recording nameless."""
 
     format: Literal["vrs-recording/1"] = FORMAT  # type: ignore[assignment]
+    """Name and version of what the messages mean."""
     t: Time
     """Where the recording begins [s]."""
     robot: Word
-    """As in `robots.<name>`."""
+    """As in `robots.NAME`."""
     driver: Literal["laboratory", "live"]
+    """Whether it ran in virtual time."""
     title: Text
+    """For people."""
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] | None = None
     """Of everything random in the run; None where nothing is."""
     delay: Text
     """Delay profile, as it was asked for: one of a file has its path."""
     offset: Word
-    """`adaptive`, `fixed:S`, or `OWN`; `none` of a mobile robot whose architecture has none."""
+    """How far the real robot plays behind: `adaptive`, `fixed:S`, or `the robot's own`; `none` of a mobile robot
+    whose architecture has none."""
     service: Word
+    """How the link delivers."""
     link_loss: Word
+    """What the robot does when nothing fresh is heard: `halt`, `hold`, or `the robot's own`."""
     step: Seconds
     """Between two samples [s]."""
     q: Joints
     """Joints of both robots at the start [rad]; of a mobile robot its posture."""
     lateness: Word
+    """What becomes of commands that come too late: `postpone`, `reject`."""
     software: Word
     """What wrote the file, with its version."""
     began: Stamp | None = None
@@ -233,9 +267,9 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     sampled: Seconds | None = None
     """Between two samples of a live arm [s]; None where they came with its reports alone."""
     late: Late | None = None
-    """None where nothing had been commanded yet."""
+    """How the engine stood; None where nothing had been commanded yet."""
     drive: DriveFacts | None = None
-    """Of a mobile robot; None of an arm."""
+    """How a mobile robot's run was set up; None of an arm."""
 
 
 class Drop(Wire, frozen=True, omit_defaults=True, gc=False):
@@ -243,19 +277,23 @@ class Drop(Wire, frozen=True, omit_defaults=True, gc=False):
 
     topic: Word
     count: Count
+    """Since the beginning."""
 
 
 class Dropped(Entry, frozen=True, omit_defaults=True, gc=False, tag="dropped"):
     """How many messages weren't recorded since the beginning, because the disk took no more."""
 
     t: Time
+    """User time [s]."""
     counts: tuple[Drop, ...]
+    """By topic."""
 
 
 class End(Entry, frozen=True, omit_defaults=True, gc=False, tag="end"):
     """The recording was closed in order."""
 
     t: Time
+    """User time [s]."""
     extras: dict[str, Any] | None = None
     """What the run's summary holds besides what can be computed from the recording."""
 
@@ -268,7 +306,7 @@ class CommandRecord(Entry, frozen=True, omit_defaults=True, gc=False, eq=False, 
     at: Time
     """The engine's clock, exactly [s]."""
     command: Command | None = None
-    """None takes back the newest accepted command."""
+    """None: it takes back the newest accepted one."""
     receipt: Receipt | None = None
     """None where the command gives none."""
     refused: bool = False
@@ -279,7 +317,9 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
     """A command from before the recording that wasn't over when it began, or by which the arm had moved last."""
 
     t: Time
+    """Where the recording begins [s]."""
     receipt: Receipt
+    """As it was then."""
     command: Command | None = None
     """None where it's no motion command."""
     smooth: bool = False
@@ -307,10 +347,13 @@ class SegmentEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """A segment: a row of `dof` numbers a power, ascending, one row after the other."""
 
     duration: Seconds
+    """[s]."""
     coefficients: Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
+    """Rows of one number a joint, by ascending power of t − start, one row after the other."""
     command_id: CommandId | None = None
+    """None of a hold."""
     start: Time | None = None
-    """[s]; None where the segment before ends."""
+    """[s]; None: where the segment before ends."""
 
     @classmethod
     def of(cls, segment: PolynomialSegment, start: float | None = None) -> SegmentEntry:
@@ -335,16 +378,17 @@ class ArcEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """An arc at constant speeds."""
 
     duration: Seconds
+    """[s]."""
     posture: Posture
-    """At its start."""
+    """x, y, θ at its start [m, m, rad]."""
     v: Speed
     """[m/s]."""
     w: Speed
     """[rad/s]."""
     command_id: CommandId | None = None
-    """None for standing."""
+    """None of standing."""
     start: Time | None = None
-    """[s]; None where the arc before ends."""
+    """[s]; None: where the arc before ends."""
 
     @classmethod
     def of(cls, arc: ArcSegment, start: float | None = None) -> ArcEntry:
@@ -399,19 +443,26 @@ def following(segments: Iterable[S], start: float) -> Iterator[S]:
 
 
 class Anchor(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="anchor", kw_only=True):
-    """The virtual robot joined the real one's plan, because the two had parted."""
+    """The virtual robot joined the real one's plan, which stands here whole, because the two had parted."""
 
     number: Number
+    """Counts a recording's commands and anchors, from 1."""
     at: Time
+    """The engine's clock, exactly [s]."""
     initial: Array
+    """Before the start of that plan [rad]."""
     start: Time
+    """Origin of that plan [s]."""
     version: Count
+    """Of that plan."""
     segments: Polynomials = ()
+    """That plan's."""
     end: Time
     """Until when it takes to come back [s]."""
     error: Array
     """By how much the virtual robot was off [rad], (n,)."""
     reason: Text
+    """Why they had parted, one line."""
     timeline_version: Count | None = None
     """Version of the operator's timeline afterwards."""
 
@@ -429,7 +480,9 @@ class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receip
     """The newest truth about a command at one of the sites."""
 
     t: Time
+    """User time [s]."""
     site: Site
+    """Whose truth."""
     receipt: Receipt
 
 
@@ -456,9 +509,11 @@ class HistoryEntry(
     """A part of the whole timeline with an edit, as the virtual robot shows it."""
 
     edit: Count
+    """Its number, from 1; 0 is what the recording begins with."""
     at: Time
     """The engine's clock when the timeline was that [s]."""
     version: Count
+    """Of the timeline."""
     initial: Array
     """Before the start of the timeline [rad]."""
     start: Time
@@ -471,52 +526,71 @@ class HistoryEntry(
 
 
 class ArcHistory(HistoryEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="arcs", kw_only=True):
-    """The same of a mobile robot."""
+    """A part of the whole timeline with an edit, of a mobile robot."""
 
     row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
     initial: Posture  # type: ignore[assignment]
-    """Before the start of the timeline."""
+    """x, y, θ before the start of the timeline [m, m, rad]."""
     segments: Arcs = ()  # type: ignore[assignment]
 
 
 class ChangeEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change", kw_only=True):
-    """An edit of the timeline, as `interfaces.messages.Change`."""
+    """An edit: the first `first` segments stay, `segments` follow, then those of the base from `tail` on."""
 
     edit: Number
+    """Its number, from 1."""
     base: Count
+    """Number of the edit that it builds on."""
     at: Time
     """The engine's clock, exactly [s]."""
     version: Count
     """Of the timeline afterwards."""
     first: Count
+    """So many segments stay."""
     dof: Count
+    """Joints."""
     segments: Polynomials = ()
+    """New ones."""
     tail: Count | None = None
+    """The base's segments from this one on follow; None: none do."""
     tail_start: Time
+    """When those begin [s]."""
     end: Time
+    """Of the timeline afterwards [s]."""
     command_id: CommandId | None = None
+    """Who made it; None: a correction."""
 
 
 class ArcChange(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="drive", kw_only=True):
-    """The same of a mobile robot: the first `first` arcs stay, these follow."""
+    """An edit of a mobile robot's timeline: the first `first` arcs stay, `segments` follow."""
 
     row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
     dof: ClassVar[int] = 3
     edit: Number
+    """Its number, from 1."""
     base: Count
+    """Number of the edit that it builds on."""
     at: Time
+    """The engine's clock, exactly [s]."""
     version: Count
+    """Of the timeline afterwards."""
     first: Count
+    """So many arcs stay."""
     segments: Arcs = ()
+    """New ones."""
     end: Time
+    """Of the timeline afterwards [s]."""
     command_id: CommandId | None = None
+    """Who made it."""
 
 
 class VirtualSample(Wire, frozen=True, omit_defaults=True, gc=False):
     """Joints of the virtual robot as it's shown: a comfort for other readers, ours compute them."""
 
     t: Time
+    """User time [s]."""
     q: Joints
+    """[rad]."""
     edit: Count
     """Number of the newest edit."""
 
@@ -525,22 +599,27 @@ class RealSample(Wire, frozen=True, omit_defaults=True, gc=False):
     """Joints of the real robot as measured."""
 
     t: Time
+    """User time [s]."""
     play: Time
     """Where its timeline is played [s]."""
     q: Joints
+    """[rad]."""
     reference: Joints | None = None
-    """What its own timeline asked for; None where that isn't known."""
+    """What its own timeline asked for [rad]; None where that isn't known."""
 
 
 class LinkEntry(Wire, frozen=True, omit_defaults=True, gc=False):
     """A packet of the link whose fate is known."""
 
     direction: Direction
+    """`forward` goes to the robot."""
     sent: Time
+    """User time [s]."""
     arrived: Time | None = None
-    """[s]; None where it was lost, or still on its way when the recording ended."""
+    """User time [s]; None where it was lost, or still on its way when the recording ended."""
     lost: bool = False
     attempts: Count = 1
+    """How often it was sent."""
     size: Count = 0
     """[byte]; 0 where that wasn't recorded."""
 
@@ -551,7 +630,8 @@ class RunEvent(Wire, frozen=True, omit_defaults=True, gc=False, order=True):
     t: Time
     """User time [s]."""
     kind: Word
-    """`payload`, `release`, `late`, `lost`, `slowed`, `waited`, `corrected`, `halted`, `diverged`, `unfinished`."""
+    """`payload`, `release`, `late`, `lost`, `slowed`, `waited`, `corrected`, `halted`, `diverged`, `unfinished`;
+    live `up`, `down`, `followed`; of a mobile robot `collision`, `learned`, `forgot`."""
     text: Text
     """What happened, one line."""
 

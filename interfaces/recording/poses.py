@@ -70,11 +70,11 @@ class PoseInFrame(Wire, frozen=True, gc=False):
 
 
 class VirtualPose(PoseInFrame, frozen=True, gc=False):
-    """Of the virtual robot's last link, or of the mobile robot."""
+    """The virtual robot's last link in `base`, or the mobile robot in `world`, to 1e-9; at most 6 a second."""
 
 
 class RealPose(PoseInFrame, frozen=True, gc=False):
-    """Of the real robot's last link, or of the mobile robot."""
+    """The same of the real robot."""
 
 
 class FrameTransform(Wire, frozen=True, gc=False):
@@ -88,7 +88,7 @@ class FrameTransform(Wire, frozen=True, gc=False):
 
 
 class FrameTransforms(Wire, frozen=True, gc=False):
-    """`foxglove.FrameTransforms`."""
+    """Links `virtual/1` … `real/6`, each in the one before, or robots in `world`, to 1e-6; at most 6 a second."""
 
     transforms: tuple[FrameTransform, ...]
 

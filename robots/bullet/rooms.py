@@ -44,11 +44,8 @@ Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Size = Annotated[float, Meta(gt=0, le=1e6)]
 """[m]."""
 Timetable = Annotated[tuple[Time, ...], Meta(min_length=1, max_length=MOST_POINTS)]
-"""Ascending [s]."""
 Way = Annotated[tuple[Length, ...], Meta(min_length=1, max_length=MOST_POINTS)]
-"""A coordinate at each time [m]."""
 Shares = Annotated[tuple[Annotated[float, Meta(ge=0, le=1)], ...], Meta(min_length=1, max_length=MOST_POINTS)]
-"""A share at each time."""
 
 
 def between(times: tuple[float, ...], t: float, *, repeat: bool) -> tuple[int, int, float]:
@@ -125,10 +122,15 @@ class Person(Record, frozen=True, omit_defaults=True, gc=False):
 
     name: Name
     radius: Size
+    """[m]."""
     height: Size
+    """[m]."""
     times: Timetable
+    """Ascending [s]."""
     x: Way
+    """Where at each time [m]."""
     y: Way
+    """[m]."""
     repeat: bool = False
     """Whether the path begins again when it ended; it then ends where it began."""
 
@@ -155,15 +157,19 @@ class Door(Record, frozen=True, omit_defaults=True, gc=False):
     x: Length
     """Of its first end, where the hinge is [m]."""
     y: Length
+    """[m]."""
     length: Size
     """Of the leaf, as wide as the doorway [m]."""
     angle: Length
     """From the first end to the other when it's closed [rad]."""
     thickness: Size
+    """[m]."""
     height: Size
+    """[m]."""
     swing: Length
     """Turn when it's quite open, to the left positive [rad]; of a hinged door."""
     times: Timetable
+    """Ascending [s]."""
     shares: Shares
     """How far it's open at each time, 0 closed, 1 open."""
     repeat: bool = False

@@ -194,6 +194,20 @@ def test_a_documents_tables_say_who_may_send_what_and_what_words_mean() -> None:
         generate.document("<!-- fields: warp -->\n<!-- end -->", generate.messages())
 
 
+def test_tables_of_recordings_name_topics_and_parts_and_what_is_left_out() -> None:
+    text = "".join(f"<!-- {what} -->\n<!-- end -->\n" for what in ("topics", "fields: begin", "fields: begin.late"))
+    found = generate.document(text, generate.recorded())
+    assert "\n| `/timeline` | `arcs` | mobile | A part of the whole timeline" in found
+    assert "\n| `/real/joints` | `vrs.RealJoints` | arm | Joints of the real robot as measured |\n" in found
+    late = "| `late` | `begin.late` (absent) | How the engine stood; absent where nothing had been commanded yet |"
+    assert f"\n{late}\n" in found
+    assert "\n| `begin.late` | | |\n|---|---|---|\n| `newest` | count |" in found
+    samples = generate.document("<!-- fields: /real/joints -->\n<!-- end -->", generate.recorded())
+    assert "\n| `play` | real | Where its timeline is played [s] |\n" in samples
+    with pytest.raises(StopIteration):
+        generate.document("<!-- fields: begin.warp -->\n<!-- end -->", generate.recorded())
+
+
 def test_a_field_that_is_added_is_drawn(newer: Any) -> None:
     drawn = [plain(newer.State, Random(seed)).get("warmth") for seed in range(40)]
     assert None in drawn
