@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandPacket, CommandRecord, RunEvent
 from interfaces.recording.history import AnyTimeline, arm_timeline
-from interfaces.recording.recording import Recording
+from interfaces.recording.recording import ARM, Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.run_recorders import extras_of
 from interfaces.recording.track import (
@@ -171,6 +171,19 @@ def summary(recording: Recording) -> Json:
     return value | {"missing": list(missing)} if missing else value
 
 
+def _measured(recording: Recording, track: SampleTrack, t: Array, missing: list[str]) -> tuple[Array, Array, Array]:
+    """Play time [s], (k,), of the real robot, what was measured, and what it was told, at times [s], (k,)."""
+    rows = len(t)
+    if np.array_equal(track.t[:rows], t):
+        return track.play[:rows], track.q[:rows], track.reference[:rows]
+    missing += not_measured(track, t)
+    play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
+    q[track.unmeasured(t)] = np.nan
+    if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
+        raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
+    return np.maximum.accumulate(play), q, reference
+
+
 def _damage(recording: Recording) -> list[str]:
     """What is missing from the file."""
     found = []
@@ -211,10 +224,13 @@ class _Reading:
 
     def run(self) -> TwinRun:
         """The run on its even grid."""
-        recording, begin, model = self.recording, self.begin, self.recording.model
+        recording, begin = self.recording, self.begin
+        if recording.kind is not ARM:
+            raise FormatError(str(recording.path), "of a mobile robot, which has no joints")
+        model = recording.model
         track = recording.track(REAL)
         t = self._grid(track)
-        play, q_real, q_reference = self._real(track, t)
+        play, q_real, q_reference = _measured(recording, track, t, self.missing)
         measured = measured_rows(q_real)
         again = rerun(recording)
         shown = arm_timeline(_shown(recording, again, math.inf, self.missing))
@@ -271,18 +287,6 @@ class _Reading:
             raise FormatError(str(self.recording.path), f"is longer than the {MOST_ROWS} samples that are compared")
         t: Array = start + step * np.arange(first, last + 1, dtype=np.float64)
         return t
-
-    def _real(self, track: SampleTrack, t: Array) -> tuple[Array, Array, Array]:
-        """Play time [s], (k,), measured joints and references [rad], (k, n), at times [s], (k,)."""
-        rows = len(t)
-        if np.array_equal(track.t[:rows], t):
-            return track.play[:rows], track.q[:rows], track.reference[:rows]
-        self.missing += not_measured(track, t)
-        play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
-        q[track.unmeasured(t)] = np.nan
-        if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
-            raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
-        return np.maximum.accumulate(play), q, reference
 
     def _samples(self, track: SampleTrack, alone: Timeline, shown: Timeline) -> TwinSamples | None:
         """See `TwinRun.samples`; of very many, some."""
@@ -405,12 +409,7 @@ def driven(recording: Recording) -> Driven:
     missing = _damage(recording)
     track = recording.track(REAL_POSTURE)
     t = _drive_grid(recording, track)
-    missing += not_measured(track, t)
-    real = _on(t, track.t, track.q)
-    if len(t) != len(track.t):
-        real[track.unmeasured(t)] = np.nan
-        if len(track.gaps) == len(track.t) - 1:
-            raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
+    _, real, drives = _measured(recording, track, t, missing)
     packets = [entry for entry in recording.link if entry.direction == "forward"]
     case = _drive_case(recording)
     taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
@@ -421,8 +420,8 @@ def driven(recording: Recording) -> Driven:
         real=real,
         measured=_sampled(recording, MEASURED, t),
         estimated=_sampled(recording, ESTIMATED, t),
-        drives=_on(t, track.t, track.reference),
-        offset=_on(t, track.t, (track.t - track.play)[:, None])[:, 0],
+        drives=drives,
+        offset=resample(track.t, (track.t - track.play)[:, None], t)[:, 0],
         delays=np.array(taken).reshape(-1, 2),
         touched=tuple(Collision(e.t, e.text) for e in recording.events if e.kind == COLLISION),
         sent_bytes=sum(entry.size for entry in packets),
@@ -476,9 +475,4 @@ def _virtual_postures(recording: Recording, t: Array, missing: list[str]) -> Arr
 def _sampled(recording: Recording, topic: str, t: Array) -> Array:
     """Postures of a channel at times [s], (k, 3); NaN where it has none."""
     track = recording.track(topic)
-    return _on(t, track.t, track.q) if len(track.t) else np.full((len(t), 3), np.nan)
-
-
-def _on(t: Array, known: Array, values: Array) -> Array:
-    """Values (m, n) of times (m,) at other times (k,): the same ones where those are the same."""
-    return values if np.array_equal(t, known) else resample(known, values, t)
+    return track.on(t, "q") if len(track.t) else np.full((len(t), 3), np.nan)

@@ -12,20 +12,13 @@ import numpy as np
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import Anchor, CommandRecord, Late
 from interfaces.recording.history import AnyEdit, AnyTimeline, edit_entries
-from interfaces.recording.recording import Recording
-from robots.ipr.model import Ipr
-from robots.ipr.model import model as ipr_model
+from interfaces.recording.recording import MOBILE, Recording
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import FormatError, VrsError
 from vrs.ledger import Receipt, Standing, Status
 from vrs.timeline import Timeline
-
-POSTURE = 3
-"""Numbers of a posture."""
-NAME = "ipr"
-"""The mobile robot that is known here."""
 
 
 def begun(recording: Recording) -> tuple[Engine, ManualClock]:
@@ -34,19 +27,18 @@ def begun(recording: Recording) -> tuple[Engine, ManualClock]:
     Raises:
         FormatError: If it can't stand so, or what it needs for that is missing from the file.
     """
-    return _arm(recording) if recording.session.drive is None else _mobile(recording)
-
-
-def _arm(recording: Recording) -> tuple[Engine, ManualClock]:
-    begin, where = recording.session, str(recording.path)
+    begin, where, model = recording.session, str(recording.path), recording.model
+    if begin.late is not None and recording.kind is MOBILE:
+        raise FormatError(where, "it begins in the middle of a session, which isn't known of mobile robots")
     try:
         clock, lateness = ManualClock(begin.t), Lateness(begin.lateness)
         if begin.late is None:
-            return Engine(recording.model, q=begin.q, clock=clock, lateness=lateness), clock
+            start: dict[str, Any] = {recording.kind.state: begin.q}
+            return Engine(model, **start, clock=clock, lateness=lateness), clock
         edits = recording.edits
         if not edits or edits[0].number or not isinstance(edits[0].timeline, Timeline):
             raise FormatError(where, "the timeline that it begins with is destroyed")
-        engine = Engine(recording.model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
+        engine = Engine(model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
         engine.take_up(_stand(recording, begin.late, engine))
     except FormatError:
         raise
@@ -61,31 +53,6 @@ def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
     )
     steered = None if late.steered is None else (late.steered, late.steered_at)
     return Standing(late.newest, Lateness(recording.session.lateness), limits, steered, recording.given)
-
-
-def _mobile(recording: Recording) -> tuple[Engine, ManualClock]:
-    begin, where = recording.session, str(recording.path)
-    model = mobile_model(recording)
-    if begin.late is not None:
-        raise FormatError(where, "it begins in the middle of a session, which isn't known of mobile robots")
-    try:
-        clock = ManualClock(begin.t)
-        return Engine(model, posture=begin.q, clock=clock, lateness=Lateness(begin.lateness)), clock
-    except ValueError as error:
-        raise FormatError(where, f"its beginning: {error}") from None
-
-
-def mobile_model(recording: Recording) -> Ipr:
-    """The mobile robot of a recording.
-
-    Raises:
-        FormatError: If it's none that is known here.
-    """
-    begin = recording.session
-    facts = begin.drive
-    if facts is None or begin.robot != NAME or len(begin.q) != POSTURE:
-        raise FormatError(str(recording.path), f"of a robot that isn't known here: {begin.robot!r}")
-    return ipr_model("micro" if facts.body == "micro" else "ipr", period=facts.period)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
