@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 import msgspec
 
 from interfaces.messages import recording as m
-from interfaces.messages.fields import json_schema
+from interfaces.messages.fields import Wire, json_schema
 from interfaces.recording.poses import FrameTransforms, RealPose, VirtualPose
 
 _ENDLESS = 2**63 - 1
@@ -87,13 +87,8 @@ CHANNELS: Final = (
 NUMBER_OF: Final = {kind: number for number, channel in enumerate(CHANNELS, 1) for kind in channel.kinds}
 """Number of the channel of a kind of message."""
 
-Message: TypeAlias = (
-    m.Begin | m.Dropped | m.End | m.CommandRecord | m.Anchor | m.ReceiptEntry | m.CommandPacket | m.GivenEntry
-    | m.HistoryEntry | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms
-    | m.LinkEntry | m.RunEvent | m.RoomEntry | m.ArcHistory | m.ArcChange | m.VirtualPosture | m.RealPosture
-    | m.MeasuredPosture | m.EstimatedPosture | m.CellsEntry
-)  # fmt: skip
-"""What can be recorded."""
+Message: TypeAlias = Wire
+"""What can be recorded: one of the channels' kinds."""
 
 
 @cache

@@ -59,7 +59,7 @@ from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture
 from vrs.commands import Lateness
 from vrs.errors import FormatError
-from vrs.mobile import ArcTimeline, Grid
+from vrs.mobile import Grid
 from vrs.model import Array
 
 
@@ -206,14 +206,18 @@ LONGEST_WORD = 200
 
 
 class DriveRecorder(Witness):
-    """A `Witness` that writes a run into a file. What it costs a run is a note a command and a packet."""
+    """A `Witness` that writes a run into a file when it's over."""
 
     def __init__(self, path: Path) -> None:
         """Record into a file, which is made anew when the run is over."""
         self.path = path
         self.problem = ""
         """Why it wasn't written; empty where it was."""
-        self._deeds: list[tuple[CommandRecord, ArcTimeline]] = []
+        self._commands: list[Timed] = []
+        """Commands, and the edits that they made."""
+        self._number = 0
+        self._edited: list[float] = []
+        """When the timeline was edited [s]."""
         self._sent: dict[str, list[tuple[float, int]]] = {"forward": [], "backward": []}
         self._settled: dict[str, list[PacketRecord]] = {"forward": [], "backward": []}
 
@@ -224,7 +228,7 @@ class DriveRecorder(Witness):
         self._case, self._start, self._site = case, start, site
         self._place = () if body.room is EMPTY else (room_entry(body.room),)
         self._grid: Grid | None = None if site.surroundings is None else grid_of(body.room, start)
-        self._first = site.engine.timeline
+        self._first = self._timeline = site.engine.timeline
         site.listener = self._commanded
         for direction, lane in (("forward", link.forward), ("backward", link.backward)):
             lane.log.told = partial(self._settle, direction)
@@ -250,7 +254,15 @@ class DriveRecorder(Witness):
             writer.give_up()
 
     def _commanded(self, deed: CommandRecord) -> None:
-        self._deeds.append((deed, self._site.engine.timeline))
+        before, self._timeline = self._timeline, self._site.engine.timeline
+        receipt = None if deed.receipt is None else portable(deed.receipt)
+        self._number += 1
+        self._commands.append((deed.at, replace(deed, number=self._number, receipt=receipt)))
+        if self._timeline is not before:
+            self._edited.append(deed.at)
+            command_id = None if receipt is None else receipt.command_id
+            entries = edit_entries(before, self._timeline, len(self._edited), deed.at, command_id)
+            self._commands += [(deed.at, entry) for entry in entries]
 
     def _settle(self, direction: str, record: PacketRecord) -> None:
         if not record.copy:
@@ -291,7 +303,7 @@ class DriveRecorder(Witness):
         yield from ((0.0, entry) for entry in self._place)
         yield from ((0.0, entry) for entry in whole_entries(self._first, 0, 0.0))
         yield from heapq.merge(
-            self._commands(),
+            self._commands,
             self._samples(drive),
             self._shown(drive),
             self._packets("forward", end),
@@ -303,34 +315,11 @@ class DriveRecorder(Witness):
             ),
             key=itemgetter(0),
         )
-        edits = len(self._edited())
-        yield from ((end, entry) for entry in whole_entries(self._site.engine.timeline, edits, end))
+        yield from ((end, entry) for entry in whole_entries(self._timeline, len(self._edited), end))
         yield from ((end, entry) for entry in self._place)
 
-    def _edited(self) -> list[float]:
-        """When the timeline was edited [s]."""
-        found, before = [], self._first
-        for deed, after in self._deeds:
-            if after is not before:
-                found.append(deed.at)
-            before = after
-        return found
-
-    def _commands(self) -> Iterator[Timed]:
-        """Commands, and the edits that they made."""
-        before, edit = self._first, 0
-        for number, (deed, after) in enumerate(self._deeds, start=1):
-            receipt = None if deed.receipt is None else portable(deed.receipt)
-            command_id = None if receipt is None else receipt.command_id
-            yield deed.at, replace(deed, number=number, receipt=receipt)
-            if after is not before:
-                edit += 1
-                for entry in edit_entries(before, after, edit, deed.at, command_id):
-                    yield deed.at, entry
-            before = after
-
     def _samples(self, drive: DriveRun) -> Iterator[Timed]:
-        edits = np.searchsorted(self._edited(), drive.t, side="right").tolist()
+        edits = np.searchsorted(self._edited, drive.t, side="right").tolist()
         columns = (drive.t, drive.virtual, drive.real, drive.measured, drive.estimated, drive.drives, drive.offset)
         for row, (t, virtual, real, measured, estimated, (v, w), D) in enumerate(
             zip(*(column.tolist() for column in columns), strict=True)

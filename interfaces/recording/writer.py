@@ -153,4 +153,4 @@ class RecordingWriter:
 def encoded(message: Message) -> tuple[int, bytes]:
     """The number of a message's channel, and its JSON."""
     kind = type(message)
-    return NUMBER_OF[kind], _encode(message.as_written() if kind in _SEGMENTED else message)  # type: ignore[union-attr]
+    return NUMBER_OF[kind], _encode(message.as_written() if kind in _SEGMENTED else message)  # type: ignore[attr-defined]
