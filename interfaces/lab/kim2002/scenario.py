@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import Done, EndJob, JobFailed, JobRunner, MoveTo, Request, RunArm, Show, SilentSpeaker, Speak
+from interfaces.jobs import CarryOut, Done, EndJob, JobFailed, JobRunner, Request, Show, SilentSpeaker
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
@@ -189,12 +189,12 @@ class ScenarioRun:
 
     def _carry_out(self, request: Request, now: float) -> None:
         match request:
-            case MoveTo(attempt, goal):
+            case CarryOut(attempt, MoveJob(to=Goal() as goal)):
                 name = next(name for name, one in self._places.items() if one == goal)
                 self._asked.append(f"MOVE {name}")
                 self._moving = attempt
                 self._pilot.go(goal)
-            case Speak(attempt, text):
+            case CarryOut(attempt, VoiceJob(text=text)):
                 self._asked.append(f"VOICE {text}")
                 self._speaking = attempt
                 self._speaker.speak(text, now=now)
@@ -204,7 +204,7 @@ class ScenarioRun:
             case EndJob():
                 self._pilot.journey.end()
                 self._moving = self._speaking = 0
-            case RunArm(attempt):
+            case CarryOut(attempt):
                 self._runner.receive(JobFailed(attempt, "there's no arm"), now=now)
 
     def _stop(self, goal: Goal | None) -> ScenarioStop:
