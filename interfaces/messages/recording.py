@@ -534,8 +534,8 @@ class ArcHistory(HistoryEntry, frozen=True, omit_defaults=True, gc=False, eq=Fal
     segments: Arcs = ()  # type: ignore[assignment]
 
 
-class ChangeEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change", kw_only=True):
-    """An edit: the first `first` segments stay, `segments` follow, then those of the base from `tail` on."""
+class EditEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, kw_only=True):
+    """An edit, as what it put in."""
 
     edit: Number
     """Its number, from 1."""
@@ -547,6 +547,11 @@ class ChangeEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=
     """Of the timeline afterwards."""
     first: Count
     """So many segments stay."""
+
+
+class ChangeEntry(EditEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change", kw_only=True):
+    """An edit: the first `first` segments stay, `segments` follow, then those of the base from `tail` on."""
+
     dof: Count
     """Joints."""
     segments: Polynomials = ()
@@ -561,21 +566,11 @@ class ChangeEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=
     """Who made it; None: a correction."""
 
 
-class ArcChange(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="drive", kw_only=True):
+class ArcChange(EditEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="drive", kw_only=True):
     """An edit of a mobile robot's timeline: the first `first` arcs stay, `segments` follow."""
 
     row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
     dof: ClassVar[int] = 3
-    edit: Number
-    """Its number, from 1."""
-    base: Count
-    """Number of the edit that it builds on."""
-    at: Time
-    """The engine's clock, exactly [s]."""
-    version: Count
-    """Of the timeline afterwards."""
-    first: Count
-    """So many arcs stay."""
     segments: Arcs = ()
     """New ones."""
     end: Time

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -55,34 +55,13 @@ def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
     return Standing(late.newest, Lateness(recording.session.lateness), limits, steered, recording.given)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rerun:
-    """What became of recorded commands on a fresh engine."""
-
-    identical: bool
-    """Whether every timeline and receipt that could be compared is the same to the last digit."""
-    commands: int
-    """Commands and corrections that were run again."""
-    versions: int
-    """Timelines that were compared."""
-    difference: str
-    """The first that differs; empty where none does."""
-    missing: str
-    """Why some couldn't be run or compared; empty where all could."""
-    timeline: AnyTimeline
-    """What they made."""
-    receipts: tuple[Receipt, ...]
-    """The newest truth about each command."""
-
-
 def rerun(recording: Recording) -> Rerun:
     """Run the recorded commands again, up to the first that's missing or that makes something else.
 
     Raises:
         FormatError: If the recording is of a robot that isn't known, or holds no commands that can be.
     """
-    engine, clock = begun(recording)
-    again = _Again(engine, clock, recording.changes, late=recording.session.late)
+    again = Rerun(*begun(recording), recording.changes, recording.session.late)
     for entry in recording.commands:
         if entry.number != again.commands + 1:
             some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
@@ -95,39 +74,46 @@ def rerun(recording: Recording) -> Rerun:
             break
     else:
         again.finish()
-    return Rerun(
-        not again.difference,
-        again.commands,
-        again.versions,
-        again.difference,
-        again.missing,
-        engine.timeline,
-        engine.receipts,
-    )
+    return again
 
 
-class _Again:
-    """Runs entries in turn, and compares."""
+class Rerun:
+    """What became of recorded commands on a fresh engine."""
 
-    def __init__(
-        self,
-        engine: Engine,
-        clock: ManualClock,
-        changes: Sequence[AnyEdit],
-        *,
-        late: Late | None,
-    ) -> None:
+    def __init__(self, engine: Engine, clock: ManualClock, changes: Sequence[AnyEdit], late: Late | None) -> None:
         self._engine, self._clock, self._late = engine, clock, late
         self._recorded: dict[int, list[AnyEdit]] = {}
         for change in changes:
             self._recorded.setdefault(change.edit, []).append(change)
         first = self._recorded.pop(0, [])
-        self.commands = self.versions = self._edit = 0
-        self.difference = self.missing = ""
+        self.commands = 0
+        """Commands and corrections that were run again."""
+        self.versions = 0
+        """Timelines that were compared."""
+        self.difference = ""
+        """The first that differs; empty where none does."""
+        self.missing = ""
+        """Why some couldn't be run or compared; empty where all could."""
         if first and first[0].version != engine.timeline.version:
             self.difference = "the recording begins with a timeline that commands before it had made"
+        self._edit = 0
         self._taken_up = {receipt.command_id for receipt in engine.receipts}
         self._unseen: list[int] = []
+
+    @property
+    def identical(self) -> bool:
+        """Whether every timeline and receipt that could be compared is the same to the last digit."""
+        return not self.difference
+
+    @property
+    def timeline(self) -> AnyTimeline:
+        """What they made."""
+        return self._engine.timeline
+
+    @property
+    def receipts(self) -> tuple[Receipt, ...]:
+        """The newest truth about each command."""
+        return self._engine.receipts
 
     def run(self, entry: CommandRecord | Anchor) -> None:
         """Run one entry, and compare what it makes."""
