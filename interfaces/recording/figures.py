@@ -126,36 +126,6 @@ MOST_ROWS = 1_000_000
 """Rows of a run's grid, at most."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunFigures:
-    """A run as its recording has it."""
-
-    run: TwinRun
-    attributions: tuple[Attribution, ...]
-    """Its measures split among causes; none where that wasn't recorded."""
-    offsets: tuple[OffsetOutcome, ...]
-    """What other choices of the offset made of the network."""
-    missing: tuple[str, ...]
-    """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
-
-
-def figures(recording: Recording) -> RunFigures:
-    """Everything that a run's summary and report are made of.
-
-    Raises:
-        FormatError: If the recording has too little of it: no model, no samples of the real robot.
-    """
-    reading = _Reading(recording)
-    run = reading.run()
-    attributions, offsets = reading.extras()
-    return RunFigures(run, attributions, offsets, (*_damage(recording), *reading.missing))
-
-
-def twin_run(recording: Recording) -> TwinRun:
-    """The run alone; see `figures`."""
-    return figures(recording).run
-
-
 def summary(recording: Recording) -> Json:
     """The run's summary: of a whole recording of the laboratory the run's own, else with a list `missing`.
 
@@ -205,24 +175,37 @@ def _shown(recording: Recording, again: Rerun, until: float, missing: list[str])
     return recording.timeline
 
 
-class _Reading:
-    """Puts a run together, and notes what is missing."""
+def figures(recording: Recording) -> RunFigures:
+    """Everything that a run's summary and report are made of.
+
+    Raises:
+        FormatError: If the recording has too little of it: no model, no samples of the real robot.
+    """
+    return RunFigures(recording)
+
+
+class RunFigures:
+    """A run of an arm's twins as its recording has it, put together when it's made."""
 
     def __init__(self, recording: Recording) -> None:
         self.recording, self.begin, self.end = recording, recording.session, recording.end
-        self.missing: list[str] = []
         self._live = self.begin.driver == "live"
+        self._missing = _damage(recording)
+        self.run = self._run()
+        self.attributions, self.offsets = self._extras()
+        """Its measures split among causes, and what other offsets made of the network; none where not recorded."""
+        self.missing = tuple(self._missing)
+        """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
 
-    def extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
-        """What the recording was closed with."""
+    def _extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
         extras = None if self.end is None else self.end.extras
         if extras is None:
             if not self._live:
-                self.missing.append("what other runs say of the causes, and of other offsets")
+                self._missing.append("what other runs say of the causes, and of other offsets")
             return (), ()
         return extras_of(extras, str(self.recording.path))
 
-    def run(self) -> TwinRun:
+    def _run(self) -> TwinRun:
         """The run on its even grid."""
         recording, begin = self.recording, self.begin
         if recording.kind is not ARM:
@@ -230,14 +213,14 @@ class _Reading:
         model = recording.model
         track = recording.track(REAL)
         t = self._grid(track)
-        play, q_real, q_reference = _measured(recording, track, t, self.missing)
+        play, q_real, q_reference = _measured(recording, track, t, self._missing)
         measured = measured_rows(q_real)
         again = rerun(recording)
-        shown = arm_timeline(_shown(recording, again, math.inf, self.missing))
+        shown = arm_timeline(_shown(recording, again, math.inf, self._missing))
         corrections = self._corrections()
         alone = self._alone() if corrections else shown
         if not np.isfinite(q_reference).all():
-            self.missing.append("the real robot's own references: the virtual robot's timeline stands for its")
+            self._missing.append("the real robot's own references: the virtual robot's timeline stands for its")
             q_reference = np.where(np.isfinite(q_reference), q_reference, shown.sample(play))
         receipts = again.receipts if shown is again.timeline else recording.receipts("virtual")
         if begin.late is not None:
@@ -319,7 +302,7 @@ class _Reading:
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[CommandPacket, ...]:
         if not self._live:
             if self.end is None:
-                self.missing.append("what became of commands that weren't answered yet")
+                self._missing.append("what became of commands that weren't answered yet")
             return self.recording.packets
         # The operator's site doesn't know when a command reached the robot, but when it left the emulated link.
         messages = messages[np.argsort(messages[:, 0], kind="stable")]
