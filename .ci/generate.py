@@ -440,11 +440,11 @@ def _inside(message: MessageDescription, inner: list[str]) -> list[MessageDescri
 
 
 def _topics_table(tags: dict[str, str]) -> list[str]:
-    rows = ["| topic | message | of | |", "|---|---|---|---|"]
+    rows = ["| topic | message | robot | |", "|---|---|---|---|"]
     for channel in CHANNELS:
         for kind in channel.kinds:
             one = described(kind)
-            of = " and ".join(["an arm"] * (kind in channel.arm) + ["a mobile robot"] * (kind in channel.mobile))
+            of = "mobile" if kind not in channel.arm else "any" if kind in channel.mobile else "arm"
             rows.append(_row(f"`{channel.topic}`", f"`{one.tag or channel.schema}`", of, _told(one.text, tags)))
     return rows
 
@@ -566,6 +566,8 @@ def _one_what(kind: kinds.Type, names: Names) -> str:
             return f"[{', '.join(f'`{field.encode_name}`' for field in fields)}]"
         case kinds.DictType(_, item):
             return f"map of {_several(item, names)}"
+        case kinds.AnyType():
+            return "anything"
     inner = described(kind)
     if inner.name in names and not inner.is_array and not inner.tag:
         return f"`{names[inner.name]}`"
@@ -586,7 +588,7 @@ def _real(kind: kinds.FloatType) -> str:
     low, high = bounds(kind)
     if kind.gt is not None:
         return f"real > {_figure(kind.gt)}" + ("" if high in {None, 1e9} else f" up to {_figure(high)}")
-    if (low, high) in {(None, None), (-1e9, 1e9)}:
+    if (low, high) in {(None, None), (-1e9, 1e9), (-sys.float_info.max, sys.float_info.max)}:
         return "real"
     if high in {None, 1e9}:
         return f"real ≥ {_figure(low)}"

@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.moves import MODEL
+from interfaces.messages import recording as m
 from interfaces.recording import RecordingWriter
-from interfaces.recording import messages as m
-from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
+from interfaces.recording.history import edit_entries, whole_entries
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose, virtual_pose
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 from vrs.model import Array
@@ -104,10 +104,10 @@ def _command(engine: Engine, number: int, t: float, rng: np.random.Generator) ->
     command = MotionCommand(JointTarget(_target(engine.joints(t), rng)), execute_at=t)
     receipt = engine.execute(command)
     return [
-        m.CommandEntry.of(number, t, command, receipt),
+        m.CommandRecord(number, t, command, receipt.named()),
         *edit_entries(before, engine.timeline, number, t, receipt.command_id),
-        m.ReceiptEntry(t, "real", m.FullReceipt.of(receipt)),
-        m.PacketEntry(number, number, t, t + BEHIND, number),
+        m.ReceiptEntry(t, "real", receipt.named()),
+        m.CommandPacket(number, number, t, t + BEHIND, number),
     ]
 
 

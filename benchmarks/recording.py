@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.recorded import RATE, Teller, Tick, begin, record, ticks
 from benchmarks.results import Bar, Cost, Part, Result
 from benchmarks.timing import seconds
+from interfaces.messages import recording as m
 from interfaces.recording import Recorder, Recording, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.channels import Message
 
 HOUR = 3600.0

@@ -156,9 +156,9 @@ def serve(
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
     from interfaces.messages.jobs import OperatorLoss
+    from interfaces.messages.recording import OWN
     from interfaces.recording.live import RATE, LiveRecording
     from interfaces.recording.mcap_file import Sink
-    from interfaces.recording.messages import OWN
     from interfaces.runs.twin_run import fixed_offset, spelled
     from interfaces.runtime.live.emulation import late_often, too_slow
     from interfaces.runtime.physics_messages import BodyKind

@@ -10,6 +10,7 @@ from itertools import groupby, islice
 from typing import Any
 
 from interfaces.messages import Change, History
+from interfaces.messages.recording import ChangeEntry
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
@@ -117,7 +118,7 @@ def _alike(a: _Place, b: _Place) -> bool:
     )
 
 
-def changed(base: Timeline, message: Change) -> Timeline:
+def changed(base: Timeline, message: Change | ChangeEntry) -> Timeline:
     """The timeline that a change makes of its base.
 
     Raises:

@@ -12,24 +12,23 @@ from interfaces.jobs.devices import (
 from interfaces.jobs.file import JobFile, digest, read_jobs, written_jobs
 from interfaces.jobs.forecast import dry_run, time_needed
 from interfaces.jobs.runner import (
+    CarryOut,
     Done,
     EndJob,
     Input,
     Interrupted,
     JobFailed,
     JobRunner,
-    MoveTo,
     OperatorLost,
     Request,
-    RunArm,
     RunnerConfig,
     Show,
-    Speak,
     carried_over,
 )
 
 __all__ = [
     "ArmControl",
+    "CarryOut",
     "Done",
     "EndJob",
     "Input",
@@ -37,16 +36,13 @@ __all__ = [
     "JobFailed",
     "JobFile",
     "JobRunner",
-    "MoveTo",
     "NoArm",
     "OperatorLost",
     "Request",
-    "RunArm",
     "RunnerConfig",
     "Screen",
     "Show",
     "SilentSpeaker",
-    "Speak",
     "Speaker",
     "TextScreen",
     "carried_over",

@@ -27,7 +27,6 @@ from interfaces.messages.jobs import (
     VoiceJob,
     WaitJob,
 )
-from robots.onboard.journey import Goal
 from vrs.checks import finite, validated, within
 
 
@@ -65,19 +64,12 @@ Input: TypeAlias = ListCommand | OperatorLost | Interrupted | Done | JobFailed
 
 
 @dataclass(frozen=True, slots=True)
-class MoveTo:
-    """Go to a goal; answer with `Done` or `JobFailed`."""
+class CarryOut:
+    """Do a job; answer with `Done` or `JobFailed`."""
 
     attempt: int
-    goal: Goal
-
-
-@dataclass(frozen=True, slots=True)
-class Speak:
-    """Say something; answer when it's over."""
-
-    attempt: int
-    text: str
+    job: MoveJob | VoiceJob | ArmJob
+    """A move with its goal, whatever that's called in the list."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,22 +80,13 @@ class Show:
 
 
 @dataclass(frozen=True, slots=True)
-class RunArm:
-    """Carry out a VAL-II program; answer when it has ended."""
-
-    attempt: int
-    program: str
-    source: str
-
-
-@dataclass(frozen=True, slots=True)
 class EndJob:
     """Stop with what was asked for, at once; no answer is expected, and none counts."""
 
     attempt: int
 
 
-Request: TypeAlias = MoveTo | Speak | Show | RunArm | EndJob
+Request: TypeAlias = CarryOut | Show | EndJob
 """What a runner asks for."""
 
 
@@ -352,25 +335,20 @@ class JobRunner:
             self._mark(JobProgress(job.number, JobStage.DONE))
         self.progress = replace(self.progress, stage=JobStage.DONE, reason="")
 
-    def _ask(self, job: Job, before: JobProgress, now: float) -> None:
+    def _ask(self, job: MoveJob | VoiceJob | WaitJob | ArmJob, before: JobProgress, now: float) -> None:
         """Let a job be carried out."""
         config = self._config
         if isinstance(job, WaitJob):
             seconds = job.seconds if before.left is None else before.left
             self._due = math.inf if seconds is None else now + seconds
             return
+        if isinstance(job, MoveJob):
+            job = replace(job, to=self.jobs.goal(job))
         self._attempt += 1
         self._open = True
-        match job:
-            case MoveJob():
-                self._requests.append(MoveTo(self._attempt, self.jobs.goal(job)))
-                self._due = now + config.longest_move
-            case VoiceJob():
-                self._requests.append(Speak(self._attempt, job.text))
-                self._due = now + config.longest_voice
-            case ArmJob():
-                self._requests.append(RunArm(self._attempt, job.program, job.source))
-                self._due = now + config.longest_arm
+        self._requests.append(CarryOut(self._attempt, job))
+        longest = {MoveJob: config.longest_move, VoiceJob: config.longest_voice, ArmJob: config.longest_arm}
+        self._due = now + longest[type(job)]
 
     def _catch_up(self, now: float) -> None:
         """Do what is due by now: a wait ends when it was to, however late this is called."""

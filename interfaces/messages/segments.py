@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias
 
@@ -90,16 +90,45 @@ def rows(segments: Sequence[PolynomialSegment], packed: bool) -> tuple[int, floa
     """
     if not segments:
         return 0, 0.0, ()
-    end, found = segments[0].start, list[Any]()
+    first = segments[0]
+    return first.coefficients.shape[1], first.start, written(segments, _packed if packed else _listed, first.start)
+
+
+def _packed(segment: PolynomialSegment, start: float | None = None) -> tuple[Any, ...]:
+    a = segment.coefficients
+    # Looking costs less than a conversion that has nothing to do.
+    data = (a if a.dtype is _DOUBLE else a.astype(_DOUBLE)).tobytes()
+    row = segment.duration, segment.command_id, data
+    return row if start is None else (*row, start)
+
+
+def _listed(segment: PolynomialSegment, start: float | None = None) -> tuple[Any, ...]:
+    row = segment.duration, segment.command_id, segment.coefficients.tolist()
+    return row if start is None else (*row, start)
+
+
+def written(segments: Iterable[Any], row: Callable[..., Any], end: float) -> tuple[Any, ...]:
+    """Rows of segments, each with its start where that isn't the end of the one before.
+
+    Args:
+        segments: Of any kind.
+        row: Makes a row of a segment, and of its start [s] where it's to be given.
+        end: Where what's before the first one ends [s].
+    """
+    found = []
     for segment in segments:
-        a = segment.coefficients
-        coefficients = a.astype(_DOUBLE, copy=False).tobytes() if packed else a.tolist()
-        if segment.start == end:
-            found.append((segment.duration, segment.command_id, coefficients))
-        else:
-            found.append((segment.duration, segment.command_id, coefficients, segment.start))
+        found.append(row(segment) if segment.start == end else row(segment, segment.start))
         end = segment.start + segment.duration
-    return segments[0].coefficients.shape[1], segments[0].start, tuple(found)
+    return tuple(found)
+
+
+def placed(rows: Iterable[Any], start: float) -> Iterator[tuple[float, Any]]:
+    """The opposite: each row with its start, where none is given the end of the one before [s]."""
+    for row in rows:
+        if row.start is not None:
+            start = row.start
+        yield start, row
+        start += row.duration
 
 
 def segments_of(dof: int, start: float, wires: Iterable[SegmentRow]) -> tuple[PolynomialSegment, ...]:
@@ -109,13 +138,11 @@ def segments_of(dof: int, start: float, wires: Iterable[SegmentRow]) -> tuple[Po
         InvalidValueError: If the coefficients don't fit the joints, or aren't finite.
     """
     found = []
-    for wire in wires:
-        start = start if wire.start is None else wire.start
+    for at, wire in placed(wires, start):
         given = wire.coefficients
         a = coefficients_from_bytes(given, dof) if isinstance(given, bytes) else coefficients_from_lists(given, dof)
-        found.append(known_segment(start, wire.duration, a, wire.command_id))
-        start += wire.duration
-    if found and not np.isfinite(np.concatenate([segment.coefficients.ravel() for segment in found])).all():
+        found.append(known_segment(at, wire.duration, a, wire.command_id))
+    if found and not np.isfinite(np.concatenate([segment.coefficients for segment in found])).all():
         raise InvalidValueError("coefficients", "NaN or infinity", "finite")
     return tuple(found)
 

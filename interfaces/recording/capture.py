@@ -15,36 +15,33 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from typing_extensions import override
 
-from interfaces.engine_server.journal import difference
 from interfaces.link import PacketRecord
 from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
-from interfaces.messages.sites import Report, Sample
-from interfaces.recording.channels import Message
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     Anchor,
     ChangeEntry,
-    CommandEntry,
+    CommandRecord,
+    Direction,
     GivenEntry,
     HistoryEntry,
     Late,
     LinkEntry,
     ReceiptEntry,
+    Site,
     VirtualSample,
-    segment_entries,
 )
+from interfaces.messages.sites import Report, Sample
+from interfaces.recording.channels import Message
+from interfaces.recording.history import edit_entries, whole_entries
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.teleop import CommandRecord, Correction, OperatorSite
+from interfaces.teleop import Correction, OperatorSite
 from interfaces.teleop.operator import SiteObserver
 from vrs.commands import Profile
 from vrs.ledger import Receipt, Standing, Status
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
-PART = 256
-"""Segments of one message of a history."""
-MOST_CHANGED = 2048
-"""Segments of an edit that's written as one; beyond that the whole timeline is, in parts."""
 MOST_AT_ONCE = 1200
 """Samples of a robot that are taken at once; the others next time."""
 MOST_REPEATED = 20_000
@@ -185,13 +182,12 @@ class Capture(SiteObserver):
             for now, X in zip(t[rows].tolist(), kinematics(q[rows]), strict=True):
                 self.add(now, message(now, X))
 
-    def link(self, direction: str, records: Iterable[PacketRecord]) -> None:
-        """Write down what became of packets (`forward`, `backward`), in the order in which it was known."""
+    def link(self, direction: Direction, records: Iterable[PacketRecord]) -> None:
+        """Write down what became of packets, in the order in which it was known."""
         for record in records:
-            known = record.sent if record.arrived is None else record.arrived
+            known, entry = link_entry(direction, record)
             t = self._linked[direction] = max(self._linked[direction], known)
-            lost = record.lost is not None
-            self.add(t, LinkEntry(direction, record.sent, record.arrived, lost, record.attempts))  # type: ignore[arg-type]
+            self.add(t, entry)
 
     def advance(self, *, now: float) -> tuple[Array, Array]:
         """Write down what is due; the virtual robot's times [s], (k,), and joints [rad], (k, n), for the driver."""
@@ -237,11 +233,11 @@ class Capture(SiteObserver):
             what, before, after = self._happened.popleft()
             self._number += 1
             if isinstance(what, CommandRecord):
-                at, command_id = what.at, None if what.receipt is None else what.receipt.command_id
-                receipt = None if what.receipt is None else self._named(what.receipt)
-                self.add(at, CommandEntry(self._number, at, what.command, receipt, what.refused))
-                if what.receipt is not None and what.receipt.status is not Status.REJECTED:
-                    self._known[what.receipt.command_id] = what.receipt.version
+                at, receipt = what.at, None if what.receipt is None else self._named(what.receipt)
+                command_id = None if receipt is None else receipt.command_id
+                self.add(at, replace(what, number=self._number, receipt=receipt))
+                if receipt is not None and receipt.status is not Status.REJECTED:
+                    self._known[receipt.command_id] = receipt.version
             else:
                 at, command_id = what[0].t, None
                 self.add(at, _anchor(self._number, *what, after.version))
@@ -280,62 +276,17 @@ class Capture(SiteObserver):
             for entry in whole_entries(self._timeline, self._edit, t, cut=self._cut):
                 self.add(t, entry)
 
-    def receipts(self, t: float, site: str, receipts: Sequence[Receipt]) -> None:
+    def receipts(self, t: float, site: Site, receipts: Sequence[Receipt]) -> None:
         """Write down the truth about commands at a site, `virtual` or `real`, at a time [s]."""
         for receipt in receipts:
-            self.add(t, ReceiptEntry(t, site, self._named(receipt)))  # type: ignore[arg-type]
+            self.add(t, ReceiptEntry(t, site, self._named(receipt)))
 
 
-def edit_entries(
-    before: Timeline, after: Timeline, edit: int, at: float, command_id: int | None, *, cut: int = 0
-) -> tuple[ChangeEntry | HistoryEntry, ...]:
-    """An edit as it stands in a recording.
-
-    Args:
-        before: The timeline before it.
-        after: The timeline after it.
-        edit: Its number, from 1.
-        at: The engine's time [s]: nothing changed before that.
-        command_id: Who made it, if a command did.
-        cut: First segment that the recording has; edits lie after it.
-    """
-    change = difference(before, after, at, edit=edit, command_id=command_id)
-    if change is None or len(change.segments) > MOST_CHANGED:
-        return whole_entries(after, edit, at, cut=cut)
-    entry = ChangeEntry(
-        edit=edit,
-        base=change.base,
-        at=at,
-        version=after.version,
-        first=change.first - cut,
-        dof=after.dof,
-        segments=segment_entries(change.segments),
-        tail=None if change.tail is None else change.tail - cut,
-        tail_start=change.tail_start,
-        end=change.end,
-        command_id=command_id,
-    )
-    return (entry,)
-
-
-def whole_entries(timeline: Timeline, edit: int, at: float, *, cut: int = 0) -> tuple[HistoryEntry, ...]:
-    """A whole timeline as it stands in a recording, in parts; from a segment on, where `cut` isn't 0."""
-    total = len(timeline)
-    start = timeline.start_of(cut) if cut else timeline.start
-    initial = timeline.sample(start) if cut else timeline.initial
-    return tuple(
-        HistoryEntry(
-            edit=edit,
-            at=at,
-            version=timeline.version,
-            initial=initial.tolist(),
-            start=start,
-            total=total - cut,
-            index=index - cut,
-            segments=segment_entries(timeline.segments[index : index + PART]),
-        )
-        for index in range(cut, max(total, cut + 1), PART)
-    )
+def link_entry(direction: Direction, record: PacketRecord, size: int = 0) -> tuple[float, LinkEntry]:
+    """When it was known what became of a packet [s], and that; its size [byte] where that's to be recorded."""
+    known = record.sent if record.arrived is None else record.arrived
+    lost = record.lost is not None
+    return known, LinkEntry(direction, record.sent, record.arrived, lost, record.attempts, size)
 
 
 def late_of(stand: Standing | None) -> Late | None:
@@ -353,12 +304,12 @@ def _anchor(number: int, correction: Correction, truth: Timeline, version: int) 
     return Anchor(
         number=number,
         at=correction.t,
-        initial=truth.initial.tolist(),
+        initial=truth.initial,
         start=truth.start,
         version=truth.version,
-        segments=segment_entries(truth.segments),
+        segments=truth.segments[:],
         end=correction.end,
-        error=correction.error.tolist(),
+        error=correction.error,
         reason=text(correction.reason),
         timeline_version=version,
     )

@@ -13,9 +13,10 @@ from typing import Any, Final, TypeAlias
 
 import msgspec
 
+from interfaces.messages import recording as m
 from interfaces.messages.fields import json_schema
-from interfaces.recording import messages as m
 from interfaces.recording.poses import FrameTransforms, RealPose, VirtualPose
+from vrs.record import Record
 
 _ENDLESS = 2**63 - 1
 """A range up to here is none."""
@@ -56,7 +57,7 @@ class RecordingChannel:
 
 
 _SESSION = m.Begin, m.Dropped, m.End
-_COMMANDS = m.CommandEntry, m.Anchor, m.ReceiptEntry, m.PacketEntry, m.GivenEntry
+_COMMANDS = m.CommandRecord, m.Anchor, m.ReceiptEntry, m.CommandPacket, m.GivenEntry
 CHANNELS: Final = (
     RecordingChannel("/session", "vrs.Session", _SESSION, (*_SESSION, m.RoomEntry), many=False),
     RecordingChannel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
@@ -75,7 +76,7 @@ CHANNELS: Final = (
         "/tf", "foxglove.FrameTransforms", (FrameTransforms,), (FrameTransforms,), "FrameTransforms.json"
     ),
     RecordingChannel("/link", "vrs.Packet", (m.LinkEntry,), (m.LinkEntry,)),
-    RecordingChannel("/events", "vrs.Event", (m.EventEntry,), (m.EventEntry,), many=False),
+    RecordingChannel("/events", "vrs.Event", (m.RunEvent,), (m.RunEvent,), many=False),
     RecordingChannel("/virtual/posture", "vrs.VirtualPosture", (), (m.VirtualPosture,)),
     RecordingChannel("/real/posture", "vrs.RealPosture", (), (m.RealPosture,)),
     RecordingChannel("/real/measured", "vrs.MeasuredPosture", (), (m.MeasuredPosture,)),
@@ -87,12 +88,8 @@ CHANNELS: Final = (
 NUMBER_OF: Final = {kind: number for number, channel in enumerate(CHANNELS, 1) for kind in channel.kinds}
 """Number of the channel of a kind of message."""
 
-Message: TypeAlias = (
-    m.Begin | m.Dropped | m.End | m.CommandEntry | m.Anchor | m.ReceiptEntry | m.PacketEntry | m.GivenEntry
-    | m.HistoryEntry | m.ChangeEntry | m.VirtualSample | m.RealSample | VirtualPose | RealPose | FrameTransforms
-    | m.LinkEntry | m.EventEntry | m.DriveMessage
-)  # fmt: skip
-"""What can be recorded."""
+Message: TypeAlias = Record
+"""What can be recorded: one of the channels' kinds."""
 
 
 @cache

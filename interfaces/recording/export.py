@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
+from msgspec import inspect as kinds
 
+from interfaces.messages.description import described
 from interfaces.messages.fields import plain
+from interfaces.messages.recording import Anchor, ArcEntry, CommandPacket, CommandRecord, LinkEntry, RunEvent
 from interfaces.recording.history import arm_timeline
-from interfaces.recording.messages import Anchor, CommandEntry
 from interfaces.recording.poses import quaternions
 from interfaces.recording.recording import ARM, Recording
-from interfaces.recording.track import ESTIMATED, MEASURED, REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE
+from interfaces.recording.track import ESTIMATED, MEASURED
 from vrs.errors import FormatError, InvalidValueError
+from vrs.ledger import Receipt
 from vrs.mobile import ArcTimeline
 from vrs.model import Array
 
-RADIANS = "rad"
-_POSE = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""))
-_STAMPS = ("issued_at", "asked_at", "execute_at", "end")
+_POSE = "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"
+_POSTURE = "x_m", "y_m", "theta_rad"
+_DRIVE = "v_m_per_s", "w_rad_per_s"
+_STAMPS = "issued_at_s", "asked_at_s", "execute_at_s", "end_s"
+_UNIT = re.compile(r"_((?:s|m|rad|byte)(?:_per_s\d*)?)$")
+_KINDS: dict[type, type] = {kinds.FloatType: float, kinds.IntType: int, kinds.BoolType: bool}
 
 
 class TableColumn(NamedTuple):
@@ -31,12 +38,16 @@ class TableColumn(NamedTuple):
 
     name: str
     """With its unit where it has one."""
-    unit: str
-    """Empty where there's none."""
     kind: type
     """`float`, `int`, `bool` or `str`."""
     values: Sequence[Any]
     """None where there's none."""
+
+    @property
+    def unit(self) -> str:
+        """Empty where there's none."""
+        found = _UNIT.search(self.name)
+        return found[1].replace("_per_", "/") if found else ""
 
 
 class RecordingTable(NamedTuple):
@@ -46,285 +57,174 @@ class RecordingTable(NamedTuple):
     columns: tuple[TableColumn, ...]
 
 
-def arm_tables(recording: Recording) -> tuple[RecordingTable, ...]:
-    """An arm's tables; see `tables`."""
-    return (
-        _virtual(recording),
-        _real(recording),
-        commands_table(recording),
-        receipts_table(recording),
-        _segments(recording),
-        edits_table(recording),
-        _packets(recording),
-        link_table(recording),
-        events_table(recording),
-    )
+def _table(name: str, *columns: Sequence[TableColumn]) -> RecordingTable:
+    return RecordingTable(name, tuple(column for some in columns for column in some))
 
 
-def table(name: str, *columns: TableColumn | Sequence[TableColumn]) -> RecordingTable:
-    """A table of columns, and of lists of them."""
-    found: list[TableColumn] = []
-    for column in columns:
-        found += [column] if isinstance(column, TableColumn) else column
-    return RecordingTable(name, tuple(found))
+def _fields(kind: type, values: Sequence[Any], *names: str) -> list[TableColumn]:
+    """Columns of fields of values, called as those and their units; None where a value is."""
+    types = {field.name: field.type for field in described(kind).fields}
+    found = []
+    for name in names:
+        field = _UNIT.sub("", name)
+        cells = [None if value is None else getattr(value, field) for value in values]
+        found.append(TableColumn(name, _KINDS.get(type(types[field]), str), cells))
+    return found
 
 
-def seconds(name: str, values: Sequence[float | None]) -> TableColumn:
-    """A column of times."""
-    return TableColumn(f"{name}_s", "s", float, values)
+def _rows(rows: Sequence[Sequence[Any]], **columns: type) -> list[TableColumn]:
+    """Columns of rows, by their names."""
+    return [TableColumn(name, kind, [row[k] for row in rows]) for k, (name, kind) in enumerate(columns.items())]
+
+
+def _numbers(names: Iterable[str], values: Array) -> list[TableColumn]:
+    """Columns of an array (k, m)."""
+    return [TableColumn(name, float, column.tolist()) for name, column in zip(names, values.T, strict=True)]
 
 
 def _joints(name: str, q: Array) -> list[TableColumn]:
-    return [TableColumn(f"{name}{i}_rad", RADIANS, float, column.tolist()) for i, column in enumerate(q.T, start=1)]
-
-
-def _pose(X: Array) -> list[TableColumn]:
-    """Position and unit quaternion of poses, (k, 4, 4); NaN where they aren't known."""
-    known = np.isfinite(X).all(axis=(1, 2))
-    values = np.full((len(X), 7), np.nan)
-    values[known, :3], values[known, 3:] = X[known, :3, 3], quaternions(X[known, :3, :3])
-    return [
-        TableColumn(name, unit, float, column.tolist())
-        for (name, unit), column in zip(_POSE, values.T, strict=True)
-    ]
+    return _numbers((f"{name}{i}_rad" for i in range(1, q.shape[1] + 1)), q)
 
 
 def _tool(recording: Recording, q: Array) -> list[TableColumn]:
-    X = np.full((len(q), 4, 4), np.nan)
+    """Position and unit quaternion of an arm's tool; NaN where the joints aren't known."""
+    if recording.kind is not ARM:
+        return []
+    values = np.full((len(q), len(_POSE)), np.nan)
     known = np.isfinite(q).all(axis=1)
     if known.any():
-        X[known] = recording.model.forward(q[known])
-    return _pose(X)
+        X = recording.model.forward(q[known])
+        values[known, :3], values[known, 3:] = X[:, :3, 3], quaternions(X[:, :3, :3])
+    return _numbers(_POSE, values)
+
+
+def _state(recording: Recording, q: Array) -> list[TableColumn]:
+    return _joints("q", q) if recording.kind is ARM else _numbers(_POSTURE, q)
 
 
 def _virtual(recording: Recording) -> RecordingTable:
-    t = recording.track(VIRTUAL).t
+    t = recording.track(recording.kind.virtual).t
     q = recording.virtual(t)
-    return table("virtual", seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
+    return _table("virtual", _numbers(["t_s"], t[:, None]), _state(recording, q), _tool(recording, q))
 
 
 def _real(recording: Recording) -> RecordingTable:
-    track = recording.track(REAL)
-    return table(
+    track = recording.track(recording.kind.real)
+    return _table(
         "real",
-        seconds("t", track.t.tolist()),
-        seconds("play", track.play.tolist()),
-        _joints("q", track.q),
-        _joints("reference", track.reference),
+        _numbers(["t_s", "play_s"], np.stack((track.t, track.play), axis=1)),
+        _state(recording, track.q),
+        _joints("reference", track.reference) if recording.kind is ARM else _numbers(_DRIVE, track.reference),
         _tool(recording, track.q),
     )
 
 
-def commands_table(recording: Recording) -> RecordingTable:
+def _commands(recording: Recording) -> RecordingTable:
     """What the operator's engine was told."""
     entries = recording.commands
-    receipts = [entry.receipt if isinstance(entry, CommandEntry) else None for entry in entries]
-
-    def told(name: str) -> list[Any]:
-        return [None if receipt is None else getattr(receipt, name) for receipt in receipts]
-
+    receipts = [entry.receipt if isinstance(entry, CommandRecord) else None for entry in entries]
     # A drive command has no target.
-    n = len(recording.session.q) if recording.kind.word == "arm" else 0
-    q = np.array([[math.nan] * n if row is None or len(row) != n else row for row in told("q")]).reshape(
-        len(entries), n
-    )
-    return table(
+    n = len(recording.session.q) if recording.kind is ARM else 0
+    goals = [None if receipt is None else receipt.q for receipt in receipts]
+    q = np.array([[math.nan] * n if goal is None or len(goal) != n else goal for goal in goals])
+    return _table(
         "commands",
-        TableColumn("number", "", int, [entry.number for entry in entries]),
-        seconds("at", [entry.at for entry in entries]),
-        TableColumn("command", "", str, [_kind(entry) for entry in entries]),
-        TableColumn("command_id", "", int, told("command_id")),
-        TableColumn("status", "", str, [None if status is None else str(status) for status in told("status")]),
-        [seconds(name, told(name)) for name in _STAMPS],
-        _joints("q", q),
-        TableColumn("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
-        TableColumn("reason", "", str, [_reason(entry) for entry in entries]),
-        TableColumn("content", "", str, [_content(entry) for entry in entries]),
+        _fields(CommandRecord, entries, "number", "at_s"),
+        [TableColumn("command", str, [_kind(entry) for entry in entries])],
+        _fields(Receipt, receipts, "command_id", "status", *_STAMPS),
+        _joints("q", q.reshape(len(entries), n)),
+        [
+            TableColumn("refused", bool, [isinstance(one, CommandRecord) and one.refused for one in entries]),
+            TableColumn("reason", str, [_reason(entry) for entry in entries]),
+            TableColumn("content", str, [_content(entry) for entry in entries]),
+        ],
     )
 
 
-def _kind(entry: CommandEntry | Anchor) -> str:
+def _kind(entry: CommandRecord | Anchor) -> str:
     if isinstance(entry, Anchor):
         return "correction"
     return "undo" if entry.command is None else str(entry.command.__struct_config__.tag)
 
 
-def _reason(entry: CommandEntry | Anchor) -> str:
+def _reason(entry: CommandRecord | Anchor) -> str:
     if isinstance(entry, Anchor):
         return entry.reason
     return "" if entry.receipt is None else entry.receipt.reason
 
 
-def _content(entry: CommandEntry | Anchor) -> str | None:
+def _content(entry: CommandRecord | Anchor) -> str | None:
     """A command as JSON."""
     if isinstance(entry, Anchor) or entry.command is None:
         return None
     return msgspec.json.encode(entry.command, enc_hook=plain).decode()
 
 
-def receipts_table(recording: Recording) -> RecordingTable:
+def _receipts(recording: Recording) -> RecordingTable:
     """The newest truth about each command at each site."""
-    rows = [("virtual", receipt) for receipt in recording.receipts("virtual")]
-    rows += [("real", receipt) for receipt in recording.receipts("real")]
-
-    def told(name: str) -> list[Any]:
-        return [getattr(receipt, name) for _, receipt in rows]
-
-    return table(
+    virtual, real = recording.receipts("virtual"), recording.receipts("real")
+    told = "command_id", "status", *_STAMPS, "shift_s", "superseded_by", "undone", "reason"
+    return _table(
         "receipts",
-        TableColumn("site", "", str, [site for site, _ in rows]),
-        TableColumn("command_id", "", int, told("command_id")),
-        TableColumn("status", "", str, [str(status) for status in told("status")]),
-        [seconds(name, told(name)) for name in _STAMPS],
-        seconds("shift", told("shift")),
-        TableColumn("superseded_by", "", int, told("superseded_by")),
-        TableColumn("undone", "", bool, told("undone")),
-        TableColumn("reason", "", str, told("reason")),
+        [TableColumn("site", str, ["virtual"] * len(virtual) + ["real"] * len(real))],
+        _fields(Receipt, (*virtual, *real), *told),
     )
 
 
 def _segments(recording: Recording) -> RecordingTable:
     """The newest timeline, a row a segment and joint."""
-    rows: list[tuple[int, float, float, int | None, int, list[float]]] = []
-    for number, segment in enumerate(arm_timeline(recording.timeline).segments):
-        for joint, powers in enumerate(segment.coefficients.T.tolist(), start=1):
-            rows.append((number, segment.start, segment.duration, segment.command_id, joint, powers))
+    rows = [
+        (number, segment.start, segment.duration, segment.command_id, joint, powers)
+        for number, segment in enumerate(arm_timeline(recording.timeline).segments)
+        for joint, powers in enumerate(segment.coefficients.T.tolist(), start=1)
+    ]
     most = max((len(row[-1]) for row in rows), default=1)
-    return table(
+    names = [f"c{k}_rad" + f"_per_s{k if k > 1 else ''}" * (k > 0) for k in range(most)]
+    return _table(
         "segments",
-        TableColumn("segment", "", int, [row[0] for row in rows]),
-        seconds("start", [row[1] for row in rows]),
-        seconds("duration", [row[2] for row in rows]),
-        TableColumn("command_id", "", int, [row[3] for row in rows]),
-        TableColumn("joint", "", int, [row[4] for row in rows]),
-        [
-            TableColumn(
-                f"c{k}_{_power(k, '_per_')}", _power(k, "/"), float, [(row[5] + [0.0] * most)[k] for row in rows]
-            )
-            for k in range(most)
-        ],
+        _rows(rows, segment=int, start_s=float, duration_s=float, command_id=int, joint=int),
+        _rows([(row[-1] + [0.0] * most)[:most] for row in rows], **dict.fromkeys(names, float)),
     )
 
 
-def _power(k: int, per: str) -> str:
-    """Unit of a coefficient of a power."""
-    return RADIANS if k == 0 else f"{RADIANS}{per}s{k if k > 1 else ''}"
-
-
-def edits_table(recording: Recording) -> RecordingTable:
+def _edits(recording: Recording) -> RecordingTable:
     """The timelines that the virtual robot had."""
-    edits = recording.edits
-    return table(
-        "edits",
-        TableColumn("edit", "", int, [edit.number for edit in edits]),
-        seconds("at", [edit.at for edit in edits]),
-        TableColumn("version", "", int, [edit.timeline.version for edit in edits]),
-        TableColumn("command_id", "", int, [edit.command_id for edit in edits]),
-        seconds("end", [edit.timeline.end for edit in edits]),
-    )
+    rows = [(e.number, e.at, e.timeline.version, e.command_id, e.timeline.end) for e in recording.edits]
+    return _table("edits", _rows(rows, edit=int, at_s=float, version=int, command_id=int, end_s=float))
 
 
 def _packets(recording: Recording) -> RecordingTable:
-    packets = recording.packets
-    return table(
-        "packets",
-        TableColumn("command_id", "", int, [packet.command_id for packet in packets]),
-        TableColumn("real_id", "", int, [packet.real_id for packet in packets]),
-        seconds("sent", [packet.sent for packet in packets]),
-        seconds("arrived", [packet.arrived for packet in packets]),
-        TableColumn("lost", "", bool, [packet.lost for packet in packets]),
-    )
+    told = "command_id", "real_id", "sent_s", "arrived_s", "lost"
+    return _table("packets", _fields(CommandPacket, recording.packets, *told))
 
 
-def link_table(recording: Recording) -> RecordingTable:
-    """Packets of the link."""
+def _link(recording: Recording) -> RecordingTable:
     entries = recording.link
-    sized = any(entry.size for entry in entries)
-    return table(
-        "link",
-        TableColumn("direction", "", str, [entry.direction for entry in entries]),
-        seconds("sent", [entry.sent for entry in entries]),
-        seconds("arrived", [entry.arrived for entry in entries]),
-        TableColumn("lost", "", bool, [entry.lost for entry in entries]),
-        TableColumn("attempts", "", int, [entry.attempts for entry in entries]),
-        [TableColumn("size_byte", "byte", int, [entry.size for entry in entries])] if sized else [],
+    sized = ["size_byte"] * any(entry.size for entry in entries)
+    return _table(
+        "link", _fields(LinkEntry, entries, "direction", "sent_s", "arrived_s", "lost", "attempts", *sized)
     )
 
 
-def events_table(recording: Recording) -> RecordingTable:
-    """What else happened."""
-    events = recording.events
-    return table(
-        "events",
-        seconds("t", [event.t for event in events]),
-        TableColumn("kind", "", str, [event.kind for event in events]),
-        TableColumn("text", "", str, [event.text for event in events]),
-    )
-
-
-_POSTURE = (("x_m", "m"), ("y_m", "m"), ("theta_rad", "rad"))
-_DRIVE = (("v_m_per_s", "m/s"), ("w_rad_per_s", "rad/s"))
-
-
-def mobile_tables(recording: Recording) -> tuple[RecordingTable, ...]:
-    """All tables of a recording: `docs/recording.md` describes their columns.
-
-    Raises:
-        FormatError: If a message in it makes no sense.
-    """
-    return (
-        _virtual_postures(recording),
-        _real_postures(recording),
-        _postures(recording, "measured", MEASURED),
-        _postures(recording, "estimated", ESTIMATED),
-        commands_table(recording),
-        receipts_table(recording),
-        _arcs(recording),
-        edits_table(recording),
-        link_table(recording),
-        events_table(recording),
-        _environment(recording),
-    )
-
-
-def _columns(names: tuple[tuple[str, str], ...], values: Array) -> list[TableColumn]:
-    pairs = zip(names, values.T, strict=True)
-    return [TableColumn(name, unit, float, column.tolist()) for (name, unit), column in pairs]
-
-
-def _virtual_postures(recording: Recording) -> RecordingTable:
-    t = recording.track(VIRTUAL_POSTURE).t
-    return table("virtual", seconds("t", t.tolist()), _columns(_POSTURE, recording.virtual(t)))
-
-
-def _real_postures(recording: Recording) -> RecordingTable:
-    track = recording.track(REAL_POSTURE)
-    return table(
-        "real",
-        seconds("t", track.t.tolist()),
-        seconds("play", track.play.tolist()),
-        _columns(_POSTURE, track.q),
-        _columns(_DRIVE, track.reference),
-    )
+def _events(recording: Recording) -> RecordingTable:
+    return _table("events", _fields(RunEvent, recording.events, "t_s", "kind", "text"))
 
 
 def _postures(recording: Recording, name: str, topic: str) -> RecordingTable:
     track = recording.track(topic)
-    return table(name, seconds("t", track.t.tolist()), _columns(_POSTURE, track.q))
+    return _table(name, _numbers(["t_s", *_POSTURE], np.column_stack((track.t, track.q))))
 
 
 def _arcs(recording: Recording) -> RecordingTable:
     """The newest timeline, a row an arc."""
     timeline = recording.timeline
-    arcs = timeline.segments if isinstance(timeline, ArcTimeline) else ()
-    return table(
+    arcs = timeline.segments[:] if isinstance(timeline, ArcTimeline) else ()
+    return _table(
         "segments",
-        TableColumn("segment", "", int, list(range(len(arcs)))),
-        seconds("start", [arc.start for arc in arcs]),
-        seconds("duration", [arc.duration for arc in arcs]),
-        TableColumn("command_id", "", int, [arc.command_id for arc in arcs]),
-        _columns(_POSTURE, np.array([arc.posture for arc in arcs]).reshape(-1, 3)),
-        _columns(_DRIVE, np.array([(arc.v, arc.w) for arc in arcs]).reshape(-1, 2)),
+        _rows([(number,) for number in range(len(arcs))], segment=int),
+        _fields(ArcEntry, arcs, "start_s", "duration_s", "command_id"),
+        _numbers(_POSTURE, np.array([arc.posture for arc in arcs]).reshape(-1, 3)),
+        _fields(ArcEntry, arcs, *_DRIVE),
     )
 
 
@@ -336,22 +236,30 @@ def _environment(recording: Recording) -> RecordingTable:
         for came, flat in ((True, entry.added), (False, entry.gone))
         for i, j in zip(flat[::2], flat[1::2], strict=False)
     ]
-    return table(
-        "environment",
-        seconds("t", [row[0] for row in rows]),
-        TableColumn("came", "", bool, [row[1] for row in rows]),
-        TableColumn("i", "", int, [row[2] for row in rows]),
-        TableColumn("j", "", int, [row[3] for row in rows]),
-    )
+    return _table("environment", _rows(rows, t_s=float, came=bool, i=int, j=int))
 
 
 def tables(recording: Recording) -> tuple[RecordingTable, ...]:
     """A recording's tables: `docs/recording.md` describes their columns.
 
     Raises:
-        FormatError: If the recording's robot isn't known.
+        FormatError: If the recording's robot isn't known, or a message in it makes no sense.
     """
-    return arm_tables(recording) if recording.kind is ARM else mobile_tables(recording)
+    arm = recording.kind is ARM
+    thought = () if arm else (("measured", MEASURED), ("estimated", ESTIMATED))
+    return (
+        _virtual(recording),
+        _real(recording),
+        *(_postures(recording, name, topic) for name, topic in thought),
+        _commands(recording),
+        _receipts(recording),
+        (_segments if arm else _arcs)(recording),
+        _edits(recording),
+        *((_packets(recording),) if arm else ()),
+        _link(recording),
+        _events(recording),
+        *(() if arm else (_environment(recording),)),
+    )
 
 
 def write_csv(found: Iterable[RecordingTable], folder: Path) -> tuple[Path, ...]:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from interfaces.recording.history import arm_timeline
-from interfaces.recording.messages import COLLISION, OWN, Anchor, CommandEntry
-from interfaces.recording.recording import Recording
+from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandPacket, CommandRecord, RunEvent
+from interfaces.recording.history import AnyTimeline, arm_timeline
+from interfaces.recording.recording import ARM, Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.run_recorders import extras_of
 from interfaces.recording.track import (
@@ -27,7 +27,7 @@ from interfaces.recording.track import (
 )
 from interfaces.runs.drive_run import DriveCase, DriveRun, facts_of, row_of
 from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
-from interfaces.runs.twin_run import ADAPTIVE, CommandPacket, RunEvent, TwinRun, TwinSamples, carried_out, waits
+from interfaces.runs.twin_run import ADAPTIVE, TwinRun, TwinSamples, carried_out, waits
 from interfaces.teleop import Correction
 from interfaces.teleop.architectures import Transport
 from robots.ipr.robot import Collision
@@ -35,7 +35,7 @@ from robots.onboard.playout import PlayoutConfig
 from vrs.comparison import PathMatch, match_paths, measured_rows, resample
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt, Status
-from vrs.model import Array, frozen_array
+from vrs.model import Array
 from vrs.timeline import Timeline
 
 MOST = 36_000
@@ -126,36 +126,6 @@ MOST_ROWS = 1_000_000
 """Rows of a run's grid, at most."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunFigures:
-    """A run as its recording has it."""
-
-    run: TwinRun
-    attributions: tuple[Attribution, ...]
-    """Its measures split among causes; none where that wasn't recorded."""
-    offsets: tuple[OffsetOutcome, ...]
-    """What other choices of the offset made of the network."""
-    missing: tuple[str, ...]
-    """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
-
-
-def figures(recording: Recording) -> RunFigures:
-    """Everything that a run's summary and report are made of.
-
-    Raises:
-        FormatError: If the recording has too little of it: no model, no samples of the real robot.
-    """
-    reading = _Reading(recording)
-    run = reading.run()
-    attributions, offsets = reading.extras()
-    return RunFigures(run, attributions, offsets, (*reading.damage(), *reading.missing))
-
-
-def twin_run(recording: Recording) -> TwinRun:
-    """The run alone; see `figures`."""
-    return figures(recording).run
-
-
 def summary(recording: Recording) -> Json:
     """The run's summary: of a whole recording of the laboratory the run's own, else with a list `missing`.
 
@@ -171,46 +141,86 @@ def summary(recording: Recording) -> Json:
     return value | {"missing": list(missing)} if missing else value
 
 
-class _Reading:
-    """Puts a run together, and notes what is missing."""
+def _measured(recording: Recording, track: SampleTrack, t: Array, missing: list[str]) -> tuple[Array, Array, Array]:
+    """Play time [s], (k,), of the real robot, what was measured, and what it was told, at times [s], (k,)."""
+    rows = len(t)
+    if np.array_equal(track.t[:rows], t):
+        return track.play[:rows], track.q[:rows], track.reference[:rows]
+    missing += not_measured(track, t)
+    play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
+    q[track.unmeasured(t)] = np.nan
+    if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
+        raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
+    return np.maximum.accumulate(play), q, reference
+
+
+def _damage(recording: Recording) -> list[str]:
+    """What is missing from the file."""
+    found = []
+    if recording.damage:
+        found.append(f"the recording is damaged: {recording.damage}")
+    if recording.dropped:
+        counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(recording.dropped.items()))
+        found.append(f"messages for which the disk was too slow: {counts}")
+    return found
+
+
+def _shown(recording: Recording, again: Rerun, until: float, missing: list[str]) -> AnyTimeline:
+    """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
+    if not again.missing and not again.difference:
+        return again.timeline
+    missing.append(f"the virtual robot is as its recorded edits have it, since {again.difference or again.missing}")
+    if recording.certain < until:
+        missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
+    return recording.timeline
+
+
+def figures(recording: Recording) -> RunFigures:
+    """Everything that a run's summary and report are made of.
+
+    Raises:
+        FormatError: If the recording has too little of it: no model, no samples of the real robot.
+    """
+    return RunFigures(recording)
+
+
+class RunFigures:
+    """A run of an arm's twins as its recording has it, put together when it's made."""
 
     def __init__(self, recording: Recording) -> None:
         self.recording, self.begin, self.end = recording, recording.session, recording.end
-        self.missing: list[str] = []
         self._live = self.begin.driver == "live"
+        self._missing = _damage(recording)
+        self.run = self._run()
+        self.attributions, self.offsets = self._extras()
+        """Its measures split among causes, and what other offsets made of the network; none where not recorded."""
+        self.missing = tuple(self._missing)
+        """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
 
-    def damage(self) -> tuple[str, ...]:
-        """What is missing from the file."""
-        found = []
-        if self.recording.damage:
-            found.append(f"the recording is damaged: {self.recording.damage}")
-        if self.recording.dropped:
-            counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(self.recording.dropped.items()))
-            found.append(f"messages for which the disk was too slow: {counts}")
-        return tuple(found)
-
-    def extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
-        """What the recording was closed with."""
+    def _extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
         extras = None if self.end is None else self.end.extras
         if extras is None:
             if not self._live:
-                self.missing.append("what other runs say of the causes, and of other offsets")
+                self._missing.append("what other runs say of the causes, and of other offsets")
             return (), ()
         return extras_of(extras, str(self.recording.path))
 
-    def run(self) -> TwinRun:
+    def _run(self) -> TwinRun:
         """The run on its even grid."""
-        recording, begin, model = self.recording, self.begin, self.recording.model
+        recording, begin = self.recording, self.begin
+        if recording.kind is not ARM:
+            raise FormatError(str(recording.path), "of a mobile robot, which has no joints")
+        model = recording.model
         track = recording.track(REAL)
         t = self._grid(track)
-        play, q_real, q_reference = self._real(track, t)
+        play, q_real, q_reference = _measured(recording, track, t, self._missing)
         measured = measured_rows(q_real)
         again = rerun(recording)
-        shown = self._shown(again)
+        shown = arm_timeline(_shown(recording, again, math.inf, self._missing))
         corrections = self._corrections()
         alone = self._alone() if corrections else shown
         if not np.isfinite(q_reference).all():
-            self.missing.append("the real robot's own references: the virtual robot's timeline stands for its")
+            self._missing.append("the real robot's own references: the virtual robot's timeline stands for its")
             q_reference = np.where(np.isfinite(q_reference), q_reference, shown.sample(play))
         receipts = again.receipts if shown is again.timeline else recording.receipts("virtual")
         if begin.late is not None:
@@ -220,12 +230,7 @@ class _Reading:
         answers, messages = recording.receipts("real"), recording.messages()
         return TwinRun(
             model=model,
-            title=begin.title,
-            seed=0 if begin.seed is None else begin.seed,
-            delay=begin.delay,
-            offset=begin.offset,
-            service=begin.service,
-            link_loss=begin.link_loss,
+            session=begin,
             t=t,
             play=play,
             q_virtual=alone.sample(t),
@@ -266,18 +271,6 @@ class _Reading:
         t: Array = start + step * np.arange(first, last + 1, dtype=np.float64)
         return t
 
-    def _real(self, track: SampleTrack, t: Array) -> tuple[Array, Array, Array]:
-        """Play time [s], (k,), measured joints and references [rad], (k, n), at times [s], (k,)."""
-        rows = len(t)
-        if np.array_equal(track.t[:rows], t):
-            return track.play[:rows], track.q[:rows], track.reference[:rows]
-        self.missing += not_measured(track, t)
-        play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
-        q[track.unmeasured(t)] = np.nan
-        if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
-            raise FormatError(str(self.recording.path), f"holds no two samples of the real robot within {GAP} s")
-        return np.maximum.accumulate(play), q, reference
-
     def _samples(self, track: SampleTrack, alone: Timeline, shown: Timeline) -> TwinSamples | None:
         """See `TwinRun.samples`; of very many, some."""
         if self.begin.sampled is None:
@@ -287,25 +280,15 @@ class _Reading:
         reference = np.where(np.isfinite(reference), reference, shown.sample(play))
         return TwinSamples(t, alone.sample(t), shown.sample(t), alone.sample(play), q, reference)
 
-    def _shown(self, again: Rerun) -> Timeline:
-        """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
-        if not again.missing and not again.difference:
-            return arm_timeline(again.timeline)
-        why = again.difference or again.missing
-        self.missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
-        if self.recording.certain < math.inf:
-            self.missing.append(f"edits of the virtual robot's timeline after {self.recording.certain:.3f} s")
-        return arm_timeline(self.recording.timeline)
-
     def _corrections(self) -> tuple[Correction, ...]:
         anchors = (entry for entry in self.recording.commands if isinstance(entry, Anchor))
-        return tuple(Correction(made.at, made.end, frozen_array(made.error), made.reason) for made in anchors)
+        return tuple(Correction(made.at, made.end, made.error, made.reason) for made in anchors)
 
-    def _taken(self) -> list[tuple[CommandEntry, Receipt | None]]:
+    def _taken(self) -> list[tuple[CommandRecord, Receipt | None]]:
         """The commands that were carried out, with their receipts."""
         found = []
         for entry in self.recording.commands:
-            if isinstance(entry, CommandEntry):
+            if isinstance(entry, CommandRecord):
                 receipt = entry.receipt
                 if receipt is None or receipt.status is not Status.REJECTED:
                     found.append((entry, receipt))
@@ -319,12 +302,12 @@ class _Reading:
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[CommandPacket, ...]:
         if not self._live:
             if self.end is None:
-                self.missing.append("what became of commands that weren't answered yet")
+                self._missing.append("what became of commands that weren't answered yet")
             return self.recording.packets
         # The operator's site doesn't know when a command reached the robot, but when it left the emulated link.
         messages = messages[np.argsort(messages[:, 0], kind="stable")]
         known = {receipt.command_id for receipt in answers}
-        found = []
+        found = list[CommandPacket]()
         for entry, receipt in self._taken():
             if receipt is None:
                 continue
@@ -334,6 +317,7 @@ class _Reading:
             answered = receipt.command_id in known
             found.append(
                 CommandPacket(
+                    len(found) + 1,
                     receipt.command_id,
                     entry.at,
                     float(there.min()) if answered and len(there) else None,
@@ -405,17 +389,10 @@ def driven(recording: Recording) -> Driven:
     Raises:
         FormatError: If the recording has too little of it: no samples of the real robot, no known robot.
     """
-    missing: list[str] = []
-    if recording.damage:
-        missing.append(f"the recording is damaged: {recording.damage}")
+    missing = _damage(recording)
     track = recording.track(REAL_POSTURE)
     t = _drive_grid(recording, track)
-    missing += not_measured(track, t)
-    real = _on(t, track.t, track.q)
-    if len(t) != len(track.t):
-        real[track.unmeasured(t)] = np.nan
-        if len(track.gaps) == len(track.t) - 1:
-            raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
+    _, real, drives = _measured(recording, track, t, missing)
     packets = [entry for entry in recording.link if entry.direction == "forward"]
     case = _drive_case(recording)
     taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
@@ -426,8 +403,8 @@ def driven(recording: Recording) -> Driven:
         real=real,
         measured=_sampled(recording, MEASURED, t),
         estimated=_sampled(recording, ESTIMATED, t),
-        drives=_on(t, track.t, track.reference),
-        offset=_on(t, track.t, (track.t - track.play)[:, None])[:, 0],
+        drives=drives,
+        offset=resample(track.t, (track.t - track.play)[:, None], t)[:, 0],
         delays=np.array(taken).reshape(-1, 2),
         touched=tuple(Collision(e.t, e.text) for e in recording.events if e.kind == COLLISION),
         sent_bytes=sum(entry.size for entry in packets),
@@ -472,15 +449,7 @@ def _drive_grid(recording: Recording, track: SampleTrack) -> Array:
 
 def _virtual_postures(recording: Recording, t: Array, missing: list[str]) -> Array:
     """Postures of the virtual robot: as the commands make them, which is exact, or by its recorded edits."""
-    again = rerun(recording)
-    timeline = again.timeline
-    if again.missing or again.difference:
-        why = again.difference or again.missing
-        missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
-        timeline = recording.timeline
-        if recording.certain < t[-1]:
-            missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
-    virtual = timeline.sample(t)
+    virtual = _shown(recording, rerun(recording), float(t[-1]), missing).sample(t)
     if not matchable(virtual):
         raise FormatError(str(recording.path), f"its virtual robot drives further than {FARTHEST:g} m")
     return virtual
@@ -489,9 +458,4 @@ def _virtual_postures(recording: Recording, t: Array, missing: list[str]) -> Arr
 def _sampled(recording: Recording, topic: str, t: Array) -> Array:
     """Postures of a channel at times [s], (k, 3); NaN where it has none."""
     track = recording.track(topic)
-    return _on(t, track.t, track.q) if len(track.t) else np.full((len(t), 3), np.nan)
-
-
-def _on(t: Array, known: Array, values: Array) -> Array:
-    """Values (m, n) of times (m,) at other times (k,): the same ones where those are the same."""
-    return values if np.array_equal(t, known) else resample(known, values, t)
+    return track.on(t, "q") if len(track.t) else np.full((len(t), 3), np.nan)

@@ -9,6 +9,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
+import msgspec
+
 from interfaces.clients.playhead import Mode
 from interfaces.recording.marks import Mark
 from interfaces.recording.playback import Playback, PlaybackFrame, PlaybackMoment
@@ -162,18 +164,8 @@ def _facts(frame: PlaybackFrame, marks: Sequence[Mark]) -> dict[str, Any]:
         "play": frame.play,
         "behind": frame.behind,
         "error": frame.error,
-        "marks": [mark_facts(mark) for mark in marks],
+        "marks": msgspec.to_builtins(marks),
     }
-
-
-def mark_facts(mark: Mark) -> dict[str, Any]:
-    """A mark as JSON."""
-    facts: dict[str, Any] = {"t": mark.t, "kind": str(mark.kind), "text": mark.text}
-    if mark.span is not None:
-        facts["span"] = list(mark.span)
-    if mark.command_id is not None:
-        facts["command_id"] = mark.command_id
-    return facts
 
 
 def _joints(q: Array) -> str:

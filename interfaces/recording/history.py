@@ -3,102 +3,114 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import numpy as np
-
-from interfaces.engine_server.journal import SAME, changed, first_unlike
-from interfaces.messages import Change
-from interfaces.recording.messages import (
-    ArcChange,
-    ArcEntry,
-    ArcHistory,
-    ChangeEntry,
-    HistoryEntry,
-    SegmentEntry,
-    segments_of,
-)
+from interfaces.engine_server.journal import SAME, changed, difference, first_unlike
+from interfaces.messages.recording import ArcChange, ArcHistory, ChangeEntry, HistoryEntry, following
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import ArcPiece, ArcTimeline, wrapped
-from vrs.segment import HOLD, ArcSegment
+from vrs.segment import HOLD
 from vrs.timeline import Timeline
 
 PART = 256
-"""Arcs of one message of a history."""
+"""Segments of one message of a history."""
 MOST_CHANGED = 2048
-"""Arcs of an edit that's written as one; beyond that the whole timeline is, in parts."""
+"""Segments of an edit that's written as one; beyond that the whole timeline is, in parts."""
 OFF = 1e-6
 """By how much a posture may differ from where the arcs before it lead [m, rad]."""
 
+AnyChange: TypeAlias = ChangeEntry | ArcChange
+AnyEdit: TypeAlias = HistoryEntry | AnyChange
+AnyTimeline: TypeAlias = Timeline | ArcTimeline
+
 
 def edit_entries(
-    before: ArcTimeline, after: ArcTimeline, edit: int, at: float, command_id: int | None
-) -> tuple[ArcChange | ArcHistory, ...]:
-    """An edit as it stands in a recording; see `interfaces.recording.capture.edit_entries`.
+    before: AnyTimeline, after: AnyTimeline, edit: int, at: float, command_id: int | None, *, cut: int = 0
+) -> tuple[AnyEdit, ...]:
+    """An edit as it stands in a recording.
 
-    Where what was shifted along would come back otherwise, by a rounding error, it's the whole timeline.
+    Args:
+        before: The timeline before it.
+        after: The timeline after it.
+        edit: Its number, from 1.
+        at: The engine's time [s]: nothing changed before that.
+        command_id: Who made it, if a command did.
+        cut: First segment that the recording has; edits lie after it.
     """
+    entry: AnyChange | None
+    if isinstance(before, ArcTimeline):
+        assert isinstance(after, ArcTimeline)
+        entry = _arc_change(before, after, edit, at, command_id)
+    else:
+        entry = _change(before, arm_timeline(after), edit, at, command_id, cut)
+    return whole_entries(after, edit, at, cut=cut) if entry is None else (entry,)
+
+
+def _change(
+    before: Timeline, after: Timeline, edit: int, at: float, command_id: int | None, cut: int
+) -> ChangeEntry | None:
+    """An arm's edit; None where the whole timeline says it shorter."""
+    change = difference(before, after, at, edit=edit, command_id=command_id)
+    if change is None or len(change.segments) > MOST_CHANGED:
+        return None
+    return ChangeEntry(
+        edit=edit,
+        base=change.base,
+        at=at,
+        version=after.version,
+        first=change.first - cut,
+        dof=after.dof,
+        segments=change.segments,
+        tail=None if change.tail is None else change.tail - cut,
+        tail_start=change.tail_start,
+        end=change.end,
+        command_id=command_id,
+    )
+
+
+def _arc_change(
+    before: ArcTimeline, after: ArcTimeline, edit: int, at: float, command_id: int | None
+) -> ArcChange | None:
+    """A mobile robot's edit; None where what was shifted along would come back otherwise, by a rounding error."""
     since = min(before.index_at(at), after.index_at(at)) - 1
     first = first_unlike(before, after, max(since, 0)) if after.start == before.start else 0
     if after.start != before.start or len(after) - first > MOST_CHANGED:
-        return tuple(whole_entries(after, edit, at))
+        return None
     entry = ArcChange(
         edit=edit,
         base=edit - 1,
         at=at,
         version=after.version,
         first=first,
-        segments=_entries(after.segments[first : len(after)]),
+        segments=after.segments[first : len(after)],
         end=after.end,
         command_id=command_id,
     )
     made = changed_arcs(before, entry)
-    same = all(made.segment(k) == after.segment(k) for k in range(first, len(after)))
-    return (entry,) if same else tuple(whole_entries(after, edit, at))
+    return entry if all(made.segment(k) == after.segment(k) for k in range(first, len(after))) else None
 
 
-def whole_entries(timeline: ArcTimeline, edit: int, at: float) -> Iterator[ArcHistory]:
-    """A whole timeline as it stands in a recording, in parts."""
+def whole_entries(timeline: AnyTimeline, edit: int, at: float, *, cut: int = 0) -> tuple[HistoryEntry, ...]:
+    """A whole timeline as it stands in a recording, in parts; from a segment on, where `cut` isn't 0."""
     total = len(timeline)
-    for index in range(0, max(total, 1), PART):
-        yield ArcHistory(
+    start = timeline.start_of(cut) if cut else timeline.start
+    initial = timeline.sample(start) if cut else timeline.initial
+    arcs = isinstance(timeline, ArcTimeline)
+    return tuple(
+        (ArcHistory if arcs else HistoryEntry)(
             edit=edit,
             at=at,
             version=timeline.version,
-            initial=timeline.initial.tolist(),
-            start=timeline.start,
-            total=total,
-            index=index,
-            segments=_entries(timeline.segments[index : index + PART]),
+            initial=tuple(initial.tolist()) if arcs else initial,  # type: ignore[arg-type]
+            start=start,
+            total=total - cut,
+            index=index - cut,
+            segments=timeline.segments[index : index + PART],  # type: ignore[arg-type]
         )
-
-
-def _entries(arcs: Sequence[ArcSegment]) -> tuple[ArcEntry, ...]:
-    """Arcs for the file; the first one's start is always given."""
-    end: float | None = None
-    found = []
-    for arc in arcs:
-        start = None if arc.start == end else arc.start
-        found.append(ArcEntry(arc.duration, list(arc.posture), arc.v, arc.w, arc.command_id, start))
-        end = arc.start + arc.duration
-    return tuple(found)
-
-
-def whole(entry: ArcHistory, parts: Sequence[ArcEntry]) -> ArcTimeline:
-    """The timeline that all parts of a history make.
-
-    Raises:
-        InvalidValueError: If they make none.
-    """
-    start, arcs = entry.start, []
-    for part in parts:
-        start = start if part.start is None else part.start
-        x, y, theta = part.posture
-        arcs.append(ArcSegment(start, part.duration, (x, y, theta), part.v, part.w, part.command_id))
-        start += part.duration
-    return ArcTimeline(entry.initial, entry.start, arcs, entry.version)
+        for index in range(cut, max(total, cut + 1), PART)
+    )
 
 
 def changed_arcs(base: ArcTimeline, entry: ArcChange) -> ArcTimeline:
@@ -119,11 +131,6 @@ def changed_arcs(base: ArcTimeline, entry: ArcChange) -> ArcTimeline:
     if not math.isfinite(made.end) or abs(made.end - entry.end) > SAME * max(1.0, abs(entry.end)):
         raise InvalidValueError("change", entry.end, f"one that ends at {made.end} s")
     return made
-
-
-AnyHistory: TypeAlias = HistoryEntry | ArcHistory
-AnyChange: TypeAlias = ChangeEntry | ArcChange
-AnyTimeline: TypeAlias = Timeline | ArcTimeline
 
 
 def arm_timeline(timeline: AnyTimeline) -> Timeline:
@@ -160,32 +167,31 @@ class Chain:
         self.broken = False
         """Whether an edit after the newest known one is missing."""
 
-    def add(self, entry: AnyHistory | AnyChange) -> None:
+    def add(self, entry: AnyEdit) -> None:
         """Take the next message of the channel.
 
         Raises:
             FormatError: If it fits nothing.
         """
         try:
-            self._history(entry) if isinstance(entry, AnyHistory) else self._change(entry)
+            self._history(entry) if isinstance(entry, HistoryEntry) else self._change(entry)
         except InvalidValueError as error:
             raise FormatError(self._where, f"edit {entry.edit}: {error}") from None
 
-    def _history(self, entry: AnyHistory) -> None:
+    def _history(self, entry: HistoryEntry) -> None:
         if entry.index == 0:
             self._parts, self._edit = [], entry.edit
         if entry.edit != self._edit or entry.index != len(self._parts):
             self._edit = None
             return
-        self._parts += entry.segments
+        self._parts += following(entry.segments, self._parts[-1].end if self._parts else entry.start)
         if len(self._parts) < entry.total:
             return
         self._edit = None
         newest = self.edits[-1] if self.edits else None
         if newest is not None and newest.number >= entry.edit:
             return
-        made = whole(entry, self._parts) if isinstance(entry, ArcHistory) else _whole(entry, self._parts)
-        self._append(RecordedEdit(entry.edit, entry.at, made, None))
+        self._append(RecordedEdit(entry.edit, entry.at, whole(entry, self._parts), None))
         self.broken = False
 
     def _change(self, entry: AnyChange) -> None:
@@ -204,25 +210,17 @@ class Chain:
         self.times.append(max(edit.at, self.times[-1] if self.times else edit.at))
 
 
-def _whole(entry: HistoryEntry, parts: Sequence[SegmentEntry]) -> Timeline:
-    segments = segments_of(len(entry.initial), entry.start, parts)
-    if segments and not all(np.isfinite(segment.coefficients).all() for segment in segments):
-        raise InvalidValueError("coefficients", "infinity", "finite")
-    return Timeline(entry.initial, entry.start, segments, entry.version)
+def whole(entry: HistoryEntry, parts: Sequence[Any]) -> AnyTimeline:
+    """The timeline that the segments of all parts of a history make.
+
+    Raises:
+        InvalidValueError: If they make none.
+    """
+    kind = ArcTimeline if isinstance(entry, ArcHistory) else Timeline
+    return kind(entry.initial, entry.start, parts, entry.version)
 
 
 def _changed(base: Timeline, entry: ChangeEntry) -> Timeline:
     if entry.dof != base.dof:
         raise InvalidValueError("dof", entry.dof, f"{base.dof}")
-    segments = segments_of(entry.dof, base.start, entry.segments)
-    change = Change(
-        entry.edit,
-        entry.first,
-        entry.end,
-        entry.command_id,
-        entry.base,
-        entry.tail,
-        entry.tail_start,
-        segments=segments,
-    )
-    return changed(base, change).with_version(entry.version)
+    return changed(base, entry).with_version(entry.version)

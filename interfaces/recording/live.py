@@ -13,16 +13,16 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.messages import fields
+from interfaces.messages.recording import Begin, CommandRecord, End, RealSample, RunEvent
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import Begin, End, EventEntry, RealSample
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
-from interfaces.teleop import CommandRecord, Correction, RobotLine
+from interfaces.teleop import Correction, RobotLine
 from interfaces.teleop.samples import PERIOD
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
@@ -79,7 +79,7 @@ class _LiveCapture(Capture):
     def corrected(self, correction: Correction, truth: Timeline) -> None:
         super().corrected(correction, truth)
         for event in correction_events([correction]):
-            self.tell(event.t, event.kind, event.text)
+            self.add(event.t, fields.cut(event))
 
     def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
         super().answered(command_id, receipt, now=now)
@@ -108,7 +108,7 @@ class _LiveCapture(Capture):
 
     def tell(self, t: float, kind: str, text: str) -> None:
         """Write down an event."""
-        self.add(t, EventEntry(t, kind, fields.text(text)))
+        self.add(t, RunEvent(t, kind, fields.text(text)))
 
     def show_links(self, robot: str, paced: Paced, t: Array, q: Array) -> None:
         """Let the links of a robot, `virtual` or `real`, be shown; see `show`."""

@@ -5,22 +5,21 @@ from __future__ import annotations
 import enum
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.messages.recording import Anchor, CommandRecord, RunEvent
 from interfaces.runs.twin_run import correction_text
 from vrs.commands import DriveCommand, Motion, MotionCommand
 from vrs.ledger import Receipt, Status
 from vrs.model import Array
+from vrs.record import Record
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from interfaces.recording.history import AnyTimeline, RecordedEdit
     from interfaces.recording.recording import Recording
-    from interfaces.runs.twin_run import RunEvent
 
 CHANGED: Final = 1e-9
 """A predicted position that is off by more [rad] was falsified."""
@@ -75,8 +74,7 @@ _WORDS: Final = {"via": "via point", "scale": "time scaling", "retime": "another
 """What commands are called where the word of the wire isn't plain."""
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Mark(Record, frozen=True, omit_defaults=True, gc=False):
     """Something that happened at a time."""
 
     t: float
@@ -208,7 +206,7 @@ def _happened(event: RunEvent) -> Iterator[Mark]:
         yield Mark(event.t, kind, event.text)
 
 
-def _told(entry: CommandEntry | Anchor) -> Iterator[Mark]:
+def _told(entry: CommandRecord | Anchor) -> Iterator[Mark]:
     """The mark of a command, or of what put the virtual robot elsewhere."""
     if isinstance(entry, Anchor):
         text = correction_text(entry.end, np.asarray(entry.error), entry.reason)
@@ -220,13 +218,13 @@ def _told(entry: CommandEntry | Anchor) -> Iterator[Mark]:
         yield Mark(entry.at, _OF_STATUS[receipt.status], _described(entry, receipt), span, receipt.command_id)
 
 
-def _usual(entry: CommandEntry) -> bool:
+def _usual(entry: CommandRecord) -> bool:
     """Whether it's one of the many by which somebody drives."""
     accepted = entry.receipt is not None and entry.receipt.status is Status.ACCEPTED
     return accepted and isinstance(entry.command, DriveCommand)
 
 
-def _described(entry: CommandEntry, receipt: Receipt) -> str:
+def _described(entry: CommandRecord, receipt: Receipt) -> str:
     """A command and what became of it at first, in a line."""
     command = entry.command
     if command is None:

@@ -15,7 +15,6 @@ import struct
 import zlib
 from array import array
 from collections import Counter, OrderedDict
-from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -132,71 +131,28 @@ def head_of(data: bytes) -> Head | None:
     return Head(RECORD.size + length, size, checksum)
 
 
-class Unpacker:
-    """Unpacks blocks; for one thread at a time."""
-
-    def __init__(self) -> None:
-        self._zstd = zstandard.ZstdDecompressor()
-
-    def unpacked(self, data: bytes) -> bytes | None:
-        """The messages of a block, as records; None where it isn't what was written."""
-        head = head_of(data)
-        if head is None or head.length != len(data):
+def unpacked(data: bytes, zstd: zstandard.ZstdDecompressor) -> bytes | None:
+    """The messages of a block, as records; None where it isn't what was written."""
+    head = head_of(data)
+    if head is None or head.length != len(data):
+        return None
+    packed = memoryview(data)[HEAD:]
+    try:
+        # A frame that says its size is unpacked to that size, whatever limit is given.
+        if zstandard.frame_content_size(packed) != head.size:
             return None
-        packed = memoryview(data)[HEAD:]
-        try:
-            # A frame that says its size is unpacked to that size, whatever limit is given.
-            if zstandard.frame_content_size(packed) != head.size:
-                return None
-            content: bytes = self._zstd.decompress(packed, max_output_size=head.size)
-        except (zstandard.ZstdError, MemoryError):
-            return None
-        return content if len(content) == head.size and zlib.crc32(content) == head.checksum else None
+        content: bytes = zstd.decompress(packed, max_output_size=head.size)
+    except (zstandard.ZstdError, MemoryError):
+        return None
+    return content if len(content) == head.size and zlib.crc32(content) == head.checksum else None
 
 
-def messages(content: bytes, wanted: Container[int], where: str) -> list[bytes]:
-    """The messages of some channels in a block, in order, as they were written.
-
-    Args:
-        content: As `Unpacker` gave it.
-        wanted: Numbers of the channels in the file.
-        where: What to call it in an error.
+def _messages(content: bytes, where: str, topics: dict[int, str] | None = None) -> list[tuple[int, int, int, int]]:
+    """Number of the channel, log time, and place of the JSON of each message; topics are noted where they stand.
 
     Raises:
         FormatError: If a record runs over the end.
     """
-    return [content[start:end] for channel, _, start, end in _messages(content, where) if channel in wanted]
-
-
-class Contents(NamedTuple):
-    """What a block holds, without reading the messages."""
-
-    start: int
-    """Earliest log time [ns]."""
-    end: int
-    """Latest log time [ns]."""
-    counts: Mapping[int, int]
-    """Messages by the channel's number in the file."""
-    topics: dict[int, str]
-    """Topics by number that the block introduces."""
-
-
-def contents(content: bytes, where: str) -> Contents:
-    """Look through a block.
-
-    Raises:
-        FormatError: If a record is none.
-    """
-    topics: dict[int, str] = {}
-    times, counts = [], Counter[int]()
-    for channel, log_time, _, _ in _messages(content, where, topics):
-        times.append(log_time)
-        counts[channel] += 1
-    return Contents(min(times, default=0), max(times, default=0), counts, topics)
-
-
-def _messages(content: bytes, where: str, topics: dict[int, str] | None = None) -> list[tuple[int, int, int, int]]:
-    """Number of the channel, log time, and place of the JSON of each message; topics are noted where they stand."""
     at, size, last = 0, len(content), len(content) - _MESSAGE.size
     short, message, read = RECORD.size, _MESSAGE.size, _MESSAGE.unpack_from
     found = []
@@ -396,7 +352,7 @@ class Blocks:
         """
         self._source = source
         self._places = Places()
-        self._unpacker = Unpacker()
+        self._zstd = zstandard.ZstdDecompressor()
         self._held: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * (len(CHANNELS) + 1)
         self._looked = 0
         self._cache: OrderedDict[int, bytes] = OrderedDict()
@@ -509,8 +465,8 @@ class Blocks:
         content = self._content(index)
         if content is None:
             return []
-        wanted = [theirs for theirs, ours in self._numbers.items() if ours == number]
-        return messages(content, wanted, f"{self._source.where}, block {index + 1}")
+        found = _messages(content, f"{self._source.where}, block {index + 1}")
+        return [content[start:end] for channel, _, start, end in found if self._numbers.get(channel) == number]
 
     def _content(self, index: int) -> bytes | None:
         known = self._cache.get(index)
@@ -520,7 +476,7 @@ class Blocks:
         if index in self._bad:
             return None
         places = self._places
-        content = self._unpacker.unpacked(self._source.read(places.offsets[index], places.lengths[index]))
+        content = unpacked(self._source.read(places.offsets[index], places.lengths[index]), self._zstd)
         if content is None:
             self._bad.add(index)
             return None
@@ -602,20 +558,23 @@ class Blocks:
         if head is None or at + head.length > self._source.size:
             return False
         self._count(head.size + head.length)
-        content = self._unpacker.unpacked(self._ahead(at, head.length))
+        content = unpacked(self._ahead(at, head.length), self._zstd)
         if content is None:
             self._torn += 1
             return False
-        known = contents(content, f"{self._source.where}, at byte {at}")
-        self._numbers |= {number: NUMBERS[topic] for number, topic in known.topics.items() if topic in NUMBERS}
-        follows = at in (self._tail, self._expected) if len(self) else bool(known.topics)
+        topics: dict[int, str] = {}
+        found = _messages(content, f"{self._source.where}, at byte {at}", topics)
+        counts = Counter(channel for channel, *_ in found)
+        times = [log_time for _, log_time, *_ in found] or [0]
+        self._numbers |= {number: NUMBERS[topic] for number, topic in topics.items() if topic in NUMBERS}
+        follows = at in (self._tail, self._expected) if len(self) else bool(topics)
         if not follows:
-            until = max(self._newest, known.end)
+            until = max(self._newest, *times)
             self._gaps.append(_Gap(len(self), self._newest, until, max(self._torn, 1)))
-        self._places.add(at, head.length, known.start, known.end, head.size, frozenset(known.counts))
-        self._newest = max(self._newest, known.end)
+        self._places.add(at, head.length, min(times), max(times), head.size, frozenset(counts))
+        self._newest = max(self._newest, *times)
         self._tail = at + head.length
-        self._expected = self._tail + sum(_INDEX + _INDEXED * count for count in known.counts.values())
+        self._expected = self._tail + sum(_INDEX + _INDEXED * count for count in counts.values())
         self._torn = 0
         return True
 

@@ -7,7 +7,9 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import replace
-from typing import Any, Final, TypeAlias
+from functools import reduce
+from operator import or_
+from typing import Any, Final
 
 import msgspec
 from starlette.requests import HTTPConnection, Request
@@ -98,20 +100,7 @@ class _ToMarkWish(_Wish, frozen=True, tag="mark"):
     back: bool = False
 
 
-_Any: TypeAlias = (
-    _PlayWish
-    | _PauseWish
-    | _ToggleWish
-    | _RateWish
-    | _StepWish
-    | _SeekWish
-    | _SkipWish
-    | _LoopWish
-    | _UnloopWish
-    | _LiveWish
-    | _ToMarkWish
-)
-_decoder = msgspec.json.Decoder(_Any)
+_decoder: msgspec.json.Decoder[_Wish] = msgspec.json.Decoder(reduce(or_, _Wish.__subclasses__()))
 
 
 class ReplayPage:
@@ -227,7 +216,7 @@ class ReplayPage:
             return json.dumps({"kind": "refused", "text": str(error)})
         return ""
 
-    def _do(self, wish: _Any, now: float) -> None:
+    def _do(self, wish: _Wish, now: float) -> None:
         playback = self.playback
         match wish:
             case _PlayWish(rate):

@@ -70,11 +70,11 @@ class PoseInFrame(Record, frozen=True, gc=False):
 
 
 class VirtualPose(PoseInFrame, frozen=True, gc=False):
-    """Of the virtual robot's last link, or of the mobile robot."""
+    """The virtual robot's last link in `base`, or the mobile robot in `world`, to 1e-9; at most 6 a second."""
 
 
 class RealPose(PoseInFrame, frozen=True, gc=False):
-    """Of the real robot's last link, or of the mobile robot."""
+    """The same of the real robot."""
 
 
 class FrameTransform(Record, frozen=True, gc=False):
@@ -88,7 +88,7 @@ class FrameTransform(Record, frozen=True, gc=False):
 
 
 class FrameTransforms(Record, frozen=True, gc=False):
-    """`foxglove.FrameTransforms`."""
+    """Links `virtual/1` … `real/6`, each in the one before, or robots in `world`, to 1e-6; at most 6 a second."""
 
     transforms: tuple[FrameTransform, ...]
 
@@ -103,31 +103,24 @@ def timestamp(t: float) -> Timestamp:
     return Timestamp(*divmod(nanoseconds(t), _NANO))
 
 
-def virtual_pose(t: float, X: Array) -> VirtualPose:
-    """The pose of the virtual robot's last link in the base frame, X (4, 4), at a time [s]."""
-    return VirtualPose(timestamp(t), BASE, _pose(X))
+def virtual_pose(t: float, X: Array, frame: str = BASE) -> VirtualPose:
+    """The pose of the virtual robot's last link, or of the mobile robot, X (4, 4), in a frame, at a time [s]."""
+    return VirtualPose(timestamp(t), frame, _pose(X))
 
 
-def real_pose(t: float, X: Array) -> RealPose:
-    """The pose of the real robot's last link in the base frame, X (4, 4), at a time [s]."""
-    return RealPose(timestamp(t), BASE, _pose(X))
+def real_pose(t: float, X: Array, frame: str = BASE) -> RealPose:
+    """The same of the real robot."""
+    return RealPose(timestamp(t), frame, _pose(X))
 
 
-def placed_pose(t: float, X: Array, *, virtual: bool) -> VirtualPose | RealPose:
-    """The pose of a mobile robot on the floor, X (4, 4), at a time [s]."""
-    return (VirtualPose if virtual else RealPose)(timestamp(t), WORLD, _pose(X))
+def robot_frames(t: float, parent: str, names: Sequence[str], X: Array) -> FrameTransforms:
+    """Frames at a time [s], by name, and their poses (m, 4, 4) in a parent's."""
+    stamp, rows = timestamp(t), _rows(X, LINK_DIGITS)
+    return FrameTransforms(tuple(_placed(stamp, parent, *one) for one in zip(names, rows, strict=True)))
 
 
-def frames(t: float, robots: Sequence[tuple[str, Array]]) -> FrameTransforms:
-    """Mobile robots as frames on the floor: their names and poses, (4, 4), at a time [s]."""
-    stamp = timestamp(t)
-    rows = _rows(np.stack([X for _, X in robots]), LINK_DIGITS)
-    return FrameTransforms(
-        tuple(
-            FrameTransform(stamp, WORLD, name, Vector3(*row[:3]), Quaternion(*row[3:]))
-            for (name, _), row in zip(robots, rows, strict=True)
-        )
-    )
+def _placed(stamp: Timestamp, parent: str, name: str, row: list[float]) -> FrameTransform:
+    return FrameTransform(stamp, parent, name, Vector3(*row[:3]), Quaternion(*row[3:]))
 
 
 def _pose(X: Array) -> Pose:
@@ -152,7 +145,7 @@ def link_transforms(t: float, robots: Sequence[tuple[str, Array]]) -> FrameTrans
         parent = BASE
         for number, row in enumerate(_rows(X_PL, LINK_DIGITS), 1):
             child = f"{name}/{number}"
-            found.append(FrameTransform(stamp, parent, child, Vector3(*row[:3]), Quaternion(*row[3:])))
+            found.append(_placed(stamp, parent, child, row))
             parent = child
     return FrameTransforms(tuple(found))
 

@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from threading import Event, Lock, Thread
 
+from interfaces.messages.recording import Begin, Drop, Dropped, End
 from interfaces.recording.channels import CHANNELS, Message
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import RawFile, Sink
 from interfaces.recording.mcap_reading import LONGEST
-from interfaces.recording.messages import Begin, Drop, Dropped, End
 from interfaces.recording.writer import FLUSH, RecordingWriter, encoded
 from vrs.clock import Clock, WallClock
 

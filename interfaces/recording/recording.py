@@ -4,39 +4,42 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from interfaces.recording.errors import Damage
-from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
-from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     Anchor,
     Begin,
     CellsEntry,
-    CommandEntry,
+    CommandPacket,
+    CommandRecord,
     Dropped,
     End,
-    EventEntry,
     GivenEntry,
     LinkEntry,
-    PacketEntry,
     ReceiptEntry,
     RoomEntry,
+    RunEvent,
 )
+from interfaces.recording.errors import Damage
+from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
-from interfaces.runs.twin_run import CommandPacket, RunEvent
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
-from vrs.model import Array, RobotModel, frozen_array
+from vrs.model import Array, frozen_array
 from vrs.segment import times
+
+POSTURE = 3
+"""Numbers of a posture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,22 +56,14 @@ class RecordingKind:
     """Topic of the real robot's."""
     unit: str
     """Of how far the real robot is from the virtual one: `rad` or `m`."""
+    state: str
+    """What an engine calls where it begins."""
 
 
-ARM: Final = RecordingKind("an arm", "arm", VIRTUAL, REAL, "rad")
+ARM: Final = RecordingKind("an arm", "arm", VIRTUAL, REAL, "rad", "q")
 """Joints, and polynomials on its timeline."""
-MOBILE: Final = RecordingKind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m")
+MOBILE: Final = RecordingKind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m", "posture")
 """Postures, and arcs on its timeline."""
-
-
-def kind_of(begin: Begin) -> RecordingKind:
-    """The kind of a recording's robot."""
-    return ARM if begin.drive is None else MOBILE
-
-
-def references(begin: Begin) -> int:
-    """How many numbers the real robot was told at a time: a reference a joint; v and ω."""
-    return len(begin.q) if begin.drive is None else 2
 
 
 def shows(begin: Begin) -> list[str]:
@@ -78,14 +73,17 @@ def shows(begin: Begin) -> list[str]:
     return ["driven"] if begin.drive.grid is None else ["driven", "learned"]
 
 
-def _puma560() -> RobotModel:
-    from robots import puma560
+def _model(begin: Begin) -> Any:
+    """The model of a robot that is known here; None of any other."""
+    if begin.drive is None:
+        from robots import puma560
 
-    return puma560.model()
+        model = puma560.model()
+        return model if begin.robot == "puma560" and len(begin.q) == model.limits.dof else None
+    from robots import ipr
 
-
-MODELS: Final[dict[str, Callable[[], RobotModel]]] = {"puma560": _puma560}
-"""Arms that recordings may be of."""
+    body = "micro" if begin.drive.body == "micro" else "ipr"
+    return ipr.model(body, period=begin.drive.period) if begin.robot == "ipr" and len(begin.q) == POSTURE else None
 
 
 def open_recording(path: Path | str) -> Recording:
@@ -117,11 +115,13 @@ class Recording:
                 raise FormatError(str(path), "isn't a recording, or the block that it begins with is destroyed")
             self.session: Begin = begin
             """How the run was set up."""
-            self.kind: RecordingKind = kind_of(begin)
+            self.kind: RecordingKind = ARM if begin.drive is None else MOBILE
             """What its robot is."""
-            self._tracks = Tracks(self._blocks, len(begin.q), references(begin), str(path))
+            # A reference a joint; v and ω.
+            told = len(begin.q) if begin.drive is None else 2
+            self._tracks = Tracks(self._blocks, len(begin.q), told, str(path))
             self._chain, self._applied = Chain(str(path)), 0
-            self._model: RobotModel | None = None
+            self._model: Any = None
         except FormatError:
             self._source.close()
             raise
@@ -186,20 +186,16 @@ class Recording:
         return found
 
     @property
-    def model(self) -> RobotModel:
-        """The arm.
+    def model(self) -> Any:
+        """The robot's model: a `RobotModel`, or an `Ipr`.
 
         Raises:
             FormatError: If it's none that is known here, or has other joints.
         """
         if self._model is None:
-            if self.session.drive is not None:
-                raise FormatError(str(self.path), "of a mobile robot, which has no joints")
-            made = MODELS.get(self.session.robot)
-            model = None if made is None else made()
-            if model is None or model.limits.dof != len(self.session.q):
+            self._model = _model(self.session)
+            if self._model is None:
                 raise FormatError(str(self.path), f"of a robot that isn't known here: {self.session.robot!r}")
-            self._model = model
         return self._model
 
     @property
@@ -216,9 +212,9 @@ class Recording:
         return start, last
 
     @property
-    def commands(self) -> tuple[CommandEntry | Anchor, ...]:
+    def commands(self) -> tuple[CommandRecord | Anchor, ...]:
         """What the operator's engine was told, in order; numbers are missing where blocks are."""
-        return tuple(entry for entry in self._commands() if isinstance(entry, CommandEntry | Anchor))
+        return tuple(entry for entry in self._commands() if isinstance(entry, CommandRecord | Anchor))
 
     def receipts(self, site: Literal["virtual", "real"]) -> tuple[Receipt, ...]:
         """The newest truth about each command at a site, by command id."""
@@ -227,17 +223,15 @@ class Recording:
             if isinstance(entry, ReceiptEntry):
                 if entry.site == site:
                     found[entry.receipt.command_id] = entry.receipt
-            elif isinstance(entry, CommandEntry | GivenEntry) and site == "virtual" and entry.receipt is not None:
+            elif isinstance(entry, CommandRecord | GivenEntry) and site == "virtual" and entry.receipt is not None:
                 found[entry.receipt.command_id] = entry.receipt
         return tuple(found[command_id] for command_id in sorted(found))
 
     @property
     def packets(self) -> tuple[CommandPacket, ...]:
         """Commands on their way across the link, in the order of sending; what is newest about each."""
-        found = {entry.number: entry for entry in self._commands() if isinstance(entry, PacketEntry)}
-        return tuple(
-            CommandPacket(e.command_id, e.sent, e.arrived, e.real_id, e.lost) for _, e in sorted(found.items())
-        )
+        found = {entry.number: entry for entry in self._commands() if isinstance(entry, CommandPacket)}
+        return tuple(found[number] for number in sorted(found))
 
     @property
     def given(self) -> tuple[Known, ...]:
@@ -251,17 +245,16 @@ class Recording:
         except InvalidValueError as error:
             raise FormatError(str(self.path), f"a command from before it: {error}") from None
 
-    def _commands(self) -> list[CommandEntry | Anchor | ReceiptEntry | PacketEntry | GivenEntry]:
+    def _commands(self) -> list[CommandRecord | Anchor | ReceiptEntry | CommandPacket | GivenEntry]:
         return self.logs["/commands"].entries()
 
     @property
     def events(self) -> tuple[RunEvent, ...]:
         """What else happened, by time."""
-        entries: list[EventEntry] = self.logs["/events"].entries()
-        return tuple(RunEvent(e.t, e.kind, e.text) for e in sorted(entries, key=lambda entry: entry.t))
+        return tuple(sorted(self.logs["/events"].entries(), key=attrgetter("t")))
 
     @property
-    def changes(self) -> tuple[AnyHistory | AnyChange, ...]:
+    def changes(self) -> tuple[AnyEdit, ...]:
         """The messages about the timeline, as they stand in the file."""
         return tuple(self.logs["/timeline"].entries())
 

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from interfaces.recording import capture, history
-from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
-from interfaces.recording.messages import Anchor, CommandEntry, Late
-from interfaces.recording.recording import Recording
-from robots.ipr.model import Ipr
-from robots.ipr.model import model as ipr_model
+from interfaces.messages.fields import plain
+from interfaces.messages.recording import Anchor, CommandRecord, Late
+from interfaces.recording.history import AnyEdit, AnyTimeline, edit_entries
+from interfaces.recording.recording import MOBILE, Recording
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import FormatError, VrsError
 from vrs.ledger import Receipt, Standing, Status
-from vrs.mobile import ArcTimeline
 from vrs.timeline import Timeline
-
-POSTURE = 3
-"""Numbers of a posture."""
-NAME = "ipr"
-"""The mobile robot that is known here."""
 
 
 def begun(recording: Recording) -> tuple[Engine, ManualClock]:
@@ -34,19 +27,18 @@ def begun(recording: Recording) -> tuple[Engine, ManualClock]:
     Raises:
         FormatError: If it can't stand so, or what it needs for that is missing from the file.
     """
-    return _arm(recording) if recording.session.drive is None else _mobile(recording)
-
-
-def _arm(recording: Recording) -> tuple[Engine, ManualClock]:
-    begin, where = recording.session, str(recording.path)
+    begin, where, model = recording.session, str(recording.path), recording.model
+    if begin.late is not None and recording.kind is MOBILE:
+        raise FormatError(where, "it begins in the middle of a session, which isn't known of mobile robots")
     try:
         clock, lateness = ManualClock(begin.t), Lateness(begin.lateness)
         if begin.late is None:
-            return Engine(recording.model, q=begin.q, clock=clock, lateness=lateness), clock
+            start: dict[str, Any] = {recording.kind.state: begin.q}
+            return Engine(model, **start, clock=clock, lateness=lateness), clock
         edits = recording.edits
         if not edits or edits[0].number or not isinstance(edits[0].timeline, Timeline):
             raise FormatError(where, "the timeline that it begins with is destroyed")
-        engine = Engine(recording.model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
+        engine = Engine(model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
         engine.take_up(_stand(recording, begin.late, engine))
     except FormatError:
         raise
@@ -63,59 +55,13 @@ def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
     return Standing(late.newest, Lateness(recording.session.lateness), limits, steered, recording.given)
 
 
-def _mobile(recording: Recording) -> tuple[Engine, ManualClock]:
-    begin, where = recording.session, str(recording.path)
-    model = mobile_model(recording)
-    if begin.late is not None:
-        raise FormatError(where, "it begins in the middle of a session, which isn't known of mobile robots")
-    try:
-        clock = ManualClock(begin.t)
-        return Engine(model, posture=begin.q, clock=clock, lateness=Lateness(begin.lateness)), clock
-    except ValueError as error:
-        raise FormatError(where, f"its beginning: {error}") from None
-
-
-def mobile_model(recording: Recording) -> Ipr:
-    """The mobile robot of a recording.
-
-    Raises:
-        FormatError: If it's none that is known here.
-    """
-    begin = recording.session
-    facts = begin.drive
-    if facts is None or begin.robot != NAME or len(begin.q) != POSTURE:
-        raise FormatError(str(recording.path), f"of a robot that isn't known here: {begin.robot!r}")
-    return ipr_model("micro" if facts.body == "micro" else "ipr", period=facts.period)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rerun:
-    """What became of recorded commands on a fresh engine."""
-
-    identical: bool
-    """Whether every timeline and receipt that could be compared is the same to the last digit."""
-    commands: int
-    """Commands and corrections that were run again."""
-    versions: int
-    """Timelines that were compared."""
-    difference: str
-    """The first that differs; empty where none does."""
-    missing: str
-    """Why some couldn't be run or compared; empty where all could."""
-    timeline: AnyTimeline
-    """What they made."""
-    receipts: tuple[Receipt, ...]
-    """The newest truth about each command."""
-
-
 def rerun(recording: Recording) -> Rerun:
     """Run the recorded commands again, up to the first that's missing or that makes something else.
 
     Raises:
         FormatError: If the recording is of a robot that isn't known, or holds no commands that can be.
     """
-    engine, clock = begun(recording)
-    again = _Again(engine, clock, recording.changes, late=recording.session.late)
+    again = Rerun(*begun(recording), recording.changes, recording.session.late)
     for entry in recording.commands:
         if entry.number != again.commands + 1:
             some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
@@ -128,41 +74,48 @@ def rerun(recording: Recording) -> Rerun:
             break
     else:
         again.finish()
-    return Rerun(
-        not again.difference,
-        again.commands,
-        again.versions,
-        again.difference,
-        again.missing,
-        engine.timeline,
-        engine.receipts,
-    )
+    return again
 
 
-class _Again:
-    """Runs entries in turn, and compares."""
+class Rerun:
+    """What became of recorded commands on a fresh engine."""
 
-    def __init__(
-        self,
-        engine: Engine,
-        clock: ManualClock,
-        changes: Sequence[AnyHistory | AnyChange],
-        *,
-        late: Late | None,
-    ) -> None:
+    def __init__(self, engine: Engine, clock: ManualClock, changes: Sequence[AnyEdit], late: Late | None) -> None:
         self._engine, self._clock, self._late = engine, clock, late
-        self._recorded: dict[int, list[AnyHistory | AnyChange]] = {}
+        self._recorded: dict[int, list[AnyEdit]] = {}
         for change in changes:
             self._recorded.setdefault(change.edit, []).append(change)
         first = self._recorded.pop(0, [])
-        self.commands = self.versions = self._edit = 0
-        self.difference = self.missing = ""
+        self.commands = 0
+        """Commands and corrections that were run again."""
+        self.versions = 0
+        """Timelines that were compared."""
+        self.difference = ""
+        """The first that differs; empty where none does."""
+        self.missing = ""
+        """Why some couldn't be run or compared; empty where all could."""
         if first and first[0].version != engine.timeline.version:
             self.difference = "the recording begins with a timeline that commands before it had made"
+        self._edit = 0
         self._taken_up = {receipt.command_id for receipt in engine.receipts}
         self._unseen: list[int] = []
 
-    def run(self, entry: CommandEntry | Anchor) -> None:
+    @property
+    def identical(self) -> bool:
+        """Whether every timeline and receipt that could be compared is the same to the last digit."""
+        return not self.difference
+
+    @property
+    def timeline(self) -> AnyTimeline:
+        """What they made."""
+        return self._engine.timeline
+
+    @property
+    def receipts(self) -> tuple[Receipt, ...]:
+        """The newest truth about each command."""
+        return self._engine.receipts
+
+    def run(self, entry: CommandRecord | Anchor) -> None:
         """Run one entry, and compare what it makes."""
         self.commands += 1
         engine, before = self._engine, self._engine.timeline
@@ -171,7 +124,7 @@ class _Again:
             receipt = None
             if isinstance(entry, Anchor):
                 made = engine.anchor(entry.truth)
-                same = (made.end, made.error.tolist()) == (entry.end, list(entry.error))
+                same = made.end == entry.end and np.array_equal(made.error, entry.error)
                 command_id, problem = None, "" if same else "joins the real robot's plan otherwise"
             else:
                 receipt = self._carry_out(entry)
@@ -188,9 +141,9 @@ class _Again:
         elif engine.timeline is not before:
             self._edit += 1
             after = engine.timeline
-            self._compare(_entries(before, after, self._edit, entry.at, command_id), entry)
+            self._compare(edit_entries(before, after, self._edit, entry.at, command_id), entry)
 
-    def _goes_back(self, entry: CommandEntry | Anchor, made: Receipt | None) -> bool:
+    def _goes_back(self, entry: CommandRecord | Anchor, made: Receipt | None) -> bool:
         """Whether a command needs what only an engine from before the recording knows."""
         late = self._late
         if late is None or isinstance(entry, Anchor):
@@ -207,7 +160,7 @@ class _Again:
             )
         return undone or resumed or unknown
 
-    def _carry_out(self, entry: CommandEntry) -> Receipt | None:
+    def _carry_out(self, entry: CommandRecord) -> Receipt | None:
         command = entry.command
         if entry.refused and command is not None:
             return self._engine.refuse(command, "" if entry.receipt is None else entry.receipt.reason)
@@ -216,7 +169,7 @@ class _Again:
         answer: object = self._engine.execute(command)  # type: ignore[arg-type]
         return answer if isinstance(answer, Receipt) else None
 
-    def _compare(self, made: tuple[AnyChange | AnyHistory, ...], entry: CommandEntry | Anchor) -> None:
+    def _compare(self, made: tuple[AnyEdit, ...], entry: CommandRecord | Anchor) -> None:
         recorded = self._recorded.pop(self._edit, None)
         if recorded is None:
             self._unseen.append(self._edit)
@@ -224,8 +177,8 @@ class _Again:
         self.versions += 1
         # The newest timeline stands in the file once more, as a whole.
         for mine, theirs in zip(made, recorded, strict=False):
-            if mine != theirs:
-                self.difference = f"{_named(entry)} makes another timeline: {_first(mine, theirs)}"
+            if unlike := _first(mine.as_written(), theirs.as_written()):
+                self.difference = f"{_named(entry)} makes another timeline: {unlike}"
                 return
         if len(made) > len(recorded):
             self.difference = f"{_named(entry)} makes another timeline: {len(made)} parts, not {len(recorded)}"
@@ -238,18 +191,7 @@ class _Again:
             self.missing = f"what made edit {min(self._recorded)} isn't in the recording"
 
 
-def _entries(
-    before: AnyTimeline, after: AnyTimeline, edit: int, at: float, command_id: int | None
-) -> tuple[AnyChange | AnyHistory, ...]:
-    """An edit as it stands in a recording."""
-    if isinstance(before, Timeline):
-        assert isinstance(after, Timeline)
-        return capture.edit_entries(before, after, edit, at, command_id)
-    assert isinstance(after, ArcTimeline)
-    return history.edit_entries(before, after, edit, at, command_id)
-
-
-def _named(entry: CommandEntry | Anchor) -> str:
+def _named(entry: CommandRecord | Anchor) -> str:
     if isinstance(entry, Anchor):
         return f"the correction at {entry.at:.6f} s"
     if entry.command is None:
@@ -262,24 +204,17 @@ def _unlike(made: Receipt | None, recorded: Receipt | None) -> str:
     """How a receipt differs from the recorded one, names of others aside; empty where it doesn't."""
     if made is None or recorded is None:
         return "" if made is None and recorded is None else "has a receipt in one of the runs alone"
-    for name in made.__struct_fields__:
-        a, b = (
-            value.tolist() if isinstance(value, np.ndarray) else value
-            for value in (getattr(made, name), getattr(recorded, name))
-        )
-        if name not in {"shifted_names", "superseded_names"} and a != b:
+    for name, a, b in _differing(made, recorded):
+        if name not in {"shifted_names", "superseded_names"}:
             return f"is answered with {name} {a!r}, not {b!r}"
     return ""
 
 
 def _first(mine: msgspec.Struct, theirs: msgspec.Struct) -> str:
-    """Where two messages first differ."""
+    """Where two messages first differ, as they're written; empty where they don't."""
     if type(mine) is not type(theirs):
         return "it begins elsewhere"
-    for name in mine.__struct_fields__:
-        a, b = getattr(mine, name), getattr(theirs, name)
-        if a == b:
-            continue
+    for name, a, b in _differing(mine, theirs):
         if name != "segments":
             return f"{name} {a!r}, not {b!r}"
         if len(a) != len(b):
@@ -287,4 +222,12 @@ def _first(mine: msgspec.Struct, theirs: msgspec.Struct) -> str:
         for number, (segment, other) in enumerate(zip(a, b, strict=True)):
             if segment != other:
                 return f"of new segment {number}, {_first(segment, other)}"
-    return "nothing"
+    return ""
+
+
+def _differing(mine: msgspec.Struct, theirs: msgspec.Struct) -> Iterator[tuple[str, Any, Any]]:
+    """Fields that two values of a kind don't have in common, and what is in them; arrays as lists."""
+    for name in mine.__struct_fields__:
+        a, b = (plain(v) if isinstance(v, np.ndarray) else v for v in (getattr(mine, name), getattr(theirs, name)))
+        if a != b:
+            yield name, a, b

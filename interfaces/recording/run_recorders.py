@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import replace
 from functools import partial
 from math import isnan
 from operator import itemgetter
@@ -16,33 +16,42 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link import PacketRecord
+from interfaces.messages import recording as d
 from interfaces.messages.commands import portable
-from interfaces.messages.fields import text
-from interfaces.recording import messages as d
-from interfaces.recording.capture import Capture
-from interfaces.recording.channels import Message
-from interfaces.recording.errors import RecordingError
-from interfaces.recording.history import edit_entries, whole_entries
-from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import (
+from interfaces.messages.fields import cut, text
+from interfaces.messages.recording import (
     COLLISION,
     Begin,
-    CommandEntry,
+    CommandPacket,
+    CommandRecord,
+    Direction,
     End,
-    EventEntry,
     LinkEntry,
-    PacketEntry,
     RealSample,
+    RunEvent,
     grid_facts,
     room_entry,
 )
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, frames, link_transforms, placed_pose, real_pose
+from interfaces.recording.capture import Capture, link_entry
+from interfaces.recording.channels import Message
+from interfaces.recording.errors import RecordingError
+from interfaces.recording.history import edit_entries, whole_entries
+from interfaces.recording.poses import (
+    LINK_RATE,
+    POSE_RATE,
+    WORLD,
+    Paced,
+    link_transforms,
+    real_pose,
+    robot_frames,
+    virtual_pose,
+)
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.runs.summary import CAUSES, Attribution, Measures, OffsetOutcome
-from interfaces.runs.twin_run import CommandPacket, RunEvent, RunFacts, Turn, TwinRun
+from interfaces.runs.twin_run import Turn, TwinRun
 from interfaces.system import software
-from interfaces.teleop import CommandRecord, OperatorSite
+from interfaces.teleop import OperatorSite
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
@@ -50,7 +59,7 @@ from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture
 from vrs.commands import Lateness
 from vrs.errors import FormatError
-from vrs.mobile import ArcTimeline, Grid
+from vrs.mobile import Grid
 from vrs.model import Array
 
 
@@ -69,32 +78,13 @@ class RunRecorder:
         self._packets: dict[int, CommandPacket] = {}
         self._end = 0.0
 
-    def begin(self, facts: RunFacts, operator: OperatorSite) -> None:
+    def begin(self, begin: Begin, operator: OperatorSite) -> None:
         """Begin the file."""
-        self._capture = Capture(operator, facts.model, now=0.0, step=facts.step, every=True)
-        begin = Begin(
-            t=0.0,
-            robot=facts.model.name,
-            driver="laboratory",
-            title=facts.title,
-            seed=facts.seed,
-            delay=facts.delay,
-            offset=facts.offset,
-            service=facts.service,
-            link_loss=facts.link_loss,
-            step=facts.step,
-            q=np.asarray(facts.start, float).tolist(),
-            lateness=str(Lateness.POSTPONE),
-            software=software(),
-        )
-        sink = None
+        self._capture = Capture(operator, operator.engine.model, now=0.0, step=begin.step, every=True)
         try:
-            sink = Sink.create(self.path)
-            self._writer = RecordingWriter(sink, begin)
+            self._writer = RecordingWriter(self.path, begin)
         except RecordingError as error:
             self._fail(error)
-            if sink is not None:
-                sink.close()
         else:
             self._capture.put = self._put
 
@@ -105,8 +95,8 @@ class RunRecorder:
             return
         capture.link("forward", turn.there)
         capture.link("backward", turn.back)
-        for number, packet in turn.packets:
-            self._tell_packet(number, packet, turn.now)
+        for packet in turn.packets:
+            self._tell_packet(packet, turn.now)
         for event in turn.events:
             self._tell_event(event, event.t)
         t: Array = capture.step * np.arange(turn.first, turn.first + len(turn.play), dtype=np.float64)
@@ -129,20 +119,12 @@ class RunRecorder:
     def _tell_event(self, event: RunEvent, t: float) -> None:
         if event not in self._events and self._capture is not None:
             self._events.add(event)
-            self._capture.add(t, EventEntry(float(event.t), event.kind, text(event.text)))
+            self._capture.add(t, cut(event))
 
-    def _tell_packet(self, number: int, packet: CommandPacket, t: float) -> None:
-        if self._packets.get(number) != packet and self._capture is not None:
-            self._packets[number] = packet
-            entry = PacketEntry(
-                number=number,
-                command_id=packet.command_id,
-                sent=packet.sent,
-                arrived=packet.arrived,
-                real_id=packet.real_id,
-                lost=packet.lost,
-            )
-            self._capture.add(t, entry)
+    def _tell_packet(self, packet: CommandPacket, t: float) -> None:
+        if self._packets.get(packet.number) != packet and self._capture is not None:
+            self._packets[packet.number] = packet
+            self._capture.add(t, packet)
 
     def end(self, run: TwinRun) -> None:
         """Write down what is known once the run is over; what is in the file then can be read."""
@@ -152,8 +134,8 @@ class RunRecorder:
         self._end = end = float(run.t[-1])
         capture.receipts(end, "virtual", run.receipts_virtual)
         capture.receipts(end, "real", run.receipts_real)
-        for number, packet in enumerate(run.packets, start=1):
-            self._tell_packet(number, packet, end)
+        for packet in run.packets:
+            self._tell_packet(packet, end)
         for event in run.events:
             self._tell_event(event, end)
         capture.whole(end)
@@ -166,10 +148,7 @@ class RunRecorder:
         writer, self._writer = self._writer, None
         if writer is None:
             return
-        extras = {
-            "attributions": [asdict(item) for item in attributions],
-            "offsets": [asdict(item) for item in offsets],
-        }
+        extras = msgspec.to_builtins(_Extras(tuple(attributions), tuple(offsets)))
         self._try(lambda: writer.finish(End(self._end, extras)))
 
     def _put(self, message: Message, *, t: float) -> None:
@@ -227,14 +206,18 @@ LONGEST_WORD = 200
 
 
 class DriveRecorder(Witness):
-    """A `Witness` that writes a run into a file. What it costs a run is a note a command and a packet."""
+    """A `Witness` that writes a run into a file when it's over."""
 
     def __init__(self, path: Path) -> None:
         """Record into a file, which is made anew when the run is over."""
         self.path = path
         self.problem = ""
         """Why it wasn't written; empty where it was."""
-        self._deeds: list[tuple[CommandRecord, ArcTimeline]] = []
+        self._commands: list[Timed] = []
+        """Commands, and the edits that they made."""
+        self._number = 0
+        self._edited: list[float] = []
+        """When the timeline was edited [s]."""
         self._sent: dict[str, list[tuple[float, int]]] = {"forward": [], "backward": []}
         self._settled: dict[str, list[PacketRecord]] = {"forward": [], "backward": []}
 
@@ -245,7 +228,7 @@ class DriveRecorder(Witness):
         self._case, self._start, self._site = case, start, site
         self._place = () if body.room is EMPTY else (room_entry(body.room),)
         self._grid: Grid | None = None if site.surroundings is None else grid_of(body.room, start)
-        self._first = site.engine.timeline
+        self._first = self._timeline = site.engine.timeline
         site.listener = self._commanded
         for direction, lane in (("forward", link.forward), ("backward", link.backward)):
             lane.log.told = partial(self._settle, direction)
@@ -256,15 +239,11 @@ class DriveRecorder(Witness):
 
     def finish(self, drive: DriveRun) -> None:
         """Write the run down. A disk that doesn't take it is a `problem`, and ends nothing else."""
-        sink = None
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            sink = Sink.create(self.path)
-            writer = RecordingWriter(sink, self._begin())
+            writer = RecordingWriter(self.path, self._begin())
         except (RecordingError, OSError) as error:
             self.problem = str(error)
-            if sink is not None:
-                sink.close()
             return
         try:
             for t, message in self._messages(drive):
@@ -275,7 +254,15 @@ class DriveRecorder(Witness):
             writer.give_up()
 
     def _commanded(self, deed: CommandRecord) -> None:
-        self._deeds.append((deed, self._site.engine.timeline))
+        before, self._timeline = self._timeline, self._site.engine.timeline
+        receipt = None if deed.receipt is None else portable(deed.receipt)
+        self._number += 1
+        self._commands.append((deed.at, replace(deed, number=self._number, receipt=receipt)))
+        if self._timeline is not before:
+            self._edited.append(deed.at)
+            command_id = None if receipt is None else receipt.command_id
+            entries = edit_entries(before, self._timeline, len(self._edited), deed.at, command_id)
+            self._commands += [(deed.at, entry) for entry in entries]
 
     def _settle(self, direction: str, record: PacketRecord) -> None:
         if not record.copy:
@@ -316,48 +303,23 @@ class DriveRecorder(Witness):
         yield from ((0.0, entry) for entry in self._place)
         yield from ((0.0, entry) for entry in whole_entries(self._first, 0, 0.0))
         yield from heapq.merge(
-            self._commands(),
+            self._commands,
             self._samples(drive),
             self._shown(drive),
             self._packets("forward", end),
             self._packets("backward", end),
             self._learned(drive),
             sorted(
-                ((c.time, EventEntry(c.time, COLLISION, f"collision: {c.thing}")) for c in drive.touched),
+                ((c.time, RunEvent(c.time, COLLISION, f"collision: {c.thing}")) for c in drive.touched),
                 key=itemgetter(0),
             ),
             key=itemgetter(0),
         )
-        edits = len(self._edited())
-        yield from ((end, entry) for entry in whole_entries(self._site.engine.timeline, edits, end))
+        yield from ((end, entry) for entry in whole_entries(self._timeline, len(self._edited), end))
         yield from ((end, entry) for entry in self._place)
 
-    def _edited(self) -> list[float]:
-        """When the timeline was edited [s]."""
-        found, before = [], self._first
-        for deed, after in self._deeds:
-            if after is not before:
-                found.append(deed.at)
-            before = after
-        return found
-
-    def _commands(self) -> Iterator[Timed]:
-        """Commands, and the edits that they made."""
-        before, edit = self._first, 0
-        for number, (deed, after) in enumerate(self._deeds, start=1):
-            command_id = None if deed.receipt is None else deed.receipt.command_id
-            yield (
-                deed.at,
-                CommandEntry(number, deed.at, deed.command, deed.receipt and portable(deed.receipt), deed.refused),
-            )
-            if after is not before:
-                edit += 1
-                for entry in edit_entries(before, after, edit, deed.at, command_id):
-                    yield deed.at, entry
-            before = after
-
     def _samples(self, drive: DriveRun) -> Iterator[Timed]:
-        edits = np.searchsorted(self._edited(), drive.t, side="right").tolist()
+        edits = np.searchsorted(self._edited, drive.t, side="right").tolist()
         columns = (drive.t, drive.virtual, drive.real, drive.measured, drive.estimated, drive.drives, drive.offset)
         for row, (t, virtual, real, measured, estimated, (v, w), D) in enumerate(
             zip(*(column.tolist() for column in columns), strict=True)
@@ -374,22 +336,21 @@ class DriveRecorder(Witness):
         both = np.hstack([drive.virtual, drive.real])
         drawn = set(links.chosen(drive.t, both))
         for row in sorted(drawn | set(poses.chosen(drive.t, both))):
-            t, X = float(drive.t[row]), [_pose(*q) for q in (drive.virtual[row], drive.real[row])]
-            yield t, placed_pose(t, X[0], virtual=True)
-            yield t, placed_pose(t, X[1], virtual=False)
+            t, X = float(drive.t[row]), np.stack([_pose(*q) for q in (drive.virtual[row], drive.real[row])])
+            yield t, virtual_pose(t, X[0], WORLD)
+            yield t, real_pose(t, X[1], WORLD)
             if row in drawn:
-                yield t, frames(t, (("virtual", X[0]), ("real", X[1])))
+                yield t, robot_frames(t, WORLD, ("virtual", "real"), X)
 
-    def _packets(self, direction: str, end: float) -> Iterator[Timed]:
+    def _packets(self, direction: Direction, end: float) -> Iterator[Timed]:
         """Packets whose fate is known, and then those that are still on their way."""
         settled = self._settled[direction]
-        for r in settled:
-            known = r.sent if r.arrived is None else r.arrived
-            yield known, LinkEntry(direction, r.sent, r.arrived, r.lost is not None, r.attempts, r.size)  # type: ignore[arg-type]
+        for record in settled:
+            yield link_entry(direction, record, record.size)
         known_ones = {record.number for record in settled}
         for number, (sent, size) in enumerate(self._sent[direction]):
             if number not in known_ones:
-                yield end, LinkEntry(direction, sent, size=size)  # type: ignore[arg-type]
+                yield end, LinkEntry(direction, sent, size=size)
 
     def _learned(self, drive: DriveRun) -> Iterator[Timed]:
         """What came into the virtual environment and went; events are cells that are new, and that all are gone."""
@@ -402,9 +363,9 @@ class DriveRecorder(Witness):
             yield t, d.CellsEntry(t, _flat(sorted(now - before)), _flat(sorted(before - now)))
             if new := len(now - ever):
                 text = f"the virtual environment learned {new} cell{'s' * (new > 1)}"
-                yield t, EventEntry(t, "learned", text)
+                yield t, RunEvent(t, "learned", text)
             elif not now:
-                yield t, EventEntry(t, "forgot", "the virtual environment forgot all that it had learned")
+                yield t, RunEvent(t, "forgot", "the virtual environment forgot all that it had learned")
             before, ever = now, ever | now
 
 

@@ -8,12 +8,10 @@ from typing import TypeAlias
 import numpy as np
 
 from interfaces.clients.appearance import link_shapes
-from interfaces.recording.messages import grid_of, room_of
+from interfaces.messages.recording import grid_of, room_of
 from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import ARM, Recording
-from interfaces.recording.rerun import mobile_model
 from interfaces.stream.meshcat import Committed, MeshcatScene, MobileScene
-from robots.ipr.model import Ipr
 from vrs.model import Array
 
 MARGIN = 3.0
@@ -25,13 +23,13 @@ THIN = 2
 class DriveStage:
     """Two mobile robots, what they drove, the room, and what was learned of it."""
 
-    def __init__(self, recording: Recording, model: Ipr) -> None:
+    def __init__(self, recording: Recording) -> None:
         """Take what was driven, and make the scene.
 
         Raises:
             FormatError: If the room makes no sense.
         """
-        self._recording, facts = recording, recording.session.drive
+        self._recording, facts, model = recording, recording.session.drive, recording.model
         self._until = -np.inf
         self._t: Array = np.empty(0)
         self._paths: dict[str, Array] = {}
@@ -116,13 +114,10 @@ Stage: TypeAlias = ArmStage | DriveStage
 
 def stage_of(recording: Recording) -> Stage:
     """The robots of a recording for a page."""
-    return ArmStage(recording) if recording.kind is ARM else DriveStage(recording, mobile_model(recording))
+    return ArmStage(recording) if recording.kind is ARM else DriveStage(recording)
 
 
 def prepare(recording: Recording) -> None:
     """Read and load what takes long before a recording can be shown; from any thread."""
-    if recording.kind is ARM:
-        recording.model.links(recording.virtual(recording.span[0]))
-        return
-    link_shapes(mobile_model(recording))
-    recording.virtual(recording.span[0])
+    q = recording.virtual(recording.span[0])
+    recording.model.links(q) if recording.kind is ARM else link_shapes(recording.model)

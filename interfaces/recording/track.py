@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from interfaces.messages import recording as d
 from interfaces.messages.fields import rich
-from interfaces.recording import messages as d
+from interfaces.messages.recording import RealSample
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.mcap_reading import NUMBERS, Blocks
-from interfaces.recording.messages import RealSample, VirtualSample
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
@@ -82,12 +82,9 @@ VIRTUAL, REAL = "/virtual/joints", "/real/joints"
 VIRTUAL_POSTURE, REAL_POSTURE = "/virtual/posture", "/real/posture"
 MEASURED, ESTIMATED = "/real/measured", "/virtual/estimated"
 _DECODERS: dict[str, msgspec.json.Decoder[Any]] = {
-    VIRTUAL: msgspec.json.Decoder(list[VirtualSample]),
-    REAL: msgspec.json.Decoder(list[RealSample]),
-    VIRTUAL_POSTURE: msgspec.json.Decoder(list[d.VirtualPosture]),
-    REAL_POSTURE: msgspec.json.Decoder(list[d.RealPosture]),
-    MEASURED: msgspec.json.Decoder(list[d.MeasuredPosture]),
-    ESTIMATED: msgspec.json.Decoder(list[d.EstimatedPosture]),
+    channel.topic: msgspec.json.Decoder(list[channel.kinds[0]])  # type: ignore[name-defined]
+    for channel in CHANNELS
+    if channel.topic in {VIRTUAL, REAL, VIRTUAL_POSTURE, REAL_POSTURE, MEASURED, ESTIMATED}
 }
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import msgspec
 
 from interfaces.messages.fields import plain
+from interfaces.messages.recording import FORMAT, Begin, End, SegmentedEntry
 from interfaces.recording.channels import CHANNELS, NUMBER_OF, Message
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import McapFile, RawFile, Sink
 from interfaces.recording.mcap_reading import LONGEST
-from interfaces.recording.messages import FORMAT, Begin, End
 from interfaces.recording.poses import nanoseconds
 from vrs.errors import InvalidValueError
 
@@ -25,6 +25,7 @@ AGAIN = 10.0
 
 
 _encode = msgspec.json.Encoder(enc_hook=plain).encode
+_SEGMENTED = frozenset(kind for kind in NUMBER_OF if issubclass(kind, SegmentedEntry))
 
 
 class RecordingWriter:
@@ -151,4 +152,5 @@ class RecordingWriter:
 
 def encoded(message: Message) -> tuple[int, bytes]:
     """The number of a message's channel, and its JSON."""
-    return NUMBER_OF[type(message)], _encode(message)
+    kind = type(message)
+    return NUMBER_OF[kind], _encode(message.as_written() if kind in _SEGMENTED else message)  # type: ignore[attr-defined]

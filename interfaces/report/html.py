@@ -17,6 +17,7 @@ import numpy as np
 from interfaces.clients.appearance import viewer_bundle
 from interfaces.lab.claims import Figure
 from interfaces.lab.driving.output import of_drives
+from interfaces.messages.recording import RunEvent
 from interfaces.recording.figures import driven, figures_of
 from interfaces.recording.figures import figures as run_figures
 from interfaces.recording.recording import Recording
@@ -25,7 +26,7 @@ from interfaces.report.scene import scene
 from interfaces.report.tables import FIGURES, card, figures, receipts, shown, table, tiles, words
 from interfaces.runs.drive_run import DriveRun
 from interfaces.runs.summary import summarize
-from interfaces.runs.twin_run import RunEvent, TwinRun
+from interfaces.runs.twin_run import TwinRun
 
 
 def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> None:
@@ -48,7 +49,7 @@ def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
     viewer, licences = viewer_bundle()
     drawn = plots(run)
     return Template(_asset("report.html")).substitute(
-        title=escape(run.title or "Twin run"),
+        title=escape(run.session.title or "Twin run"),
         css=_asset("report.css"),
         facts=_facts(run, summary),
         tiles=tiles(summary),
@@ -68,13 +69,13 @@ def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:
     order = ", then ".join(words(str(cause)) for cause in summary.get("attribution_order", ()))
     facts = {
         "robot": run.model.name,
-        "delay": run.delay,
-        "service": run.service,
-        "offset": run.offset,
+        "delay": run.session.delay,
+        "service": run.session.service,
+        "offset": run.session.offset,
         "D": _span(run),
-        "link loss": run.link_loss,
+        "link loss": run.session.link_loss,
         "corrections": str(len(run.corrections)),
-        "seed": str(run.seed),
+        "seed": str(run.session.seed or 0),
         "duration": f"{run.t[-1] - run.t[0]:.1f} s",
         "not measured": f"{run.gap_s:.1f} s" if run.gap_s > 0 else "",
         "commands": str(len(run.receipts_virtual)),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
 from interfaces.link.delays import MAX_DELAY
+from interfaces.messages.recording import Begin, CommandPacket, RunEvent
 from interfaces.teleop import Correction, OperatorSite
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
@@ -71,34 +72,6 @@ def spelled(D: float | None) -> str:
     return ADAPTIVE if D is None else f"{FIXED}:{-D:.9g}"
 
 
-@dataclass(frozen=True, slots=True)
-class CommandPacket:
-    """One motion command on its way across the link."""
-
-    command_id: int
-    """Id that the operator's engine gave the command, from 1."""
-    sent: float
-    """User time of sending [s]."""
-    arrived: float | None
-    """User time at which it first arrived [s]; None when it never did."""
-    real_id: int | None = None
-    """Id that the real robot's engine gave the command; None when it never arrived."""
-    lost: bool = False
-    """Whether the link lost the first message with it; later messages repeat it."""
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class RunEvent:
-    """Something that happened to the real robot or the link."""
-
-    t: float
-    """User time [s]."""
-    kind: str
-    """`payload`, `release`, `late`, `lost`, `slowed`, `waited`, `corrected`, `halted`, `diverged`, `unfinished`."""
-    text: str
-    """What happened, one line."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class TwinSamples:
     """Where both robots were whenever the real one was measured; the joints as in `TwinRun`, (m, n)."""
@@ -123,18 +96,8 @@ class TwinRun:
 
     model: RobotModel
     """The robot that both twins are."""
-    title: str
-    """Title of the plan."""
-    seed: int
-    """Seed of everything random in the run."""
-    delay: str
-    """Delay profile, as it was asked for."""
-    offset: str
-    """How D was chosen: `adaptive`, or `fixed:S` for D = −S."""
-    service: str
-    """Order of delivery on the link: `datagram` or `in-order`."""
-    link_loss: str
-    """What the robot does when messages stay away: `hold` stops, and goes on when they come again."""
+    session: Begin
+    """How it was set up."""
     t: Array
     """User time [s], (k,), evenly spaced, ascending."""
     play: Array
@@ -330,23 +293,6 @@ def correction_text(end: float, error: Array, reason: str) -> str:
     return f"the virtual robot joined the real one's plan until {end:.2f} s ({where}): {reason}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunFacts:
-    """What is known of a run before it begins; the fields of `TwinRun` of the same names."""
-
-    model: RobotModel
-    start: Array
-    """Joints at the start [rad], (n,)."""
-    title: str
-    seed: int
-    delay: str
-    offset: str
-    service: str
-    link_loss: str
-    step: float
-    """Period of the record [s]."""
-
-
 class Turn(NamedTuple):
     """What has become known of a run since the turn before."""
 
@@ -365,15 +311,15 @@ class Turn(NamedTuple):
     back: tuple[PacketRecord, ...]
     """The same of those to the operator."""
     events: tuple[RunEvent, ...]
-    packets: tuple[tuple[int, CommandPacket], ...]
-    """Of commands that the robot has answered, with their places in the order of sending, from 1."""
+    packets: tuple[CommandPacket, ...]
+    """Of commands that the robot has answered."""
 
 
 class RunKeeper(Protocol):
     """Writes a run down. It may listen to the operator's site."""
 
-    def begin(self, facts: RunFacts, operator: OperatorSite) -> None:
-        """A run begins: nothing was commanded yet."""
+    def begin(self, begin: Begin, operator: OperatorSite) -> None:
+        """A run begins, set up so: nothing was commanded yet."""
 
     def turn(self, turn: Turn) -> None:
         """Some time has passed."""

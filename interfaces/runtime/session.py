@@ -18,12 +18,10 @@ import numpy as np
 
 from interfaces.link import Conditions, ConstantDelay, DelayProfile, LinkConditions, PacketRecord, Service
 from interfaces.messages.fields import text
+from interfaces.messages.recording import Begin, CommandPacket, RunEvent
 from interfaces.runs.summary import OffsetOutcome, measures
 from interfaces.runs.twin_run import (
     QUANTILE,
-    CommandPacket,
-    RunEvent,
-    RunFacts,
     RunKeeper,
     Turn,
     TwinRun,
@@ -35,6 +33,7 @@ from interfaces.runs.twin_run import (
 )
 from interfaces.runtime.laboratory import Laboratory, RobotBody
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
+from interfaces.system import software
 from interfaces.teleop import JointReference, OperatorSite, RobotSite, RobotSiteConfig
 from vrs import Lateness, Receipt, Status
 from vrs.model import Array, RobotModel
@@ -123,13 +122,14 @@ class TwinSession:
         self.last_action = 0.0
         """When the operator did something last, or will [s]; infinity while that's unknown."""
         link = conditions.forward
-        self._facts = RunFacts(
-            model, start, text(title), seed, text(link.delay.name), spelled(offset), str(link.service),
-            LINK_LOSS, STEP,
+        self._session = Begin(
+            t=0.0, robot=model.name, driver="laboratory", title=text(title), seed=seed,
+            delay=text(link.delay.name), offset=spelled(offset), service=str(link.service), link_loss=LINK_LOSS,
+            step=STEP, q=start.tolist(), lateness=Lateness.POSTPONE.value, software=software(),
         )  # fmt: skip
         self._keeper = keeper
         if keeper is not None:
-            keeper.begin(self._facts, self.operator)
+            keeper.begin(self._session, self.operator)
 
     def sent(self, now: float, command: PlannedCommand, receipt: Receipt) -> None:
         """Write down a command that the virtual robot took, and the operator's site sent on."""
@@ -239,15 +239,9 @@ class TwinSession:
         self._settle(all_of_them=True)
         events = [*self._events, *waits(t, play, reference, slowest=1.0 - self._robot.config.playout.slew)]
         arrivals = [(m.sent, math.nan if m.arrived is None else m.arrived) for m in self._messages]
-        facts = self._facts
         run = TwinRun(
-            model=facts.model,
-            title=facts.title,
-            seed=facts.seed,
-            delay=facts.delay,
-            offset=facts.offset,
-            service=facts.service,
-            link_loss=facts.link_loss,
+            model=self._model,
+            session=self._session,
             t=t,
             play=play,
             q_virtual=commanded.sample(t),
@@ -273,7 +267,7 @@ class TwinSession:
         """What the robot's engine answered to each command that was sent."""
         return [self.lab.answers.get((1, number)) for number in range(1, len(self._sent) + 1)]
 
-    def _settle(self, *, all_of_them: bool = False) -> tuple[tuple[int, CommandPacket], ...]:
+    def _settle(self, *, all_of_them: bool = False) -> tuple[CommandPacket, ...]:
         """Find out what became of commands that weren't answered before, if they are now; at the end, of all."""
         found = []
         for number in list(self._unsettled):
@@ -285,10 +279,10 @@ class TwinSession:
             real_id = None if answer is None else answer.command_id
             arrived = self.lab.arrivals.get((1, number))
             packet = self._packets[number - 1] = CommandPacket(
-                receipt.command_id, sent, arrived, real_id, sent in self._lost
+                number, receipt.command_id, sent, arrived, real_id, sent in self._lost
             )
             self._events += command_events(packet, receipt, answer, play_at=self._play_at)
-            found.append((number, packet))
+            found.append(packet)
         return tuple(found)
 
     def _receipts(self) -> tuple[Receipt, ...]:
@@ -462,7 +456,7 @@ def offset_outcome(
     )  # fmt: skip
     kinds = [event.kind for event in run.events]
     return OffsetOutcome(
-        run.offset,
+        run.session.offset,
         float(-run.D.mean()),
         float(-run.D.min()),
         kinds.count("late") + kinds.count("diverged"),

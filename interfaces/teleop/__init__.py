@@ -1,7 +1,6 @@
 """Both sites of a teleoperated robot: messages, the operator's, the robot's."""
 
 from interfaces.teleop.operator import (
-    CommandRecord,
     Correction,
     OperatorSite,
     OperatorSiteConfig,
@@ -20,7 +19,6 @@ from interfaces.teleop.robot import (
 
 __all__ = [
     "AdaptiveOffset",
-    "CommandRecord",
     "Correction",
     "JointReference",
     "OffsetConfig",

@@ -14,6 +14,7 @@ from interfaces.link.quantiles import LARGEST, SlidingQuantiles
 from interfaces.messages import Refusal
 from interfaces.messages.commands import check_crosses
 from interfaces.messages.fields import Epoch
+from interfaces.messages.recording import CommandRecord
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.halt import Halt, HaltCause, not_following, text_of
@@ -53,19 +54,6 @@ class Correction(NamedTuple):
     error: Array
     """By how much it was off [rad], (n,)."""
     reason: str
-
-
-class CommandRecord(NamedTuple):
-    """A command that the operator's engine was given, and what became of it."""
-
-    at: float
-    """The engine's time when it was [s]."""
-    command: Command | None
-    """None took back the newest."""
-    receipt: Receipt | None
-    """None where there's none, as for a parameter."""
-    refused: bool
-    """Whether the site refused it, so that it was never tried."""
 
 
 class SiteObserver(Protocol):
@@ -125,7 +113,7 @@ class LoggedEngine(Engine):
             answer: Receipt | None = (
                 super().execute(command) if refused is None else self.refuse(command, *refused)  # type: ignore[arg-type]
             )
-            self._tell(CommandRecord(self.now(), command, answer, refused is not None), newest)
+            self._tell(CommandRecord(0, self.now(), command, answer, refused is not None), newest)
             return answer
 
     def undo(self) -> Receipt | None:
@@ -136,7 +124,7 @@ class LoggedEngine(Engine):
             newest = self.newest
             answer = super().undo()
             if answer is not None:
-                self._tell(CommandRecord(self.now(), None, answer, False), newest)
+                self._tell(CommandRecord(0, self.now(), None, answer), newest)
             return answer
 
     def undo_refusal(self) -> str:
@@ -298,7 +286,7 @@ class OperatorSite:
         Raises:
             InvalidValueError: If it can't be sent, or the plan goes on for too long; nothing is written then.
         """
-        number, (now, command, answer, _) = self.entries_sent + 1, deed
+        number, now, command, answer = self.entries_sent + 1, deed.at, deed.command, deed.receipt
         if answer is None or answer.status is not Status.REJECTED:
             number_in("end of the plan", self.engine.timeline.end, -LATEST, LATEST, "a session time", " s")
             if command is not None and answer is not None:

@@ -22,15 +22,30 @@ Things are boxes, columns, people and doors, with their timetables.
 
 from __future__ import annotations
 
-import enum
 import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
 
 from vrs.checks import bounded_text, one_of
 from vrs.errors import FormatError
+from vrs.record import Record, Time
+
+MOST_THINGS = 1000
+MOST_POINTS = 1000
+
+Name = Annotated[str, Meta(max_length=200)]
+Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
+"""[m]."""
+Size = Annotated[float, Meta(gt=0, le=1e6)]
+"""[m]."""
+Timetable = Annotated[tuple[Time, ...], Meta(min_length=1, max_length=MOST_POINTS)]
+Way = Annotated[tuple[Length, ...], Meta(min_length=1, max_length=MOST_POINTS)]
+Shares = Annotated[tuple[Annotated[float, Meta(ge=0, le=1)], ...], Meta(min_length=1, max_length=MOST_POINTS)]
 
 
 def between(times: tuple[float, ...], t: float, *, repeat: bool) -> tuple[int, int, float]:
@@ -44,7 +59,7 @@ def between(times: tuple[float, ...], t: float, *, repeat: bool) -> tuple[int, i
     Returns:
         Two numbers of entries, the same before the first and after the last; the share, in [0, 1].
     """
-    if repeat and t > times[-1]:
+    if repeat and t > times[-1] and len(times) > 1:
         t = times[0] + math.fmod(t - times[0], times[-1] - times[0])
     k = bisect_right(times, t)
     if k in (0, len(times)):
@@ -102,62 +117,60 @@ def is_wall(thing: Block | Column) -> bool:
     return thing.name.startswith("wall")
 
 
-@dataclass(frozen=True, slots=True)
-class Person:
+class Person(Record, frozen=True, omit_defaults=True, gc=False):
     """A cylinder that walks along straight lines between places, at the times that belong to them."""
 
-    name: str
-    radius: float
-    height: float
-    times: tuple[float, ...]
+    name: Name
+    radius: Size
+    """[m]."""
+    height: Size
+    """[m]."""
+    times: Timetable
     """Ascending [s]."""
-    places: tuple[tuple[float, float], ...]
+    x: Way
     """Where at each time [m]."""
+    y: Way
+    """[m]."""
     repeat: bool = False
     """Whether the path begins again when it ended; it then ends where it began."""
 
     def at(self, t: float) -> tuple[float, float]:
         """Where the person is at t [s]; before the first time at the first place, after the last at the last."""
         before, after, share = between(self.times, t, repeat=self.repeat)
-        (x0, y0), (x1, y1) = self.places[before], self.places[after]
+        (x0, x1), (y0, y1) = (self.x[before], self.x[after]), (self.y[before], self.y[after])
         return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
 
     @property
     def speed(self) -> float:
         """Fastest that the person walks [m/s]."""
-        steps = zip(self.times, self.places, self.times[1:], self.places[1:], strict=False)
+        places = tuple(zip(self.x, self.y, strict=True))
+        steps = zip(self.times, places, self.times[1:], places[1:], strict=False)
         return max((math.dist(p, q) / (b - a) for a, p, b, q in steps), default=0.0)
 
 
-class DoorKind(enum.StrEnum):
-    """How a door opens."""
-
-    HINGED = "hinged"
-    """It swings about its first end."""
-    SLIDING = "sliding"
-    """It slides past its first end."""
-
-
-@dataclass(frozen=True, slots=True)
-class Door:
+class Door(Record, frozen=True, omit_defaults=True, gc=False):
     """A leaf in a doorway that opens and closes by a timetable, at even speed in between, and stops for nobody."""
 
-    name: str
-    kind: DoorKind
-    x: float
+    name: Name
+    sliding: bool
+    """Whether it slides past its first end; a hinged door swings about it."""
+    x: Length
     """Of its first end, where the hinge is [m]."""
-    y: float
-    length: float
+    y: Length
+    """[m]."""
+    length: Size
     """Of the leaf, as wide as the doorway [m]."""
-    angle: float
+    angle: Length
     """From the first end to the other when it's closed [rad]."""
-    thickness: float
-    height: float
-    swing: float
+    thickness: Size
+    """[m]."""
+    height: Size
+    """[m]."""
+    swing: Length
     """Turn when it's quite open, to the left positive [rad]; of a hinged door."""
-    times: tuple[float, ...]
+    times: Timetable
     """Ascending [s]."""
-    shares: tuple[float, ...]
+    shares: Shares
     """How far it's open at each time, 0 closed, 1 open."""
     repeat: bool = False
     """Whether the timetable begins again when it ended; it then ends as it began."""
@@ -170,10 +183,10 @@ class Door:
     def at(self, t: float) -> Block:
         """The leaf as it stands at t [s]."""
         share, half = self.share(t), self.length / 2
-        if self.kind is DoorKind.HINGED:
-            angle, ahead = self.angle + share * self.swing, half
-        else:
+        if self.sliding:
             angle, ahead = self.angle, half - share * self.length
+        else:
+            angle, ahead = self.angle + share * self.swing, half
         x, y = self.x + ahead * math.cos(angle), self.y + ahead * math.sin(angle)
         return Block(self.name, x, y, self.length, self.thickness, angle, self.height, known=False)
 
@@ -195,7 +208,7 @@ class Door:
         """Fastest that anything of it moves [m/s]."""
         steps = zip(self.times, self.shares, self.times[1:], self.shares[1:], strict=False)
         fastest = max((abs(q - p) / (b - a) for a, p, b, q in steps), default=0.0)
-        return fastest * self.length * (abs(self.swing) if self.kind is DoorKind.HINGED else 1.0)
+        return fastest * self.length * (1.0 if self.sliding else abs(self.swing))
 
 
 __all__ = [
@@ -207,7 +220,6 @@ __all__ = [
     "Block",
     "Column",
     "Door",
-    "DoorKind",
     "Person",
     "Place",
     "Room",
@@ -218,8 +230,6 @@ __all__ = [
 VERSION = 1
 """Of the format."""
 MOST_BYTES = 262_144
-MOST_THINGS = 1000
-MOST_POINTS = 1000
 _MARGIN = 1.0
 _WALL_HEIGHT, _BOX_HEIGHT, _PERSON_HEIGHT, _DOOR_HEIGHT = 2.4, 0.8, 1.7, 2.0
 
@@ -491,7 +501,8 @@ class _Reader:
         if repeat and (len(times) < 2 or places[0] != places[-1]):
             self._fail("a path that repeats ends where it began")
         name, size = f"person in line {self._line}", self._number("radius", radius, 0.05, 1.0)
-        self._people.append(Person(name, size, option["height"], tuple(times), tuple(places), repeat))
+        x, y = (tuple(way) for way in zip(*places, strict=True))
+        self._people.append(Person(name, size, option["height"], tuple(times), x, y, repeat))
 
     def _read_door(self, words: list[str]) -> None:
         points = [word for word in words if "," in word]
@@ -501,10 +512,10 @@ class _Reader:
             "height": (0.01, 5.0, _DOOR_HEIGHT),
             "open_deg": (-180.0, 180.0, 90.0),
         }
-        kinds = {kind.value for kind in DoorKind}
+        kinds = {"hinged", "sliding"}
         at, option, flags = self._split(others, 4, "x, y of both ends [m]", options, {"repeat", *kinds})
         if len(flags & kinds) != 1:
-            self._fail(f"a door is either {' or '.join(DoorKind)}")
+            self._fail("a door is either hinged or sliding")
         (x0, y0), (x1, y1) = self._place(at[:2]), self._place(at[2:])
         length = math.hypot(x1 - x0, y1 - y0)
         if not 0.3 <= length <= 5.0:
@@ -518,11 +529,10 @@ class _Reader:
         repeat = "repeat" in flags
         if repeat and (len(times) < 2 or shares[0] != shares[-1]):
             self._fail("a timetable that repeats ends as it began")
-        kind = DoorKind(*(flags & kinds))
         name, swing = f"door in line {self._line}", math.radians(option["open_deg"])
         self._doors.append(Door(
-            name, kind, x0, y0, length, math.atan2(y1 - y0, x1 - x0), option["thickness"], option["height"], swing,
-            tuple(times), tuple(shares), repeat,
+            name, "sliding" in flags, x0, y0, length, math.atan2(y1 - y0, x1 - x0), option["thickness"],
+            option["height"], swing, tuple(times), tuple(shares), repeat,
         ))  # fmt: skip
 
     def _read_via(self, words: list[str]) -> None:

@@ -19,9 +19,10 @@ from interfaces.engine_server.site import Site
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.link.delivery import FAILED
 from interfaces.messages import Order, Outcome
+from interfaces.messages.recording import CommandRecord
 from interfaces.messages.sites import Report, Sample
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import CommandRecord, Correction, OperatorSite, RobotSite
+from interfaces.teleop import Correction, OperatorSite, RobotSite
 from robots import puma560
 from vrs import (
     Cancel,

@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.messages.recording import CommandPacket, RunEvent
 from interfaces.report.html import render, write_report
 from interfaces.report.plots import plots
 from interfaces.report.scene import revolute_chain, scene
 from interfaces.report.tables import time_lines
 from interfaces.runs.summary import summarize
-from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun
+from interfaces.runs.twin_run import TwinRun
 from interfaces.teleop import Correction
 from robots import puma560
+from tests.interfaces.recording.recorded import begin
 from vrs.ledger import Receipt, Status
 from vrs.model import Array
 
@@ -39,12 +41,15 @@ def make_run(title: str = "Sines", reason: str = "late", k: int = 401) -> TwinRu
         Receipt(2, Status.POSTPONED, 5.0, 4.9, 5.0, 8.0, reason=reason),
         Receipt(3, Status.REJECTED, 9.0, 8.0, reason=reason),
     )
-    packets = (CommandPacket(1, 0.5, 0.9), CommandPacket(2, 5.0, 6.0, lost=True), CommandPacket(3, 9.0, 9.4))
+    packets = tuple(
+        CommandPacket(number, number, sent, arrived, lost=number == 2)
+        for number, sent, arrived in ((1, 0.5, 0.9), (2, 5.0, 6.0), (3, 9.0, 9.4))
+    )
     messages = np.array([[0.5, 0.9], [5.0, np.nan], [9.0, 9.4]])
     corrections = (Correction(12.0, 13.0, np.full(6, 0.1), reason),)
     events = (RunEvent(3.0, "payload", reason), RunEvent(13.0, "slowed", reason))
     return TwinRun(
-        puma560.model(), title, 7, "thu", "adaptive", "datagram", "hold", t, play, curve(t), curve(t), real,
+        puma560.model(), begin(title=title, seed=7, delay="thu"), t, play, curve(t), curve(t), real,
         real, real, answers, answers, packets, messages, corrections, events,
     )  # fmt: skip
 

@@ -43,7 +43,7 @@ def test_a_constant_delay_shifts_the_real_robot_and_nothing_else(delay):
     run = twins(delay)
     D_f = delay_profile(delay).quantile(0.95)
     assert np.abs(run.D + D_f).max() < 1e-12
-    assert run.offset == f"fixed:{D_f:.9g}"
+    assert run.session.offset == f"fixed:{D_f:.9g}"
     assert [event for event in run.events if event.kind != "payload"] == []
     statuses = [receipt.status for receipt in run.receipts_virtual]
     assert statuses == [Status.ACCEPTED, Status.ACCEPTED, Status.REJECTED, Status.POSTPONED]

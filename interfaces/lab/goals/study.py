@@ -87,8 +87,7 @@ def draw_room(ax: Axes, room: Room) -> None:
         fill = MUTED if thing.known else "none"
         ax.add_patch(Polygon(_ring(thing), closed=True, facecolor=fill, edgecolor=MUTED, linewidth=0.8))
     for person in room.people:
-        x, y = np.array(person.places).T
-        ax.plot(x, y, color=MUTED, linewidth=0.6, linestyle=":")
+        ax.plot(person.x, person.y, color=MUTED, linewidth=0.6, linestyle=":")
     ax.set_xlim(-0.1, room.length + 0.1)
     ax.set_ylim(-0.1, room.width + 0.1)
 

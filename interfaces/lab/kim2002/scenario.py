@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import Done, EndJob, JobFailed, JobRunner, MoveTo, Request, RunArm, Show, SilentSpeaker, Speak
+from interfaces.jobs import CarryOut, Done, EndJob, JobFailed, JobRunner, Request, Show, SilentSpeaker
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
@@ -110,15 +110,15 @@ def home(rng: np.random.Generator) -> Room:
     room = place("home")
     front = replace(room.doors[0], times=(0.0, OPENS, OPENS + 2.0), shares=(0.0, 0.0, 1.0))
     inside = tuple(replace(door, times=(0.0,), shares=(1.0,), repeat=False) for door in room.doors[1:])
-    guest = Person("guest", 0.2, 1.7, (0.0, BROUGHT - 12, BROUGHT - 8, KEY, KEY + 4), (
-        (4.8, 7.95), (4.8, 7.95), (4.8, 7.3), (4.8, 7.3), (4.8, 7.95)))  # fmt: skip
+    times = 0.0, BROUGHT - 12, BROUGHT - 8, KEY, KEY + 4
+    guest = Person("guest", 0.2, 1.7, times, (4.8,) * 5, (7.95, 7.95, 7.3, 7.3, 7.95))
     speed, late = float(rng.uniform(0.4, 0.7)), float(rng.uniform(-1.5, 1.5))
-    places = ((1.5, 2.6), (1.55, 4.2), (2.35, 4.7), (3.1, 4.05))
-    times = [0.0]
-    for a, b in pairwise(places):
-        times.append(times[-1] + math.dist(a, b) / speed)
-    begins = KEY + _MEETS + late - times[2]
-    walker = Person("passer-by", 0.22, 1.7, tuple(t + begins for t in times), places)
+    x, y = (1.5, 1.55, 2.35, 3.1), (2.6, 4.2, 4.7, 4.05)
+    reached = [0.0]
+    for a, b in pairwise(zip(x, y, strict=True)):
+        reached.append(reached[-1] + math.dist(a, b) / speed)
+    begins = KEY + _MEETS + late - reached[2]
+    walker = Person("passer-by", 0.22, 1.7, tuple(t + begins for t in reached), x, y)
     return replace(room, doors=(front, *inside), people=(guest, walker))
 
 
@@ -189,12 +189,12 @@ class ScenarioRun:
 
     def _carry_out(self, request: Request, now: float) -> None:
         match request:
-            case MoveTo(attempt, goal):
+            case CarryOut(attempt, MoveJob(to=Goal() as goal)):
                 name = next(name for name, one in self._places.items() if one == goal)
                 self._asked.append(f"MOVE {name}")
                 self._moving = attempt
                 self._pilot.go(goal)
-            case Speak(attempt, text):
+            case CarryOut(attempt, VoiceJob(text=text)):
                 self._asked.append(f"VOICE {text}")
                 self._speaking = attempt
                 self._speaker.speak(text, now=now)
@@ -204,7 +204,7 @@ class ScenarioRun:
             case EndJob():
                 self._pilot.journey.end()
                 self._moving = self._speaking = 0
-            case RunArm(attempt):
+            case CarryOut(attempt):
                 self._runner.receive(JobFailed(attempt, "there's no arm"), now=now)
 
     def _stop(self, goal: Goal | None) -> ScenarioStop:

@@ -9,8 +9,8 @@ from typing import Protocol
 from interfaces.link.conditions import Service
 from interfaces.link.delivery import Incoming, Outgoing
 from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.messages.recording import CommandRecord
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
-from interfaces.teleop.operator import CommandRecord
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
@@ -137,7 +137,7 @@ class ArchitectureOperatorSite:
         command = DriveCommand(v, w, period, execute_at=start)
         receipt = self.engine.execute(command)
         if self.listener is not None:
-            self.listener(CommandRecord(self._clock.now(), command, receipt, refused=False))
+            self.listener(CommandRecord(0, self._clock.now(), command, receipt))
         self.estimator.command(v, w)
         arc = known_arc(start, period, self._end, v, w, receipt.command_id)
         self._arcs.add(arc)

@@ -11,22 +11,20 @@ from typing_extensions import override
 from interfaces.jobs.devices import ArmControl, NoArm, Screen, SilentSpeaker, Speaker, TextScreen
 from interfaces.jobs.file import digest
 from interfaces.jobs.runner import (
+    CarryOut,
     Done,
     EndJob,
     Interrupted,
     JobFailed,
     JobRunner,
-    MoveTo,
     OperatorLost,
     Request,
-    RunArm,
     RunnerConfig,
     Show,
-    Speak,
 )
 from interfaces.messages.drive_sites import Doing, RobotTask, TaskReport
 from interfaces.messages.fields import MOST_POINTS
-from interfaces.messages.jobs import ListCommand, OperatorLoss
+from interfaces.messages.jobs import ArmJob, ListCommand, MoveJob, OperatorLoss, VoiceJob
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
 from robots.onboard.routes import Point
@@ -271,16 +269,16 @@ class Autonomy:
     def _begin(self, request: Request, now: float) -> None:
         hands = self._hands
         match request:
-            case MoveTo(attempt, goal):
+            case CarryOut(attempt, MoveJob(to=Goal() as goal)):
                 self._move = attempt
                 self._set_out(goal)
-            case Speak(attempt, text):
+            case CarryOut(attempt, VoiceJob(text=text)):
                 self._voice, self._says = attempt, text
                 hands.speaker.speak(text, now=now)
             case Show(text):
                 self._shows = text
                 hands.screen.show(text)
-            case RunArm(attempt, program, source):
+            case CarryOut(attempt, ArmJob(program=program, source=source)):
                 refusal = hands.arm.run(program, source, now=now)
                 if refusal:
                     self.runner.receive(JobFailed(attempt, refusal), now=now)

@@ -12,17 +12,15 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from msgspec.structs import replace
 
 from interfaces.jobs import (
+    CarryOut,
     Done,
     EndJob,
     Interrupted,
     JobFailed,
     JobRunner,
-    MoveTo,
     OperatorLost,
-    Request,
     RunnerConfig,
     Show,
-    Speak,
 )
 from interfaces.messages.jobs import (
     ArmJob,
@@ -57,21 +55,22 @@ def stages(runner: JobRunner) -> list[str]:
     return [job.stage.value for job in runner.progress.jobs]
 
 
-def asked(runner: JobRunner, kind: type[Request], now: float) -> Any:
-    """The one request that's due now, of a kind."""
+def asked(runner: JobRunner, kind: type[Job], now: float) -> Any:
+    """The one request that's due now, for a job of a kind."""
     (request,) = runner.advance(now=now)
-    assert isinstance(request, kind)
+    assert isinstance(request, CarryOut)
+    assert isinstance(request.job, kind)
     return request
 
 
 def test_the_papers_scenario() -> None:
     runner = JobRunner(SCENARIO)
     assert runner.receive(ListCommand.RUN, now=0.0) == ""
-    there = asked(runner, MoveTo, 0.0)
-    assert there.goal == B
+    there = asked(runner, MoveJob, 0.0)
+    assert there.job.to == B
     runner.receive(Done(there.attempt), now=9.0)
-    said = asked(runner, Speak, 9.0)
-    assert said.text == "Hello!"
+    said = asked(runner, VoiceJob, 9.0)
+    assert said.job.text == "Hello!"
     runner.receive(Done(said.attempt), now=10.0)
     assert runner.advance(now=10.0) == (Show("Please put the book on my top side!"),)
     assert stages(runner) == ["done", "done", "done", "running", "planned"]
@@ -79,8 +78,8 @@ def test_the_papers_scenario() -> None:
     assert runner.next_deadline() is None
     assert runner.advance(now=5000.0) == ()
     assert runner.receive(ListCommand.KEY, now=5000.0) == ""
-    back = asked(runner, MoveTo, 5000.0)
-    assert back.goal == A
+    back = asked(runner, MoveJob, 5000.0)
+    assert back.job.to == A
     runner.receive(Done(back.attempt), now=5010.0)
     assert runner.progress.stage is JobStage.DONE
     assert set(stages(runner)) == {"done"}
@@ -114,7 +113,7 @@ def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how:
     assert runner.receive(ListCommand.RESUME, now=100.0) == ""
     assert stages(runner) == ["done", "running", "planned"]
     again = runner.advance(now=100.0)
-    assert [type(request) for request in again] == [type(request) for request in begun]
+    assert [type(request.job) for request in again] == [type(request.job) for request in begun]
 
 
 def test_a_wait_that_was_paused_goes_on_with_what_was_left() -> None:
@@ -126,7 +125,7 @@ def test_a_wait_that_was_paused_goes_on_with_what_was_left() -> None:
     runner.receive(ListCommand.RESUME, now=100.0)
     assert runner.next_deadline() == 106.0
     assert runner.advance(now=105.9) == ()
-    assert asked(runner, Speak, 106.0).text == "Now"
+    assert asked(runner, VoiceJob, 106.0).job.text == "Now"
 
 
 def test_waits_end_when_they_were_to_however_late_somebody_looks() -> None:
@@ -140,7 +139,7 @@ def test_waits_end_when_they_were_to_however_late_somebody_looks() -> None:
 def test_what_takes_too_long_has_failed_and_is_ended() -> None:
     runner = JobRunner(JobList((VoiceJob(1, "Hello!"),)), RunnerConfig(longest_voice=30.0))
     runner.receive(ListCommand.RUN, now=0.0)
-    said = asked(runner, Speak, 0.0)
+    said = asked(runner, VoiceJob, 0.0)
     assert runner.advance(now=30.0) == (EndJob(said.attempt),)
     assert runner.progress.stage is JobStage.FAILED
     assert "longer" in runner.progress.reason
@@ -149,20 +148,20 @@ def test_what_takes_too_long_has_failed_and_is_ended() -> None:
 def test_a_job_that_fails_says_why_and_can_be_tried_again() -> None:
     runner = JobRunner(SCENARIO)
     runner.receive(ListCommand.RUN, now=0.0)
-    first = asked(runner, MoveTo, 0.0)
+    first = asked(runner, MoveJob, 0.0)
     runner.receive(JobFailed(first.attempt, "there's no way"), now=3.0)
     assert runner.progress.stage is JobStage.FAILED
     assert runner.progress.reason == "there's no way"
     assert runner.advance(now=4.0) == ()
     runner.receive(ListCommand.RESUME, now=5.0)
-    assert asked(runner, MoveTo, 5.0).attempt > first.attempt
+    assert asked(runner, MoveJob, 5.0).attempt > first.attempt
 
 
 @pytest.mark.parametrize("loss", OperatorLoss)
 def test_losing_the_operator_follows_the_policy(loss: OperatorLoss) -> None:
     runner = JobRunner(SCENARIO, RunnerConfig(loss=loss))
     runner.receive(ListCommand.RUN, now=0.0)
-    first = asked(runner, MoveTo, 0.0)
+    first = asked(runner, MoveJob, 0.0)
     runner.receive(OperatorLost("the link is lost"), now=1.0)
     if loss is OperatorLoss.STOP:
         assert runner.advance(now=1.0) == (EndJob(first.attempt),)
@@ -170,13 +169,13 @@ def test_losing_the_operator_follows_the_policy(loss: OperatorLoss) -> None:
     else:
         assert runner.advance(now=1.0) == ()
         runner.receive(Done(first.attempt), now=2.0)
-        assert asked(runner, Speak, 2.0)
+        assert asked(runner, VoiceJob, 2.0)
 
 
 def test_a_list_is_edited_where_it_stands_still() -> None:
     runner = JobRunner(SCENARIO)
     runner.receive(ListCommand.RUN, now=0.0)
-    first = asked(runner, MoveTo, 0.0)
+    first = asked(runner, MoveJob, 0.0)
     assert "pause or abort" in runner.load(SCENARIO.removed(3), now=0.5)
     runner.receive(Done(first.attempt), now=1.0)
     runner.receive(ListCommand.PAUSE, now=1.5)
@@ -202,7 +201,7 @@ def test_a_list_that_was_being_done_when_it_was_saved_is_paused() -> None:
     assert "anew" in other.progress.reason
     assert other.advance(now=1.0) == ()
     assert other.receive(ListCommand.RESUME, now=2.0) == ""
-    assert asked(other, MoveTo, 2.0).goal == B
+    assert asked(other, MoveJob, 2.0).job.to == B
 
 
 @pytest.mark.parametrize(

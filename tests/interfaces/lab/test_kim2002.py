@@ -113,7 +113,7 @@ def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
 
 
 def test_a_gap_is_from_outline_to_outline() -> None:
-    walker = Person("passer-by", 0.22, 1.7, (0.0, 1.0), ((2.0, 0.1), (2.0, 0.1)))
+    walker = Person("passer-by", 0.22, 1.7, (0.0, 1.0), (2.0, 2.0), (0.1, 0.1))
     body = SimpleNamespace(truth=(0.0, 0.0, 0.0), time=0.0)
     run: Any = SimpleNamespace(_body=body, _room=SimpleNamespace(people=(None, walker)))
     assert ScenarioRun.gap(run) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)

@@ -119,7 +119,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from interfaces.messages import control
-from interfaces.recording import messages
+from interfaces.messages import recording
 
 
 class State(control.State, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):
@@ -129,7 +129,7 @@ class State(control.State, frozen=True, omit_defaults=True, gc=False, eq=False, 
     """Of the motors, as {0} has it [°C]."""
 
 
-class Event(messages.EventEntry, frozen=True):
+class Event(recording.RunEvent, frozen=True):
     """An event, warm."""
 
     warmth: Annotated[float, Meta(ge=-50, le=150)] = 20.0
@@ -210,6 +210,20 @@ def test_a_documents_tables_say_who_may_send_what_and_what_words_mean() -> None:
     assert "\n| `version` | No common version of the protocol |\n" in found
     with pytest.raises(KeyError, match="warp"):
         generate.document("<!-- fields: warp -->\n<!-- end -->", generate.messages())
+
+
+def test_tables_of_recordings_name_topics_and_parts_and_what_is_left_out() -> None:
+    text = "".join(f"<!-- {what} -->\n<!-- end -->\n" for what in ("topics", "fields: begin", "fields: begin.late"))
+    found = generate.document(text, generate.recorded())
+    assert "\n| `/timeline` | `arcs` | mobile | A part of the whole timeline" in found
+    assert "\n| `/real/joints` | `vrs.RealJoints` | arm | Joints of the real robot as measured |\n" in found
+    late = "| `late` | `begin.late` (absent) | How the engine stood; absent where nothing had been commanded yet |"
+    assert f"\n{late}\n" in found
+    assert "\n| `begin.late` | | |\n|---|---|---|\n| `newest` | count |" in found
+    samples = generate.document("<!-- fields: /real/joints -->\n<!-- end -->", generate.recorded())
+    assert "\n| `play` | real | Where its timeline is played [s] |\n" in samples
+    with pytest.raises(StopIteration):
+        generate.document("<!-- fields: begin.warp -->\n<!-- end -->", generate.recorded())
 
 
 def test_a_field_that_is_added_is_drawn(newer: Any) -> None:

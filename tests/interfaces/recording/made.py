@@ -7,16 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from interfaces.engine_server.journal import difference
-from interfaces.recording.messages import (
+from interfaces.messages.recording import (
     Begin,
     ChangeEntry,
-    CommandEntry,
+    CommandRecord,
     End,
-    EventEntry,
     HistoryEntry,
     RealSample,
+    RunEvent,
     VirtualSample,
-    segment_entries,
 )
 from interfaces.recording.writer import RecordingWriter
 from robots import puma560
@@ -97,14 +96,14 @@ class Site:
         except VrsError as error:
             receipt = self.engine.refuse(command, str(error))
         self.number += 1
-        self.writer.write(CommandEntry(self.number, now, command, receipt), t=now)
+        self.writer.write(CommandRecord(self.number, now, command, receipt), t=now)
         after = self.engine.timeline
         if after is not before:
             change = difference(before, after, now, edit=self.edit + 1, command_id=receipt.command_id)
             self.edit += 1
             entry = ChangeEntry(
                 edit=self.edit, base=self.edit - 1, at=now, version=after.version, first=change.first, dof=6,
-                segments=segment_entries(change.segments), tail=change.tail, tail_start=change.tail_start,
+                segments=change.segments, tail=change.tail, tail_start=change.tail_start,
                 end=change.end, command_id=change.command_id,
             )  # fmt: skip
             self.writer.write(entry, t=now)
@@ -112,7 +111,7 @@ class Site:
 
     def event(self, kind: str, text: str) -> None:
         now = self.clock.now()
-        self.writer.write(EventEntry(now, kind, text), t=now)
+        self.writer.write(RunEvent(now, kind, text), t=now)
 
     def sample(self, now: float) -> None:
         q = self.engine.joints(now).tolist()

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from interfaces.messages import recording as m
 from interfaces.recording import Recording, RecordingWriter
-from interfaces.recording import messages as m
-from interfaces.recording.capture import edit_entries, whole_entries
 from interfaces.recording.channels import Message
+from interfaces.recording.history import edit_entries, whole_entries
 from interfaces.recording.poses import link_transforms, real_pose, virtual_pose
 from robots import puma560
 from tests.interfaces.stream.same import same
@@ -61,14 +61,14 @@ def motion(
             timelines.append(engine.timeline)
             (edit,) = edit_entries(before, engine.timeline, number, t, receipt.command_id)
             found += [
-                (t, m.CommandEntry(number, t, command, receipt)),
+                (t, m.CommandRecord(number, t, command, receipt)),
                 (t, edit),
                 (t, m.ReceiptEntry(t, "real", receipt.named())),
                 (t, m.GivenEntry(t, receipt.named(), smooth=True)),
-                (t, m.PacketEntry(number, receipt.command_id, t, t + 0.2, receipt.command_id)),
+                (t, m.CommandPacket(number, receipt.command_id, t, t + 0.2, receipt.command_id)),
                 (t, m.LinkEntry("forward", t, t + 0.2)),
                 (t, m.LinkEntry("backward", t, lost=True, attempts=2)),
-                (t, m.EventEntry(t, "late", f"command {number} came late")),
+                (t, m.RunEvent(t, "late", f"command {number} came late")),
             ]
         q = engine.joints(t)
         found += [(t, m.VirtualSample(t, q.tolist(), number)), (t, sample(k, step))]

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from interfaces.link import Service, delay_profile
+from interfaces.messages.recording import Begin, End
 from interfaces.messages.sites import PlanPart, Report
 from interfaces.recording.capture import Capture
-from interfaces.recording.messages import Begin, End
 from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.twin_run import TwinRun, fixed_offset

@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
+from interfaces.messages.recording import HistoryEntry, RunEvent
 from interfaces.recording.capture import Paced
 from interfaces.recording.figures import summary
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import HistoryEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.track import REAL, VIRTUAL
 from interfaces.runs.summary import summarize, to_json
-from interfaces.runs.twin_run import RunEvent, RunFacts, Turn
+from interfaces.runs.twin_run import Turn
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import exact_arm, run_twins
 from interfaces.teleop import OperatorSite
 from interfaces.teleop.halt import Halt, HaltCause
-from tests.interfaces.recording import shown
+from tests.interfaces.recording import recorded, shown
 from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
 from vrs import JointTarget, MotionCommand, Status
 from vrs.commands import ParameterChange, PositionQuery, Retime, ScaleTime
@@ -76,7 +76,7 @@ def test_a_site_tells_every_command_once_with_the_time_and_the_receipt():
     site.halted = Halt(HaltCause.REPORTED, "it stands in the way")
     refused = site.execute(move, now=0.5)
     assert site.undo(now=0.5) is None
-    assert heard.deeds[4:] == [(0.5, move, refused, True)]
+    assert [(d.at, d.command, d.receipt, d.refused) for d in heard.deeds[4:]] == [(0.5, move, refused, True)]
     assert "it stands in the way" in refused.reason
 
 
@@ -120,15 +120,15 @@ def test_names_of_files_that_are_long_or_no_utf_8_can_be_read_back(tmp_path):
     (deep / "caf\udce9.csv").write_text("delay_s\n0.1\n")
     plan = parse_plan(b'{"issue": 0.1, "move": {"pose": "ready"}}', "caf\udce9.jsonl", MODEL)
     run = taken(tmp_path / "run.mcap", f"trace:{deep}/caf\udce9.csv", plan=plan)
-    assert (run.title, run.delay) == ("caf?", f"trace:{deep}/caf?.csv")
+    assert (run.session.title, run.session.delay) == ("caf?", f"trace:{deep}/caf?.csv")
     with open_recording(tmp_path / "run.mcap") as recording:
-        assert (recording.session.title, recording.session.delay) == (run.title, run.delay)
+        assert (recording.session.title, recording.session.delay) == (run.session.title, run.session.delay)
         assert to_json(summary(recording)) == to_json(summarize(run))
 
 
 def test_texts_of_any_length_can_be_read_back(tmp_path):
     recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
-    recorder.begin(RunFacts(MODEL, NOMINAL, "a", 0, "none", "adaptive", "datagram", "hold", 0.02), site)
+    recorder.begin(recorded.begin(title="a", step=0.02, q=NOMINAL.tolist()), site)
     recorder.turn(
         Turn(
             0.0, 0, *(np.empty((0, *n)) for n in ((), (6,), (6,))), (), (), (RunEvent(0.0, "late", "x" * 3000),), ()
@@ -207,8 +207,7 @@ def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path):
 @pytest.mark.usefixtures("small")
 def test_a_disk_that_fills_up_amid_commands_stops_no_command(tmp_path):
     recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
-    facts = RunFacts(MODEL, NOMINAL, "many", 0, "none", "adaptive", "datagram", "hold", 0.02)
-    recorder.begin(facts, site)
+    recorder.begin(recorded.begin(title="many", step=0.02, q=NOMINAL.tolist()), site)
     for k in range(1100):
         site.execute(MotionCommand(JointTarget(NOMINAL), execute_at=10.0 + 0.5 * k), now=0.001 * k)
     assert "takes no more after 30000 bytes" in recorder.problem
@@ -239,8 +238,8 @@ def test_what_comes_late_is_shown_where_nothing_beside_it_was():
 
 
 def test_an_edit_of_very_many_segments_is_written_as_the_whole_timeline(tmp_path, monkeypatch):
-    monkeypatch.setattr("interfaces.recording.capture.MOST_CHANGED", 20)
-    monkeypatch.setattr("interfaces.recording.capture.PART", 16)
+    monkeypatch.setattr("interfaces.recording.history.MOST_CHANGED", 20)
+    monkeypatch.setattr("interfaces.recording.history.PART", 16)
     made = Sitting(tmp_path / "run.mcap", 1)
     for k in range(10):
         made.tell(MotionCommand(JointTarget(NOMINAL + 0.1 * (k % 3)), execute_at=1.0 + k))

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 import zstandard
 
-from interfaces.recording import messages as m
+from interfaces.messages import recording as m
+from interfaces.messages.fields import plain
 from interfaces.recording import open_recording
 from interfaces.recording.history import Chain
 from interfaces.recording.mcap_reading import HEAD, MAGIC, MARK, MARK_AT, NUMBERS, head_of
@@ -326,7 +327,9 @@ def test_edits_that_an_enemy_changed_bring_typed_errors_alone() -> None:
     messages = [message for _, message in recorded.motion(2.0, every=0.4)[0] if isinstance(message, kinds)]
     values = (0, 1, -1, 2, 5, 99, 2**62, 1e9, -1e9, 1e-300, 0.5, None, 6, 64)
     for _ in range(300):
-        entries: list[dict[str, Any]] = [msgspec.to_builtins(message) for message in messages]
+        entries: list[dict[str, Any]] = [
+            msgspec.to_builtins(message.as_written(), enc_hook=plain) for message in messages
+        ]
         entry = rng.choice(entries)
         if entry.get("segments") and rng.random() < 0.5:
             entry = entry["segments"][rng.randrange(len(entry["segments"]))]

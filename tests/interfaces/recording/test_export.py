@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
-from interfaces.recording import messages as m
+from interfaces.messages import recording as m
 from interfaces.recording.export import tables, write_csv, write_parquet
 from interfaces.recording.recording import open_recording
 from interfaces.report.html import render
@@ -139,9 +139,9 @@ def test_what_was_refused_taken_back_lost_or_sent_again_is_told(tmp_path):
     messages, _, _ = recorded.motion(1.5)
     move = MotionCommand(JointTarget(recorded.HOME))
     messages += [
-        (1.5, m.CommandEntry(3, 1.5, None, None)),
-        (1.5, m.CommandEntry(4, 1.5, move, None, refused=True)),
-        (1.5, m.PacketEntry(3, 7, 1.5, 1.6, 5)),
+        (1.5, m.CommandRecord(3, 1.5, None, None)),
+        (1.5, m.CommandRecord(4, 1.5, move, None, refused=True)),
+        (1.5, m.CommandPacket(3, 7, 1.5, 1.6, 5)),
     ]
     path = recorded.write(tmp_path / "run.mcap", messages, end=1.5)
     with open_recording(path) as recording:
@@ -204,7 +204,7 @@ def test_the_report_is_the_runs_own(whole, tmp_path, capsys):
 
 def test_every_column_is_described(whole):
     _, path = whole
-    text = DOC.read_text(encoding="utf-8")
+    text = DOC.read_text(encoding="utf-8").split("\n## Export\n")[1]
     with open_recording(path) as recording:
         for table in tables(recording):
             section = text.split(f"| `{table.name}` |", 1)[1].split("\n", 1)[0]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from interfaces.link import Service, delay_profile
-from interfaces.recording.figures import differences, figures, summary, twin_run
+from interfaces.recording.figures import differences, figures, summary
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import RunRecorder, extras_of
@@ -81,7 +81,7 @@ def test_a_recording_gives_the_summary_of_its_run_byte_for_byte(tmp_path, case):
     run = taken(tmp_path / "run.mcap", **CASES[case](tmp_path))
     with open_recording(tmp_path / "run.mcap") as recording:
         assert to_json(summary(recording)) == to_json(summarize(run))
-        equal(twin_run(recording), run)
+        equal(figures(recording).run, run)
         assert rerun(recording).identical
     assert bool(run.corrections) == (case in CORRECTED)
 
@@ -102,7 +102,7 @@ READY
     recorder.finish()
     with open_recording(tmp_path / "run.mcap") as recording:
         assert to_json(summary(recording)) == to_json(summarize(played.run))
-        assert recording.session.title == played.run.title
+        assert recording.session.title == played.run.session.title
 
 
 def test_what_other_runs_said_comes_back(tmp_path):

@@ -17,9 +17,9 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Message, Statistics
 from mcap.stream_reader import StreamReader
 
+from interfaces.messages import recording as m
 from interfaces.messages.fields import rich
 from interfaces.recording import RecordingWriter, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.channels import CHANNELS, RecordingChannel
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.poses import quaternions
@@ -39,12 +39,12 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (6.0, m.Anchor(
             number=9, at=6.0, initial=recorded.HOME.tolist(), start=0.0,
             version=2, end=7.0, error=[0.0] * 6, reason="apart",
-            segments=m.segment_entries(engine.timeline.segments),
+            segments=engine.timeline.segments[:],
         )),
-        (6.0, m.CommandEntry(10, 6.0, None, None)),
-        (6.0, m.CommandEntry(11, 6.0, ParameterChange("speed", 0.5), None, refused=True)),
-        (6.0, m.CommandEntry(12, 6.0, MotionCommand(PoseTarget(np.eye(4)), deviation=np.inf), None)),
-        (6.0, m.CommandEntry(13, 6.0, SteerCommand(twist=np.zeros(6)), None)),
+        (6.0, m.CommandRecord(10, 6.0, None, None)),
+        (6.0, m.CommandRecord(11, 6.0, ParameterChange("speed", 0.5), None, refused=True)),
+        (6.0, m.CommandRecord(12, 6.0, MotionCommand(PoseTarget(np.eye(4)), deviation=np.inf), None)),
+        (6.0, m.CommandRecord(13, 6.0, SteerCommand(twist=np.zeros(6)), None)),
         (6.0, recorded.history(engine, 7)),
     ]  # fmt: skip
     return recorded.write(tmp_path_factory.mktemp("format") / "run.mcap", messages, end=6.0)
@@ -222,7 +222,7 @@ def test_a_large_message_closes_its_block(tmp_path: Path) -> None:
     engine = recorded.motion(0.1)[1]
     large = m.HistoryEntry(
         edit=0, at=0.0, version=0, initial=[0.0] * 6, start=0.0, total=0, index=0,
-        segments=m.segment_entries(engine.timeline.segments) * 200,
+        segments=engine.timeline.segments[:] * 200,
     )  # fmt: skip
     path = recorded.write(tmp_path / "run.mcap", [(0.0, large)] * 30, end=0.0)
     with path.open("rb") as file:
@@ -241,7 +241,7 @@ def test_nothing_is_written_after_the_end(tmp_path: Path) -> None:
 
 def test_commands_come_back(path: Path) -> None:
     with open_recording(path) as recording:
-        entries = [entry for entry in recording.commands if isinstance(entry, m.CommandEntry)]
+        entries = [entry for entry in recording.commands if isinstance(entry, m.CommandRecord)]
         anchor = next(entry for entry in recording.commands if isinstance(entry, m.Anchor))
     first = entries[0].command
     assert isinstance(first, MotionCommand)

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from interfaces.messages.recording import Begin
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.figures import summary
 from interfaces.recording.live import LiveRecording
-from interfaces.recording.messages import Begin
 from interfaces.recording.playback import Align, Playback
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun

@@ -16,12 +16,12 @@ from interfaces import connect
 from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, TraceDelay, delay_profile
 from interfaces.messages.control import DirectionConditions, Impair
+from interfaces.messages.recording import HistoryEntry, ReceiptEntry, RunEvent
 from interfaces.messages.sites import Report
 from interfaces.recording import Recorder
 from interfaces.recording.figures import figures, summary
 from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import EventEntry, HistoryEntry, ReceiptEntry
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import REAL
@@ -192,7 +192,7 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
     line.link.backward.send(b"report", 1.4, 6)
     assert line.link.backward.receive(1.5)
     recorder.advance(now=1.5, connected=False)
-    assert not recorder.recorder.put(EventEntry(1.5, "other", "x" * 9 * 2**20), t=1.5)
+    assert not recorder.recorder.put(RunEvent(1.5, "other", "x" * 9 * 2**20), t=1.5)
     assert recorder.health()["dropped"] == 1
     recorder.finish(now=1.6)
     assert line.operator.listener is None

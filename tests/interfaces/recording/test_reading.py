@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.messages import recording as m
 from interfaces.recording import RecordingWriter, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.mcap_reading import FileSource
 from tests.interfaces.recording import recorded
 from vrs.errors import FormatError, InvalidValueError, NonFiniteTimeError, VrsError
@@ -154,9 +154,9 @@ def test_the_newest_word_counts(tmp_path: Path) -> None:
     undone = type(receipt)(**{**{name: getattr(receipt, name) for name in receipt.__slots__}, "undone": True})
     messages = [
         (0.0, m.ReceiptEntry(0.0, "virtual", receipt.named())),
-        (0.0, m.PacketEntry(1, 1, 0.0)),
+        (0.0, m.CommandPacket(1, 1, 0.0)),
         (1.0, m.ReceiptEntry(1.0, "virtual", undone.named())),
-        (1.0, m.PacketEntry(1, 1, 0.0, 0.5, 1)),
+        (1.0, m.CommandPacket(1, 1, 0.0, 0.5, 1)),
     ]
     with open_recording(recorded.write(tmp_path / "run.mcap", messages, end=1.0)) as recording:
         assert [receipt.undone for receipt in recording.receipts("virtual")] == [True]

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from interfaces.messages import recording as m
 from interfaces.recording import Recorder, RecordingError, RecordingWriter, open_recording
-from interfaces.recording import messages as m
 from interfaces.recording.mcap_file import Sink
 from tests.interfaces.recording import recorded
 from tests.interfaces.recording.disks import Disk, Failing, Hanging, Slow
@@ -103,12 +103,12 @@ def test_a_disk_that_failed_once_is_given_nothing_more(how: OSError | int | None
 def test_a_writer_says_up_to_when_all_is_there() -> None:
     writer = RecordingWriter(Disk(), recorded.begin())
     for t in (0.2, 0.1):
-        writer.write(m.EventEntry(t, "other", "late"), t=t)
+        writer.write(m.RunEvent(t, "other", "late"), t=t)
     assert writer.written == 0.0
     writer.flush()
     assert writer.written == 0.2
     with pytest.raises(InvalidValueError, match="of up to 8388608 bytes"):
-        writer.write(m.EventEntry(0.3, "other", "x" * 9 * 2**20), t=0.3)
+        writer.write(m.RunEvent(0.3, "other", "x" * 9 * 2**20), t=0.3)
 
 
 @pytest.fixture
@@ -251,10 +251,10 @@ def test_a_message_that_is_too_long_is_left_out(tmp_path: Path) -> None:
 
 
 def test_what_comes_last_needs_no_room(tmp_path: Path) -> None:
-    events = [m.EventEntry(1.0, "other", f"{k} {'x' * 100}") for k in range(1000)]
+    events = [m.RunEvent(1.0, "other", f"{k} {'x' * 100}") for k in range(1000)]
     recorder = Recorder(tmp_path / "run.mcap", recorded.begin(), room=5_000)
     assert recorder.put(events[0], t=1.0)
-    much = m.EventEntry(1.0, "other", "x" * 9 * 2**20)
+    much = m.RunEvent(1.0, "other", "x" * 9 * 2**20)
     assert recorder.close(m.End(1.0), last=[*events[1:500], much, *events[500:]])
     with open_recording(tmp_path / "run.mcap") as recording:
         assert [event.text for event in recording.events] == [event.text for event in events]
@@ -270,7 +270,7 @@ def test_closing_waits_as_long_as_the_disk_takes_something(monkeypatch: pytest.M
 
     monkeypatch.setattr("interfaces.recording.writer.LARGE", 2_000)
     recorder = Recorder(Tough(), recorded.begin())
-    events = [m.EventEntry(1.0, "other", "x" * 1000)] * 40
+    events = [m.RunEvent(1.0, "other", "x" * 1000)] * 40
     start = time.monotonic()
     assert recorder.close(m.End(1.0), patience=0.2, last=events)
     assert time.monotonic() - start > 0.3

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from interfaces.recording.messages import Anchor, CommandEntry
+from interfaces.messages.recording import Anchor, CommandRecord
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
 from robots import puma560
@@ -141,7 +141,9 @@ def test_an_altered_coefficient_is_found(tmp_path):
     told(tmp_path / "run.mcap")
     with open_recording(tmp_path / "run.mcap") as recording:
         changed = next(entry for entry in recording.changes if getattr(entry, "segments", ()))
-        changed.segments[0].coefficients[3] += 1e-15
+        altered = changed.segments[0].coefficients.copy()
+        altered[0, 3] += 1e-15
+        object.__setattr__(changed.segments[0], "coefficients", altered)
         again = rerun(recording)
     assert not again.identical
     assert "of new segment 0, coefficients" in again.difference
@@ -150,7 +152,7 @@ def test_an_altered_coefficient_is_found(tmp_path):
 def test_an_altered_receipt_is_found(tmp_path):
     told(tmp_path / "run.mcap")
     with open_recording(tmp_path / "run.mcap") as recording:
-        entries = [entry for entry in recording.commands if isinstance(entry, CommandEntry) and entry.receipt]
+        entries = [entry for entry in recording.commands if isinstance(entry, CommandRecord) and entry.receipt]
         receipt = entries[1].receipt
         set_field(receipt, "q", receipt.q + 1e-15)
         again = rerun(recording)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.bullet.rooms import Door, DoorKind, read_room
+from robots.bullet.rooms import Door, read_room
 from robots.bullet.world import RoomBodies, World
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import place
@@ -30,7 +30,7 @@ place chair 2 2
 def test_a_plan_has_doors_via_points_and_places() -> None:
     room = read_room(PLAN)
     hinged, sliding = room.doors
-    assert (hinged.kind, sliding.kind) == (DoorKind.HINGED, DoorKind.SLIDING)
+    assert (hinged.sliding, sliding.sliding) == (False, True)
     assert [hinged.share(t) for t in (0.0, 5.5, 7.0, 9.5, 15.5)] == [0.0, 0.5, 1.0, 0.5, 0.5]
     assert [sliding.share(t) for t in (0.0, 3.0, 99.0)] == [0.5, 0.75, 1.0]
     opened = hinged.at(7.0)
@@ -73,15 +73,15 @@ def test_a_bad_line_is_named(line: str) -> None:
 tables = st.lists(st.tuples(st.floats(0.5, 5), st.sampled_from([0.0, 0.25, 1.0])), min_size=2, max_size=5)
 
 
-@given(tables, st.floats(0, 40), st.booleans(), st.sampled_from(DoorKind))
+@given(tables, st.floats(0, 40), st.booleans(), st.booleans())
 def test_a_leaf_keeps_its_hinge_and_stands_as_long_as_it_says(
-    steps: list[tuple[float, float]], t: float, repeat: bool, kind: DoorKind
+    steps: list[tuple[float, float]], t: float, repeat: bool, sliding: bool
 ) -> None:
     times = np.cumsum([dt for dt, _ in steps]).tolist()
     shares = [share for _, share in steps]
-    door = Door("d", kind, 1.0, 2.0, 0.9, 0.3, 0.04, 2.0, 1.2, tuple(times), (*shares[:-1], shares[0]), repeat)
+    door = Door("d", sliding, 1.0, 2.0, 0.9, 0.3, 0.04, 2.0, 1.2, tuple(times), (*shares[:-1], shares[0]), repeat)
     leaf = door.at(t)
-    if kind is DoorKind.HINGED:
+    if not sliding:
         hinge = leaf.x - 0.45 * math.cos(leaf.angle), leaf.y - 0.45 * math.sin(leaf.angle)
         assert hinge == pytest.approx((1.0, 2.0), abs=1e-12)
     else:
@@ -120,6 +120,6 @@ def test_the_home_has_rooms_doors_and_the_papers_places() -> None:
     assert {one.name for one in home.places} >= {"A", "B"}
     front, b = home.doors[0].at(0.0), home.place("B")
     assert math.dist((front.x, front.y), (b.x, b.y)) < 1.2
-    assert {door.kind for door in home.doors} == set(DoorKind)
+    assert {door.sliding for door in home.doors} == {False, True}
     assert home.people
     assert len(home.via) >= 4

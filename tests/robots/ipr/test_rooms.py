@@ -45,7 +45,7 @@ def test_a_person_walks_by_the_clock() -> None:
     assert person.at(8.0 + 2.0) == person.at(2.0)
     assert person.at(80_002.0) == pytest.approx((2.0, 1.0), abs=1e-9)
     assert person.speed == 0.5
-    once = Person("p", 0.2, 1.7, (5.0, 6.0), ((0.0, 0.0), (1.0, 0.0)))
+    once = Person("p", 0.2, 1.7, (5.0, 6.0), (0.0, 1.0), (0.0, 0.0))
     assert [once.at(t) for t in (0.0, 5.5, 99.0)] == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0)]
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
+from interfaces.messages.recording import ArcChange
 from interfaces.recording.history import Chain, changed_arcs, edit_entries, whole, whole_entries
-from interfaces.recording.messages import ArcChange
 from robots import ipr
 from vrs import DriveCommand, Engine, ManualClock, Stop
 from vrs.errors import FormatError, InvalidValueError

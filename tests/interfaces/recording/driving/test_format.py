@@ -14,10 +14,10 @@ import pytest
 from mcap.reader import make_reader
 
 from interfaces.lab.driving.run import run
+from interfaces.messages.recording import room_entry, room_of
 from interfaces.recording import Damage, open_recording
 from interfaces.recording.channels import CHANNELS
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.messages import room_entry, room_of
 from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import DriveRecorder
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE

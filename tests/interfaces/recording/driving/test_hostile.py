@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from interfaces.cli.main import exit_status
+from interfaces.messages.recording import ArcEntry, ArcHistory, Begin, DriveFacts, End, RealPosture
 from interfaces.recording import RecordingWriter, open_recording
-from interfaces.recording.messages import ArcEntry, ArcHistory, Begin, DriveFacts, End, RealPosture
 from interfaces.recording.playback import Playback
 from vrs.errors import FormatError
 

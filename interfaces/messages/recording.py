@@ -1,14 +1,16 @@
 """Messages of a recording, as they stand in the file: of arms, of mobile robots, of commands and links.
 
-All that a file may hold is here, rooms as well: a reader finds each message and what it is made of in one place.
+All that a file may hold is here: a reader finds each message and what it is made of in one place.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from copy import copy
+from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 from msgspec import Meta, field
@@ -26,50 +28,56 @@ from interfaces.messages.fields import (
     Time,
     Word,
 )
-from interfaces.messages.segments import MOST_POWERS
+from interfaces.messages.segments import MOST_POWERS, placed, written
+from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.mobile import Grid
-from vrs.model import Array, frozen_array
+from vrs.model import Array
 from vrs.notes import rough_in
-from vrs.record import Record
-from vrs.segment import PolynomialSegment, known_segment
+from vrs.record import Record, set_field
+from vrs.segment import ArcSegment, PolynomialSegment, known_arc, known_segment
 from vrs.timeline import Timeline
 
-if TYPE_CHECKING:
-    from robots.bullet.rooms import Block, Column, Door, Room
-
-Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
-"""[m]."""
-Size = Annotated[float, Meta(gt=0, le=1e6)]
-"""[m]."""
 Place = Annotated[list[Length], Meta(min_length=2, max_length=2)]
 """x, y [m]."""
-Posture = Annotated[list[Length], Meta(min_length=3, max_length=3)]
-"""x, y [m], θ [rad]."""
+if TYPE_CHECKING:
+    Posture: TypeAlias = tuple[float, float, float]
+else:
+    Posture = Annotated[tuple[Length, ...], Meta(min_length=3, max_length=3)]
+    """x, y [m], θ [rad]."""
 Speed = Annotated[float, Meta(ge=-1e3, le=1e3)]
 """[m/s] or [rad/s]."""
 Cells = Annotated[tuple[Annotated[int, Meta(ge=0, le=4095)], ...], Meta(max_length=131_072)]
 """Of the virtual environment, two numbers a cell: along x, along y."""
 
 
+class Entry(Record, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
+    """A message of a channel that has several kinds."""
+
+
 class GridFacts(Record, frozen=True, omit_defaults=True, gc=False):
     """The cells of the virtual environment."""
 
     shape: Annotated[list[Annotated[int, Meta(ge=1, le=4096)]], Meta(min_length=2, max_length=2)]
+    """Cells along x and along y."""
     cell: Size
     """Side of a cell [m]."""
     origin: Place
+    """Lower left corner of the first cell [m]."""
 
 
 class DriveFacts(Record, frozen=True, omit_defaults=True, gc=False):
     """How a mobile robot's run was set up."""
 
     body: Literal["ipr", "micro", "bare"]
+    """Which robot of its family."""
     architecture: Word
+    """By its name, as `vrs lab --architecture` takes it."""
     transport: Literal["stream", "datagrams"]
     operator: Word
+    """Who drove, as `vrs lab --operator` takes it."""
     length: Seconds
     """For how long the operator drove [s]."""
     period: Seconds
@@ -77,116 +85,62 @@ class DriveFacts(Record, frozen=True, omit_defaults=True, gc=False):
     position: Word
     """What told the real robot where it was."""
     grid: GridFacts | None = None
-    """None where there was no virtual environment."""
+    """Of the virtual environment; None where there was none."""
 
 
 class ThingEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A block, or a column where it has a radius."""
 
     name: Word
+    """A wall's begins with `wall`."""
     x: Length
+    """Of its middle [m]."""
     y: Length
+    """[m]."""
     height: Size
+    """[m]."""
     length: Size | None = None
+    """Along its own first axis [m]; None of a column."""
     width: Size | None = None
+    """Across [m]; None of a column."""
+    # Written even where it's zero: a plain default is left out only where it's the very same object.
     angle: Finite = field(default_factory=float)
-    """Written even where it's zero: a plain default is left out only where it's the very same object."""
+    """Of its first axis [rad]."""
     radius: Size | None = None
+    """Of a column [m]; None of a block."""
     known: bool = True
+    """Whether the operator's map has it."""
     start: Finite | None = None
-    """It stands there from then on [s]; None for ever."""
+    """It stands there from then on [s]; None: it always did."""
     end: Finite | None = None
+    """It stands there until then [s]; None: for ever."""
 
 
-class PersonEntry(Record, frozen=True, omit_defaults=True, gc=False):
-    """Somebody who walks."""
-
-    name: Word
-    radius: Size
-    height: Size
-    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
-    x: Annotated[list[Length], Meta(min_length=1, max_length=1000)]
-    y: Annotated[list[Length], Meta(min_length=1, max_length=1000)]
-    repeat: bool = False
-
-
-class DoorEntry(Record, frozen=True, omit_defaults=True, gc=False):
-    """A door that opens and closes."""
-
-    name: Word
-    sliding: bool
-    x: Length
-    y: Length
-    length: Size
-    angle: Length
-    thickness: Size
-    height: Size
-    swing: Length
-    times: Annotated[list[Time], Meta(min_length=1, max_length=1000)]
-    shares: Annotated[list[Annotated[float, Meta(ge=0, le=1)]], Meta(min_length=1, max_length=1000)]
-    repeat: bool = False
-
-
-class RoomEntry(Record, frozen=True, omit_defaults=True, gc=False, tag_field="kind", tag="room"):
+class RoomEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="room"):
     """Where it was: written at the beginning, and once more at the end."""
 
     name: Word
     length: Size
+    """Along x [m]."""
     width: Size
-    things: Annotated[tuple[ThingEntry, ...], Meta(max_length=1000)] = ()
-    """Blocks, then columns."""
-    people: Annotated[tuple[PersonEntry, ...], Meta(max_length=1000)] = ()
-    doors: Annotated[tuple[DoorEntry, ...], Meta(max_length=1000)] = ()
-
-
-class ArcEntry(Record, frozen=True, omit_defaults=True, gc=False):
-    """An arc at constant speeds."""
-
-    duration: Seconds
-    posture: Posture
-    """At its start."""
-    v: Speed
-    """[m/s]."""
-    w: Speed
-    """[rad/s]."""
-    command_id: CommandId | None = None
-    """None for standing."""
-    start: Time | None = None
-    """[s]; None where the arc before ends."""
-
-
-class ArcHistory(Record, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="arcs"):
-    """A part of the whole timeline with an edit; as `HistoryEntry`."""
-
-    edit: Count
-    at: Time
-    version: Count
-    initial: Posture
-    start: Time
-    total: Count
-    index: Count
-    segments: tuple[ArcEntry, ...] = ()
-
-
-class ArcChange(Record, frozen=True, omit_defaults=True, gc=False, kw_only=True, tag_field="kind", tag="drive"):
-    """An edit of the timeline: its first `first` arcs stay, these follow."""
-
-    edit: Number
-    base: Count
-    at: Time
-    version: Count
-    first: Count
-    segments: tuple[ArcEntry, ...] = ()
-    end: Time
-    command_id: CommandId | None = None
+    """Along y [m]."""
+    things: Annotated[tuple[ThingEntry, ...], Meta(max_length=MOST_THINGS)] = ()
+    """Blocks, walls among them, then columns."""
+    people: Annotated[tuple[Person, ...], Meta(max_length=MOST_THINGS)] = ()
+    """With the paths that they walk."""
+    doors: Annotated[tuple[Door, ...], Meta(max_length=MOST_THINGS)] = ()
+    """With their timetables."""
 
 
 class PostureSample(Record, frozen=True, omit_defaults=True, gc=False):
     """Where a robot is, or is thought to be, at a time."""
 
     t: Time
+    """User time [s]."""
     x: Length
+    """[m]."""
     y: Length
+    """[m]."""
     theta: Length
     """[rad]."""
 
@@ -197,19 +151,19 @@ class PostureSample(Record, frozen=True, omit_defaults=True, gc=False):
 
 
 class VirtualPosture(PostureSample, frozen=True, omit_defaults=True, gc=False):
-    """The virtual robot as it's shown: a comfort for other readers, ours compute it."""
+    """The virtual robot as it's shown, 20 times a second: a comfort for other readers, ours compute it."""
 
     edit: Count = 0
     """Number of the newest edit."""
 
 
 class RealPosture(PostureSample, frozen=True, omit_defaults=True, gc=False, kw_only=True):
-    """The real robot, truly; and what it's told to drive from then on."""
+    """The real robot, truly, 20 times a second; and what it's told to drive from then on."""
 
     v: Speed
-    """[m/s]."""
+    """What it's told to drive [m/s]."""
     w: Speed
-    """[rad/s]."""
+    """What it's told to turn [rad/s]."""
     D: Finite | None = None
     """How far behind the operator it wants to be [s]; None where the architecture has no such thing."""
 
@@ -240,15 +194,11 @@ class CellsEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """Cells of the virtual environment, beside the known map, that came and went since the entry before."""
 
     t: Time
+    """User time [s]."""
     added: Cells = ()
+    """Two numbers a cell: along x, along y."""
     gone: Cells = ()
-
-
-DriveMessage: TypeAlias = (
-    RoomEntry | ArcHistory | ArcChange | VirtualPosture | RealPosture | MeasuredPosture | EstimatedPosture
-    | CellsEntry
-)  # fmt: skip
-"""What a mobile robot's recording has besides."""
+    """Two numbers a cell: along x, along y."""
 
 
 FORMAT = "vrs-recording/1"
@@ -256,14 +206,10 @@ FORMAT = "vrs-recording/1"
 OWN = "the robot's own"
 """`Begin.offset` and `Begin.link_loss` of a robot that somebody else started: it alone knows them."""
 COLLISION = "collision"
-"""`EventEntry.kind` of collisions."""
+"""`RunEvent.kind` of collisions."""
 
-_Numbers = Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
 Site: TypeAlias = Literal["virtual", "real"]
-
-
-class Entry(Record, frozen=True, omit_defaults=True, gc=False, tag_field="kind"):
-    """A message of a channel that has several kinds."""
+Direction: TypeAlias = Literal["forward", "backward"]
 
 
 class Late(Record, frozen=True, omit_defaults=True, gc=False):
@@ -272,9 +218,11 @@ class Late(Record, frozen=True, omit_defaults=True, gc=False):
     newest: Count
     """Highest command id given out."""
     qd_max: Joints
-    """Limits in force [rad/s], and so on."""
+    """Limit of speed in force [rad/s]."""
     qdd_max: Joints
+    """Of acceleration [rad/s²]."""
     qddd_max: Joints
+    """Of jerk [rad/s³]."""
     steered: Number | None = None
     """The command that the next steering input goes on with."""
     steered_at: Time = 0.0
@@ -282,28 +230,35 @@ class Late(Record, frozen=True, omit_defaults=True, gc=False):
 
 
 class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_only=True):
-    """How the run was set up; repeated now and then, so that no damage makes a recording nameless."""
+    """How the run was set up; repeated every 10 s, the first counts: no damage makes a recording nameless."""
 
     format: Literal["vrs-recording/1"] = FORMAT  # type: ignore[assignment]
+    """Name and version of what the messages mean."""
     t: Time
     """Where the recording begins [s]."""
     robot: Word
-    """As in `robots.<name>`."""
+    """As in `robots.NAME`."""
     driver: Literal["laboratory", "live"]
+    """Whether it ran in virtual time."""
     title: Text
+    """For people."""
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] | None = None
     """Of everything random in the run; None where nothing is."""
     delay: Text
     """Delay profile, as it was asked for: one of a file has its path."""
     offset: Word
-    """`adaptive`, `fixed:S`, or `OWN`; `none` of a mobile robot whose architecture has none."""
+    """How far the real robot plays behind: `adaptive`, `fixed:S`, or `the robot's own`; `none` of a mobile robot
+    whose architecture has none."""
     service: Word
+    """How the link delivers."""
     link_loss: Word
+    """What the robot does when nothing fresh is heard: `halt`, `hold`, or `the robot's own`."""
     step: Seconds
     """Between two samples [s]."""
     q: Joints
     """Joints of both robots at the start [rad]; of a mobile robot its posture."""
     lateness: Word
+    """What becomes of commands that come too late: `postpone`, `reject`."""
     software: Word
     """What wrote the file, with its version."""
     began: Stamp | None = None
@@ -311,9 +266,9 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     sampled: Seconds | None = None
     """Between two samples of a live arm [s]; None where they came with its reports alone."""
     late: Late | None = None
-    """None where nothing had been commanded yet."""
+    """How the engine stood; None where nothing had been commanded yet."""
     drive: DriveFacts | None = None
-    """Of a mobile robot; None of an arm."""
+    """How a mobile robot's run was set up; None of an arm."""
 
 
 class Drop(Record, frozen=True, omit_defaults=True, gc=False):
@@ -321,32 +276,36 @@ class Drop(Record, frozen=True, omit_defaults=True, gc=False):
 
     topic: Word
     count: Count
+    """Since the beginning."""
 
 
 class Dropped(Entry, frozen=True, omit_defaults=True, gc=False, tag="dropped"):
     """How many messages weren't recorded since the beginning, because the disk took no more."""
 
     t: Time
+    """User time [s]."""
     counts: tuple[Drop, ...]
+    """By topic."""
 
 
 class End(Entry, frozen=True, omit_defaults=True, gc=False, tag="end"):
     """The recording was closed in order."""
 
     t: Time
+    """User time [s]."""
     extras: dict[str, Any] | None = None
     """What the run's summary holds besides what can be computed from the recording."""
 
 
-class CommandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="command"):
-    """A command as the operator's engine took it, rejected ones too."""
+class CommandRecord(Entry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="command"):
+    """A command that the operator's engine was given, and what became of it; rejected ones too."""
 
     number: Number
-    """Counts commands and anchors, from 1."""
+    """Counts a recording's commands and anchors, from 1; 0 where it isn't in one yet."""
     at: Time
     """The engine's clock, exactly [s]."""
     command: Command | None = None
-    """None takes back the newest accepted command."""
+    """None: it takes back the newest accepted one."""
     receipt: Receipt | None = None
     """None where the command gives none."""
     refused: bool = False
@@ -357,7 +316,9 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
     """A command from before the recording that wasn't over when it began, or by which the arm had moved last."""
 
     t: Time
+    """Where the recording begins [s]."""
     receipt: Receipt
+    """As it was then."""
     command: Command | None = None
     """None where it's no motion command."""
     smooth: bool = False
@@ -377,30 +338,130 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         return Known(self.receipt, command, profile, rough_in(self.receipt.reason))
 
 
+UNSAID = -math.inf
+"""Start of segments whose entries don't say when: where those before them end."""
+
+
 class SegmentEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A segment: a row of `dof` numbers a power, ascending, one row after the other."""
 
     duration: Seconds
-    coefficients: _Numbers
+    """[s]."""
+    coefficients: Annotated[list[Finite], Meta(min_length=1, max_length=MOST_JOINTS * MOST_POWERS)]
+    """Rows of one number a joint, by ascending power of t − start, one row after the other."""
     command_id: CommandId | None = None
+    """None of a hold."""
     start: Time | None = None
-    """[s]; None where the segment before ends."""
+    """[s]; None: where the segment before ends."""
+
+    @classmethod
+    def of(cls, segment: PolynomialSegment, start: float | None = None) -> SegmentEntry:
+        """What stands in the file for a segment."""
+        return cls(segment.duration, segment.coefficients.ravel().tolist(), segment.command_id, start)
+
+    def segment(self, start: float, dof: int) -> PolynomialSegment:
+        """The segment that it stands for.
+
+        Raises:
+            InvalidValueError: If the coefficients don't fit the joints.
+        """
+        count = len(self.coefficients)
+        if not dof or count % dof or count > dof * MOST_POWERS:
+            raise InvalidValueError("coefficients", f"{count} numbers", f"1 to {MOST_POWERS} rows of {dof}")
+        a: Array = np.array(self.coefficients).reshape(-1, dof)
+        a.flags.writeable = False
+        return known_segment(start, self.duration, a, self.command_id)
 
 
-class Anchor(Entry, frozen=True, omit_defaults=True, gc=False, tag="anchor", kw_only=True):
-    """The virtual robot joined the real one's plan, because the two had parted."""
+class ArcEntry(Record, frozen=True, omit_defaults=True, gc=False):
+    """An arc at constant speeds."""
+
+    duration: Seconds
+    """[s]."""
+    posture: Posture
+    """x, y, θ at its start [m, m, rad]."""
+    v: Speed
+    """[m/s]."""
+    w: Speed
+    """[rad/s]."""
+    command_id: CommandId | None = None
+    """None of standing."""
+    start: Time | None = None
+    """[s]; None: where the arc before ends."""
+
+    @classmethod
+    def of(cls, arc: ArcSegment, start: float | None = None) -> ArcEntry:
+        """What stands in the file for an arc."""
+        return cls(arc.duration, arc.posture, arc.v, arc.w, arc.command_id, start)
+
+    def segment(self, start: float, _dof: int) -> ArcSegment:
+        """The arc that it stands for."""
+        return known_arc(start, self.duration, self.posture, self.v, self.w, self.command_id)
+
+
+if TYPE_CHECKING:
+    Arcs: TypeAlias = tuple[ArcSegment, ...]
+    Polynomials: TypeAlias = tuple[PolynomialSegment, ...]
+else:
+    Arcs = tuple[ArcEntry, ...]
+    Polynomials = tuple[SegmentEntry, ...]
+
+
+class SegmentedEntry(Entry, frozen=True, omit_defaults=True, gc=False, eq=False):
+    """An entry with segments: it holds them as they are, and is written with an entry for each."""
+
+    row: ClassVar[type[SegmentEntry | ArcEntry]] = SegmentEntry
+
+    @property
+    def dof(self) -> int:
+        """Joints of the segments."""
+        return len(self.initial)  # type: ignore[attr-defined]
+
+    def __post_init__(self) -> None:
+        given = self.segments  # type: ignore[attr-defined]
+        if given and type(given[0]) is self.row:
+            dof = self.dof
+            set_field(self, "segments", tuple([row.segment(start, dof) for start, row in placed(given, UNSAID)]))
+
+    def as_written(self) -> Self:
+        """The same as it stands in the file; the start of the first segment is always given."""
+        message = copy(self)
+        set_field(message, "segments", written(self.segments, self.row.of, UNSAID))  # type: ignore[attr-defined]
+        return message
+
+
+S = TypeVar("S", PolynomialSegment, ArcSegment)
+
+
+def following(segments: Iterable[S], start: float) -> Iterator[S]:
+    """Segments as they're held, from a time [s] on where they don't say when."""
+    for segment in segments:
+        at = start if segment.start == UNSAID else segment.start
+        yield segment if segment.start == at else replace(segment, start=at)
+        start = at + segment.duration
+
+
+class Anchor(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="anchor", kw_only=True):
+    """The virtual robot joined the real one's plan, which stands here whole, because the two had parted."""
 
     number: Number
+    """Counts a recording's commands and anchors, from 1."""
     at: Time
-    initial: Joints
+    """The engine's clock, exactly [s]."""
+    initial: Array
+    """Before the start of that plan [rad]."""
     start: Time
+    """Origin of that plan [s]."""
     version: Count
-    segments: tuple[SegmentEntry, ...] = ()
+    """Of that plan."""
+    segments: Polynomials = ()
+    """That plan's."""
     end: Time
     """Until when it takes to come back [s]."""
-    error: Joints
+    error: Array
     """By how much the virtual robot was off [rad], (n,)."""
     reason: Text
+    """Why they had parted, one line."""
     timeline_version: Count | None = None
     """Version of the operator's timeline afterwards."""
 
@@ -411,38 +472,48 @@ class Anchor(Entry, frozen=True, omit_defaults=True, gc=False, tag="anchor", kw_
         Raises:
             InvalidValueError: If it's none.
         """
-        segments = segments_of(len(self.initial), self.start, self.segments)
-        return Timeline(self.initial, self.start, segments, self.version)
+        return Timeline(self.initial, self.start, following(self.segments, self.start), self.version)
 
 
 class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receipt"):
     """The newest truth about a command at one of the sites."""
 
     t: Time
+    """User time [s]."""
     site: Site
+    """Whose truth."""
     receipt: Receipt
 
 
-class PacketEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
-    """A command on its way across the link, as `interfaces.runs.twin_run.CommandPacket`."""
+class CommandPacket(Entry, frozen=True, omit_defaults=True, gc=False, tag="packet"):
+    """A motion command on its way across the link."""
 
     number: Number
     """Place in the order of sending, from 1."""
     command_id: Number
+    """Id that the operator's engine gave the command, from 1."""
     sent: Time
+    """User time of sending [s]."""
     arrived: Time | None = None
+    """User time at which it first arrived [s]; None when it never did."""
     real_id: Number | None = None
+    """Id that the real robot's engine gave the command; None when it never arrived."""
     lost: bool = False
+    """Whether the link lost the first message with it; later messages repeat it."""
 
 
-class HistoryEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="history", kw_only=True):
+class HistoryEntry(
+    SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="history", kw_only=True
+):
     """A part of the whole timeline with an edit, as the virtual robot shows it."""
 
     edit: Count
+    """Its number, from 1; 0 is what the recording begins with."""
     at: Time
     """The engine's clock when the timeline was that [s]."""
     version: Count
-    initial: Joints
+    """Of the timeline."""
+    initial: Array
     """Before the start of the timeline [rad]."""
     start: Time
     """Origin of the timeline [s]."""
@@ -450,32 +521,70 @@ class HistoryEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="histor
     """Segments of the whole."""
     index: Count
     """Number of the first segment of this part, from 0."""
-    segments: tuple[SegmentEntry, ...] = ()
+    segments: Polynomials = ()
 
 
-class ChangeEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="change", kw_only=True):
-    """An edit of the timeline, as `interfaces.messages.Change`."""
+class ArcHistory(HistoryEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="arcs", kw_only=True):
+    """A part of the whole timeline with an edit, of a mobile robot."""
+
+    row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
+    initial: Posture  # type: ignore[assignment]
+    """x, y, θ before the start of the timeline [m, m, rad]."""
+    segments: Arcs = ()  # type: ignore[assignment]
+
+
+class EditEntry(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False, kw_only=True):
+    """An edit, as what it put in."""
 
     edit: Number
+    """Its number, from 1."""
     base: Count
+    """Number of the edit that it builds on."""
     at: Time
     """The engine's clock, exactly [s]."""
     version: Count
     """Of the timeline afterwards."""
     first: Count
+    """So many segments stay."""
+
+
+class ChangeEntry(EditEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="change", kw_only=True):
+    """An edit: the first `first` segments stay, `segments` follow, then those of the base from `tail` on."""
+
     dof: Count
-    segments: tuple[SegmentEntry, ...] = ()
+    """Joints."""
+    segments: Polynomials = ()
+    """New ones."""
     tail: Count | None = None
+    """The base's segments from this one on follow; None: none do."""
     tail_start: Time
+    """When those begin [s]."""
     end: Time
+    """Of the timeline afterwards [s]."""
     command_id: CommandId | None = None
+    """Who made it; None: a correction."""
+
+
+class ArcChange(EditEntry, frozen=True, omit_defaults=True, gc=False, eq=False, tag="drive", kw_only=True):
+    """An edit of a mobile robot's timeline: the first `first` arcs stay, `segments` follow."""
+
+    row: ClassVar[type[SegmentEntry | ArcEntry]] = ArcEntry
+    dof: ClassVar[int] = 3
+    segments: Arcs = ()
+    """New ones."""
+    end: Time
+    """Of the timeline afterwards [s]."""
+    command_id: CommandId | None = None
+    """Who made it."""
 
 
 class VirtualSample(Record, frozen=True, omit_defaults=True, gc=False):
     """Joints of the virtual robot as it's shown: a comfort for other readers, ours compute them."""
 
     t: Time
+    """User time [s]."""
     q: Joints
+    """[rad]."""
     edit: Count
     """Number of the newest edit."""
 
@@ -484,98 +593,47 @@ class RealSample(Record, frozen=True, omit_defaults=True, gc=False):
     """Joints of the real robot as measured."""
 
     t: Time
+    """User time [s]."""
     play: Time
     """Where its timeline is played [s]."""
     q: Joints
+    """[rad]."""
     reference: Joints | None = None
-    """What its own timeline asked for; None where that isn't known."""
+    """What its own timeline asked for [rad]; None where that isn't known."""
 
 
 class LinkEntry(Record, frozen=True, omit_defaults=True, gc=False):
     """A packet of the link whose fate is known."""
 
-    direction: Literal["forward", "backward"]
+    direction: Direction
+    """`forward` goes to the robot."""
     sent: Time
+    """User time [s]."""
     arrived: Time | None = None
-    """[s]; None where it was lost, or still on its way when the recording ended."""
+    """User time [s]; None where it was lost, or still on its way when the recording ended."""
     lost: bool = False
     attempts: Count = 1
+    """How often it was sent."""
     size: Count = 0
     """[byte]; 0 where that wasn't recorded."""
 
 
-class EventEntry(Record, frozen=True, omit_defaults=True, gc=False):
-    """Something that happened, as `interfaces.runs.twin_run.RunEvent`."""
+class RunEvent(Record, frozen=True, omit_defaults=True, gc=False, order=True):
+    """Something that happened to the real robot or the link."""
 
     t: Time
+    """User time [s]."""
     kind: Word
+    """`payload`, `release`, `late`, `lost`, `slowed`, `waited`, `corrected`, `halted`, `diverged`, `unfinished`;
+    live `up`, `down`, `followed`; of a mobile robot `collision`, `learned`, `forgot`."""
     text: Text
-
-
-def segment_entries(segments: Sequence[PolynomialSegment]) -> tuple[SegmentEntry, ...]:
-    """Segments for the file; the first one's start is always given."""
-    end: float | None = None
-    found = []
-    for segment in segments:
-        start = None if segment.start == end else segment.start
-        coefficients: list[float] = segment.coefficients.ravel().tolist()
-        found.append(SegmentEntry(segment.duration, coefficients, segment.command_id, start))
-        end = segment.start + segment.duration
-    return tuple(found)
-
-
-def segments_of(dof: int, start: float, entries: Sequence[SegmentEntry]) -> tuple[PolynomialSegment, ...]:
-    """The segments that entries stand for.
-
-    Args:
-        dof: Joints.
-        start: Start of the first where it doesn't say so itself [s].
-        entries: As they stand in the file.
-
-    Raises:
-        InvalidValueError: If the coefficients don't fit the joints.
-    """
-    found = []
-    for entry in entries:
-        start = start if entry.start is None else entry.start
-        count = len(entry.coefficients)
-        if not dof or count % dof or count > dof * MOST_POWERS:
-            raise InvalidValueError("coefficients", f"{count} numbers", f"1 to {MOST_POWERS} rows of {dof}")
-        a: Array = np.array(entry.coefficients).reshape(-1, dof)
-        a.flags.writeable = False
-        found.append(known_segment(start, entry.duration, a, entry.command_id))
-        start += entry.duration
-    return tuple(found)
-
-
-def joints(values: list[float]) -> Array:
-    """A read-only array of a message's joints."""
-    return frozen_array(values)
+    """What happened, one line."""
 
 
 def room_entry(room: Room) -> RoomEntry:
     """A room for the file."""
-    people = tuple(
-        PersonEntry(
-            one.name,
-            one.radius,
-            one.height,
-            list(one.times),
-            [x for x, _ in one.places],
-            [y for _, y in one.places],
-            one.repeat,
-        )
-        for one in room.people
-    )
-    things = tuple(_thing_entry(one) for one in room.things)
-    return RoomEntry(room.name, room.length, room.width, things, people, tuple(map(_door_entry, room.doors)))
-
-
-def _door_entry(door: Door) -> DoorEntry:
-    return DoorEntry(
-        door.name, door.kind.value == "sliding", door.x, door.y, door.length, door.angle, door.thickness,
-        door.height, door.swing, list(door.times), list(door.shares), door.repeat,
-    )  # fmt: skip
+    things = tuple(map(_thing_entry, room.things))
+    return RoomEntry(room.name, room.length, room.width, things, room.people, room.doors)
 
 
 def _thing_entry(thing: Block | Column) -> ThingEntry:
@@ -591,39 +649,29 @@ def room_of(entry: RoomEntry, where: str) -> Room:
     Raises:
         FormatError: If a thing or somebody in it makes no sense.
     """
-    from robots.bullet.rooms import Door, DoorKind, Person, Room
-
     things = [_thing(one, where) for one in entry.things]
-    people = []
     for one in entry.people:
         if not _ascend(one.times) or not len(one.times) == len(one.x) == len(one.y):
             raise FormatError(where, f"{one.name!r} in its room walks no path")
-        places = tuple(zip(one.x, one.y, strict=True))
-        repeats = one.repeat and len(one.times) > 1
-        people.append(Person(one.name, one.radius, one.height, tuple(one.times), places, repeats))
-    doors = []
     for leaf in entry.doors:
         if not _ascend(leaf.times) or len(leaf.times) != len(leaf.shares):
             raise FormatError(where, f"{leaf.name!r} in its room has no timetable")
-        kind = DoorKind.SLIDING if leaf.sliding else DoorKind.HINGED
-        doors.append(Door(
-            leaf.name, kind, leaf.x, leaf.y, leaf.length, leaf.angle, leaf.thickness, leaf.height, leaf.swing,
-            tuple(leaf.times), tuple(leaf.shares), leaf.repeat and len(leaf.times) > 1,
-        ))  # fmt: skip
-    blocks = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is None)
-    columns = tuple(thing for thing, entry in zip(things, entry.things, strict=True) if entry.radius is not None)
-    size = entry.name, entry.length, entry.width
-    moving = {"people": tuple(people), "doors": tuple(doors)}
-    return Room(*size, blocks=blocks, columns=columns, **moving)  # type: ignore[arg-type]
+    return Room(
+        entry.name,
+        entry.length,
+        entry.width,
+        blocks=tuple(thing for thing in things if isinstance(thing, Block)),
+        columns=tuple(thing for thing in things if isinstance(thing, Column)),
+        people=entry.people,
+        doors=entry.doors,
+    )
 
 
-def _ascend(times: list[float]) -> bool:
+def _ascend(times: tuple[float, ...]) -> bool:
     return all(a < b for a, b in pairwise(times))
 
 
 def _thing(entry: ThingEntry, where: str) -> Block | Column:
-    from robots.bullet.rooms import Block, Column
-
     start = -math.inf if entry.start is None else entry.start
     end = math.inf if entry.end is None else entry.end
     if entry.radius is not None:
