@@ -14,7 +14,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -212,6 +212,9 @@ class Host(ABC, Generic[E, O, R]):
     first.
     """
 
+    orders: ClassVar[type]
+    """What its operators send."""
+
     def __init__(self, config: HostConfig, *, now: float, seed: int = 0) -> None:
         """Stand at rest, and wait for an operator.
 
@@ -358,7 +361,7 @@ class Host(ABC, Generic[E, O, R]):
         messages, self._unsent = self._unsent, []
         if self.site is not None:
             messages += self.site.advance(now=self.site_time(now))
-        if self._next and (self.site is None or self._stands(now)):
+        if self._next and self.rests(now=now):
             messages.clear()
             self._begin(now)
         probe = None if self._trips is None else self._trips.to_send(now=now)
@@ -380,10 +383,9 @@ class Host(ABC, Generic[E, O, R]):
             times.append(self._now)
         return min(times)
 
-    def _stands(self, now: float) -> bool:
-        """Whether the body's references rest already at the robot's time now."""
-        assert self.site is not None
-        return self.site.rests(now=now + self.offset)
+    def rests(self, *, now: float) -> bool:
+        """Whether the robot is to stand still already at its time now [s]."""
+        return self.site is None or self.site.rests(now=now + self.offset)
 
     def halt(self, reason: str, *, now: float) -> None:
         """Stop, and wait for a new epoch."""

@@ -520,6 +520,8 @@ class RobotHost(Host[RobotSite, Orders, Report]):
     never changes.
     """
 
+    orders = Orders
+
     def __init__(
         self, model: RobotModel, q: Array, *, now: float, config: RobotHostConfig | None = None, seed: int = 0
     ) -> None:

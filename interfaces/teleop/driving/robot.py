@@ -313,6 +313,8 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
 class DrivenHost(Host[DrivenRobot, DriveOrders, DriveReport]):
     """See `Host`; what the body is to do is a drive for each control period."""
 
+    orders = DriveOrders
+
     def __init__(
         self, make: Callable[[float], DrivenRobot], config: HostConfig, *, now: float, seed: int = 0
     ) -> None:

@@ -1,34 +1,25 @@
-"""A mobile robot's site, live: an architecture on board of a body in PyBullet, in step with the clock.
+"""A mobile robot's body, live: an architecture on board of it in PyBullet, in step with the clock.
 
-Its process is the body's own: a control period's physics takes some 3 ms of 50.
+It's in the site's own process: a control period's physics takes some 3 ms of 50.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import secrets
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
-from starlette.requests import Request
-from starlette.responses import JSONResponse
-from starlette.routing import BaseRoute, Route
+from typing_extensions import override
 
 from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
-from interfaces.messages.control import PROTOCOL, Attached
-from interfaces.messages.drive_sites import DriveOrders
-from interfaces.runtime.live.robot_server import RobotServer
-from interfaces.stream.access import Access
-from interfaces.teleop.architectures import (
-    ArchitectureRobotSite,
-    Constants,
-    architecture,
-    controller,
-)
+from interfaces.runtime.live.robot import LiveBody
+from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, architecture, controller
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, SENSING, robot_surroundings
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.driving import (
@@ -40,7 +31,6 @@ from interfaces.teleop.driving import (
     LaserSight,
     NavigatorPilot,
 )
-from interfaces.timer import Turning
 from robots.bullet.rooms import Room
 from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses
@@ -50,21 +40,15 @@ from robots.onboard.following import SoundPosition
 from robots.onboard.laser import LaserModel
 from vrs.checks import one_of
 from vrs.clock import WallClock
+from vrs.model import Array
 
-EVERY: Final = 4
-"""Each so many of a scan's beams is told of."""
-_TOLD: Final = 0.39
-"""At most so often [s]."""
-
-
+_LOG = logging.getLogger(__name__)
 _COUNTED = 1200
 """Control periods of which it's told how late they were, and how long they took: the last minute."""
-_REST = 3.0
-"""Longest time to come to rest in the end [s]."""
 
 
 @dataclass(frozen=True, slots=True)
-class LiveMobileConfig:
+class PacedConfig:
     """A mobile robot, and how its site behaves."""
 
     room: Room
@@ -86,8 +70,6 @@ class LiveMobileConfig:
     """Of all architectures."""
     seed: int = 0
     """Of slip and of the senses' noise, ≥ 0."""
-    server: str = "vrs"
-    """Name and version of the program."""
 
     def __post_init__(self) -> None:
         architecture(self.architecture)
@@ -97,17 +79,19 @@ class LiveMobileConfig:
         one_of("position", self.position, POSITIONS)
 
 
-class LiveMobileRobot:
-    """A mobile robot that follows whoever says hello as an operator's site. Enter `running` where its loop runs."""
+class PacedBody(LiveBody):
+    """What drives along a path, a control period at a time."""
 
-    def __init__(self, config: LiveMobileConfig, access: Access) -> None:
+    host: DrivenHost
+
+    def __init__(self, config: PacedConfig) -> None:
         """Put the robot into its room; its clock runs from here on.
 
         Args:
             config: The robot.
-            access: Who may come in as `Role.SITE`.
         """
-        self.config = config
+        self.config, self.name, self.watchdog = config, "ipr", config.driven.watchdog
+        self.about = {"architecture": config.architecture, "room": config.room.name}
         senses = Senses(laser=LaserModel())
         rng = np.random.default_rng(config.seed)
         self.body = MobileBody("ipr", room=config.room, rng=rng, senses=senses)
@@ -118,22 +102,12 @@ class LiveMobileRobot:
         self.autonomy = Autonomy(NavigatorPilot(self.body, CONTROL), config.hands, config.jobs)
         self._sight = LaserSight(self.body, position)
         self.clock = WallClock()
-        self.instance = secrets.token_urlsafe(9)
         self.host = DrivenHost(
             self.new_site,
             HostConfig(lead=0.0, halting=config.halting),
             now=self.clock.now(),
             seed=secrets.randbelow(2**32),
         )
-        self._turning = Turning(self.clock, self._turn)
-        soon = self._turning.soon
-        self._server = RobotServer(
-            self.host, self.clock, access, attached=self._attached, met=self._follow, heard=soon, orders=DriveOrders
-        )
-        self.ended = asyncio.Event()
-        """Set when it's to end."""
-        self.met: Callable[[Attached], None] = lambda _: None
-        """Is given what an operator's site is told that is let in."""
         self.ticks = self.skipped = 0
         """Control periods that were run, and left out as the process stood still."""
         self.worst = 0.0
@@ -142,33 +116,22 @@ class LiveMobileRobot:
         self._touched = 0
 
     @property
-    def routes(self) -> list[BaseRoute]:
-        """`/site` and `/health`."""
-        return [Route("/health", self._say_health), *self._server.routes]
+    @override
+    def q(self) -> Array:
+        return np.array(self._position.posture())
 
+    @override
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[LiveMobileRobot]:
-        """Run the body, and serve meanwhile."""
-        control = asyncio.create_task(self._control())
-        self._turning.start()
+    async def running(self, soon: Callable[[], None]) -> AsyncIterator[None]:
+        control = asyncio.create_task(self._control(soon))
         try:
-            yield self
+            yield
         finally:
-            self._turning.stop()
             control.cancel()
             await asyncio.wait([control])
-            self._server.close()
             self.body.close()
 
-    async def rest(self) -> None:
-        """Stop, and wait until the robot stands, if that doesn't take too long."""
-        self.host.halt("the robot's site stops", now=self.clock.now())
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_REST):
-                while self.host.site is not None and not self.host.site.rests(now=self.clock.now()):
-                    await asyncio.sleep(CONTROL)
-
-    async def _control(self) -> None:
+    async def _control(self, soon: Callable[[], None]) -> None:
         """Drive the body, a control period at a time, as long as the clock says."""
         due = self.clock.now()
         try:
@@ -182,11 +145,12 @@ class LiveMobileRobot:
                 self.skipped += missed
                 due += (1 + missed) * CONTROL
                 self.drive_tick(now)
+                soon()
                 self._took.add(self.clock.now() - now, now=now)
-        except Exception:
-            # Whoever waits for the robot must not wait for ever.
-            self.ended.set()
-            raise
+        except Exception as error:  # noqa: BLE001 - whatever it is, who waits for the robot must not wait for ever
+            _LOG.exception("the body failed")
+            self.problem = f"the body failed: {error}"
+            soon()
 
     def drive_tick(self, now: float) -> None:
         """One control period."""
@@ -202,7 +166,6 @@ class LiveMobileRobot:
         if len(collisions) > self._touched:
             self._touched = len(collisions)
             self.host.halt(f"the robot touches something: {collisions[-1].thing}", now=now)
-        self._turning.soon()
 
     def new_site(self, t: float) -> DrivenRobot:
         """What follows an operator from the time t of its clock on [s]."""
@@ -231,38 +194,14 @@ class LiveMobileRobot:
             around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
         return ArchitectureRobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
 
-    def _turn(self, now: float) -> float:
-        self._server.send(self.host.advance(now=now))
-        return self.host.next_deadline()
+    @override
+    def decided(self) -> None:
+        """The next control period goes by it."""
 
-    def _follow(self, attached: Attached) -> None:
-        self._turning.soon()
-        self.met(attached)
-
-    def _attached(self) -> Attached:
-        config, dog = self.config, self.host.watchdog(self.config.driven.watchdog)
-        loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
-        posture = np.array(self._position.posture())
-        return Attached(
-            PROTOCOL, "ipr", posture, loss, timeout, None, self.instance, config.server, max_age=age,
-            architecture=config.architecture, room=config.room.name,
-        )  # fmt: skip
-
+    @override
     def health(self) -> dict[str, Any]:
-        """How it is, for `/health`."""
-        site, body = self.host.site, self.body
+        body = self.body
         return {
-            "ok": not self.ended.is_set(),
-            "robot": "ipr",
-            "server": self.config.server,
-            "instance": self.instance,
-            "now": self.clock.now(),
-            "architecture": self.config.architecture,
-            "room": self.config.room.name,
-            "operator": self._server.connected,
-            "epoch": 0 if site is None else site.epoch,
-            "halted": "" if site is None else site.halted,
-            "link_loss": self._attached().link_loss,
             "posture": list(self._position.posture()),
             "truth": list(body.truth),
             "motion": list(body.motion),
@@ -278,8 +217,4 @@ class LiveMobileRobot:
                 "took": self._took.median,
                 "took_p99": self._took.quantile(0.99),
             },
-            "timer_late": self._turning.lateness.worst,
         }
-
-    async def _say_health(self, _request: Request) -> JSONResponse:
-        return JSONResponse(self.health())
