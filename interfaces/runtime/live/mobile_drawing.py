@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 
 from interfaces.messages.drive_sites import Doing
-from interfaces.stream.meshcat import Committed, MobileScene
-from interfaces.stream.meshcat.driving import PIECE
+from interfaces.stream.meshcat import Committed, TwinScene
+from interfaces.stream.meshcat.meshes import bodies
+from interfaces.stream.meshcat.scene import PIECE
 from interfaces.teleop.driving import DrivingOperator
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
@@ -95,7 +96,7 @@ class MobileDrawing:
             grid: Cells of the virtual environment.
         """
         self._model = model
-        self.scene = MobileScene(model, start, room=None if room is EMPTY else room, grid=grid)
+        self.scene = TwinScene(model, start, looks=bodies(model), room=None if room is EMPTY else room, grid=grid)
         """What all viewers see."""
         self._ways: dict[str, _DrivenTrace] = {}
         self._drive = -1

@@ -169,7 +169,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
         while True:
             await asyncio.sleep(SHOW)
             self.drawing.follow(self.operator)
-            if self.drawing.scene.viewers:
+            if self.drawing.scene.readers:
                 self.drawing.show(self.operator, now=self.clock.now())
 
     def _turn(self, now: float) -> float | None:
