@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from interfaces.clients.appearance import parts_at
-from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece, Kinematics
+from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece
 from interfaces.stream.meshcat.meshes import Bodies
 from interfaces.stream.meshcat.newest import ROOT, Nodes
 from interfaces.stream.meshcat.room import DrawnRoom
@@ -44,17 +44,6 @@ _USUAL = 0.2
 """Length of a robot whose committed path is as thick as an arm's [m]."""
 _HEIGHTS: Final = {"real": 0.008, "virtual": 0.012, "committed": 0.03}
 """Of paths above the floor [m], so that none hides in another."""
-
-
-class _OnFloor:
-    """Kinematics of a point a little above the floor."""
-
-    def forward(self, q: ArrayLike) -> Array:
-        """Poses (k, 4, 4) of postures (k, 3); only places are set."""
-        postures = np.atleast_2d(np.asarray(q, dtype=np.float64))
-        X = np.tile(np.eye(4), (len(postures), 1, 1))
-        X[:, :2, 3] = postures[:, :2]
-        return X
 
 
 class TwinScene(Nodes):
@@ -91,7 +80,6 @@ class TwinScene(Nodes):
 
         super().__init__()
         self._model, self._objects = model, objects
-        self._kinematics: Kinematics
         self._links: Callable[[ArrayLike], Array]
         self._surroundings = room, grid, extent
         self._room: DrawnRoom | None = None
@@ -99,11 +87,11 @@ class TwinScene(Nodes):
             from robots.ipr.chassis import chassis
 
             n, self._length = 3, chassis(getattr(model, "kind", "ipr")).length
-            self._kinematics, self._links = _OnFloor(), partial(parts_at, model)
+            self._links = partial(parts_at, model)
             tool: ArrayLike = (0.0, 0.0, _HEIGHTS["committed"] * min(self._length / 0.45, 1.0))
         else:
             n, self._length = model.limits.dof, _USUAL
-            self._kinematics, self._links, tool = model, model.links, _tool_of(model)
+            self._links, tool = model.links, _tool_of(model)
             if start is None:
                 start = next(iter(model.poses.values()), 0.5 * (model.limits.q_min + model.limits.q_max))
         self.tool = frozen_array(tool)
@@ -214,6 +202,14 @@ class TwinScene(Nodes):
     def _checked(self, name: str, q: ArrayLike) -> Array:
         return finite_array(name, q, self._shape, f"finite numbers of shape {self._shape}")
 
+    def _tool_at(self, q: Array) -> Array:
+        """Where the tool is [m], (k, 3), at joints or postures (k, n)."""
+        if isinstance(self._model, MobileModel):
+            return np.column_stack([q[:, :2], np.full(len(q), self.tool[2])])
+        X = np.asarray(self._model.forward(q))
+        points: Array = X[:, :3, :3] @ self.tool + X[:, :3, 3]
+        return points
+
     def _move(self, twin: str, links: Array) -> None:
         """Put the parts of a robot where they are, (m, 4, 4)."""
         shown = self._poses.get(twin)
@@ -232,7 +228,7 @@ class TwinScene(Nodes):
             known = self._path
             # A path reaches only so far ahead: it's sampled again as the robot comes nearer to where it was cut.
             if known is None or known[0] is not timeline or not known[1].reaches(play):
-                known = self._path = timeline, CommittedPath(self._kinematics, timeline, play, self.tool)
+                known = self._path = timeline, CommittedPath(self._tool_at, timeline, play)
             pieces = known[1].pieces(play)
             if pieces:
                 self.put_property(f"{ROOT}/committed", "play", round(play, 2))

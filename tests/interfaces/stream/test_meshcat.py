@@ -86,9 +86,13 @@ def plan(*offsets: float, speed: float = 0.5) -> Timeline:
     return engine.timeline
 
 
-def tool(timeline: Timeline, t: Any) -> Array:
-    X = MODEL.forward(np.atleast_2d(timeline.sample(np.atleast_1d(t))))
+def tool_at(q: Array) -> Array:
+    X = MODEL.forward(q)
     return X[:, :3, :3] @ TOOL + X[:, :3, 3]
+
+
+def tool(timeline: Timeline, t: Any) -> Array:
+    return tool_at(np.atleast_2d(timeline.sample(np.atleast_1d(t))))
 
 
 def path_of(state: dict[Any, Any]) -> dict[str, Any]:
@@ -273,7 +277,7 @@ def test_a_robot_that_is_away_is_hidden_and_comes_back(scene: TwinScene) -> None
 @pytest.mark.parametrize("play", [0.0, 0.3, 1.0, 1.26])
 def test_the_path_goes_from_the_real_tool_to_where_it_rests(play: float) -> None:
     timeline = plan(0.5, -0.4)
-    pieces = CommittedPath(MODEL, timeline, play, TOOL).pieces(play)
+    pieces = CommittedPath(tool_at, timeline, play).pieces(play)
     line = np.vstack([piece.points for piece in pieces])
     np.testing.assert_allclose(line[0], tool(timeline, play)[0], atol=1e-9)
     np.testing.assert_allclose(line[-1], tool(timeline, timeline.end)[0], atol=1e-4)
@@ -290,7 +294,7 @@ def test_the_path_goes_from_the_real_tool_to_where_it_rests(play: float) -> None
 
 def test_ticks_stand_where_the_tool_will_be_at_halves_of_a_second() -> None:
     timeline = plan(0.5, -0.4)
-    pieces = CommittedPath(MODEL, timeline, 0.3, TOOL).pieces(0.3)
+    pieces = CommittedPath(tool_at, timeline, 0.3).pieces(0.3)
     ticks = {piece.index * PIECE: piece.marks[0] for piece in pieces if piece.marks and piece.marks[0][1] > 0}
     assert set(ticks) == set(np.arange(0.5, timeline.end, 0.5))
     for t, (X, radius) in ticks.items():
@@ -314,7 +318,7 @@ def test_ticks_stand_where_the_tool_will_be_at_halves_of_a_second() -> None:
 def test_a_turn_of_the_flange_alone_has_an_end_and_no_line() -> None:
     engine = Engine(MODEL, q=NOMINAL, clock=ManualClock(0.0))
     engine.execute(MotionCommand(target=JointTarget(NOMINAL + np.array([0, 0, 0, 0, 0, 1.0])), speed=0.3))
-    pieces = CommittedPath(MODEL, engine.timeline, 0.0, TOOL).pieces(0.0)
+    pieces = CommittedPath(tool_at, engine.timeline, 0.0).pieces(0.0)
     assert sum(len(piece.points) for piece in pieces) == 0
     assert [piece.ends for piece in pieces if piece] == [True]
 
@@ -322,8 +326,8 @@ def test_a_turn_of_the_flange_alone_has_an_end_and_no_line() -> None:
 def test_a_plan_that_is_over_or_empty_draws_nothing() -> None:
     for timeline in (plan(), plan(0.3)):
         end = timeline.end + 1e-9
-        assert CommittedPath(MODEL, timeline, end, TOOL).pieces(end) == ()
-        assert CommittedPath(MODEL, timeline, 1e6, TOOL).pieces(1e6) == ()
+        assert CommittedPath(tool_at, timeline, end).pieces(end) == ()
+        assert CommittedPath(tool_at, timeline, 1e6).pieces(1e6) == ()
 
 
 def test_a_long_plan_is_drawn_as_far_as_the_horizon_and_renewed(scene: TwinScene) -> None:
