@@ -15,8 +15,10 @@ from interfaces.lab.statistics import bootstrap, interval_name
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.control import Role
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
-from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.physics_body import PhysicsBody
+from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
+from interfaces.runtime.physics import PhysicsConfig
 from interfaces.runtime.plan import PlannedMotion, RunPlan
 from interfaces.runtime.session import SETTLE, run_twins, simulated_puma
 from interfaces.stream import sockets
@@ -77,7 +79,8 @@ async def live(seed: int) -> tuple[float, ...]:
     async with contextlib.AsyncExitStack() as stack:
         listening = sockets.bind("127.0.0.1", 0)
         port = listening.getsockname()[1]
-        robot = LiveRobot(LiveRobotConfig(MODEL, NOMINAL), Access(free={Role.SITE}))
+        body = PhysicsBody(MODEL, PhysicsConfig(MODEL.limits, NOMINAL))
+        robot = LiveRobot(body, Access(free={Role.SITE}))
         app = application(robot.routes, hosts(["127.0.0.1"], port))
         await stack.enter_async_context(sockets.serve(app, listening, largest=LARGEST))
         await stack.enter_async_context(robot.running())
@@ -100,7 +103,7 @@ async def live(seed: int) -> tuple[float, ...]:
             while waiting and clock.now() >= waiting[0][0]:
                 site.execute(waiting.pop(0)[1], now=clock.now())
             facts = robot.health()
-            reference = robot.host.reference(np.array([facts["measured_at"]])).q[0]
+            reference = body.host.reference(np.array([facts["measured_at"]])).q[0]
             t_now = facts["measured_at"] + apart
             if not rows or t_now > rows[-1][0]:
                 rows.append((t_now, facts["q"], reference.tolist()))
@@ -109,9 +112,9 @@ async def live(seed: int) -> tuple[float, ...]:
         # Means are over the same phases as in the laboratory, whose record ends so long after the last motion.
         rests = t[np.flatnonzero((np.diff(asked, axis=0) != 0).any(axis=1))[-1] + 1]
         keep = (t >= begin - 0.5) & (t <= rests + SETTLE)
-        if site.halted or robot.faults:
+        if site.halted or body.faults:
             print(
-                f"live run {seed}: {site.halted}, {robot.faults} faults, {robot.health()['timer_late']:.3f} s late"
+                f"live run {seed}: {site.halted}, {body.faults} faults, {robot.health()['timer_late']:.3f} s late"
             )
         real = np.array([row[1] for row in rows])[keep]
         return figures(t[keep], site.engine.timeline.sample(t[keep]), real, asked[keep])

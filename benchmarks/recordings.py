@@ -26,10 +26,11 @@ from interfaces import connect
 from interfaces.messages.control import Role
 from interfaces.recording.recording import open_recording
 from interfaces.recording.track import REAL
-from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.physics_body import PhysicsBody
+from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
-from interfaces.runtime.physics import TICK, Feeder, ProcessEnded, Silent
-from interfaces.runtime.physics_messages import Fault, Measurement, PhysicsReady
+from interfaces.runtime.physics import TICK, Event, Feeder, PhysicsConfig
+from interfaces.runtime.physics_messages import Measurement
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.server import application
@@ -53,16 +54,14 @@ BAR = 0.1
 """By how much the recording's figures may differ from the robot's."""
 
 
-class LoggingRobot(LiveRobot):
-    """A robot that keeps what its body measured, beside all that it tells the operator."""
+class LoggingBody(PhysicsBody):
+    """A body that keeps what it measured, beside all that it tells the operator."""
 
-    def __init__(self, config: LiveRobotConfig, access: Access) -> None:
-        super().__init__(config, access)
+    def __init__(self, physics: PhysicsConfig, host: RobotHostConfig) -> None:
+        super().__init__(MODEL, physics, host)
         self.rows: list[list[float]] = []
 
-    def _take(
-        self, event: PhysicsReady | Measurement | Fault | Silent | ProcessEnded, feeder: Feeder, now: float
-    ) -> None:
+    def _take(self, event: Event, feeder: Feeder, now: float) -> None:
         site = self.host.site
         if isinstance(event, Measurement) and site is not None:
             t = event.followed * TICK + self.host.offset
@@ -73,23 +72,24 @@ class LoggingRobot(LiveRobot):
 
 async def serve_robot(file: Path) -> None:
     """Be the robot until standard input ends; then write its log, and what its own timeline says."""
-    config = LiveRobotConfig(MODEL, NOMINAL, RobotHostConfig(site=RobotSiteConfig(beat=1 / 60), lead=LEAD))
+    host = RobotHostConfig(site=RobotSiteConfig(beat=1 / 60), lead=LEAD)
+    body = LoggingBody(PhysicsConfig(MODEL.limits, NOMINAL), host)
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
-    robot = LoggingRobot(config, Access(free={Role.SITE}))
+    robot = LiveRobot(body, Access(free={Role.SITE}))
     app = application(robot.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         await robot.ready()
         print(f"127.0.0.1:{port}", flush=True)
         ended = asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
         await ended
-        site = robot.host.site
+        site = body.host.site
         assert site is not None
-        timeline, rows = site.engine.timeline, np.array(robot.rows)
+        timeline, rows = site.engine.timeline, np.array(body.rows)
         np.savez(
             file, t=rows[:, 0], play=rows[:, 1], q=rows[:, 2:8], asked=rows[:, 8:14],
             virtual=timeline.sample(rows[:, 0]), matched=timeline.sample(rows[:, 1]),
-            parted=site.parted, halted=site.halted, faults=robot.faults,
+            parted=site.parted, halted=site.halted, faults=body.faults,
         )  # fmt: skip
 
 

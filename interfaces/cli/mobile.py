@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -13,26 +13,20 @@ import typer
 
 from interfaces.cli.options import (
     abandon,
-    access_for,
-    asked_for,
     collect_at_leisure,
     end_on_signal,
     end_with_input,
     keep_quiet,
     say_lost,
     say_robot,
-    saying_policy,
     start_robot,
 )
 from interfaces.system import software
-from vrs.checks import number_in, one_of
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
     from interfaces.cli.options import Hosts
     from interfaces.link import LinkConditions
-    from interfaces.link.proxy import Address
-    from interfaces.runtime.live.mobile_robot import LiveMobileRobot
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
     from robots.onboard import LossPolicy
@@ -218,89 +212,3 @@ def _load() -> None:
     """Import what takes long, while the robot's process does the same."""
     import interfaces.runtime.live.mobile_operator
     import interfaces.station.page  # noqa: F401
-
-
-def run_mobile(
-    listen: str,
-    *,
-    architecture: str,
-    room: str,
-    link_loss: str,
-    watchdog: tuple[float, float],
-    reports: float,
-    token_file: Path | None,
-    until_eof: bool,
-    operator_loss: str = "stop",
-    reached_as: Iterable[str] = (),
-) -> None:
-    """Run a mobile robot and its site, until Ctrl-C or SIGTERM.
-
-    Args:
-        listen: Where, HOST:PORT.
-        architecture: What it does with the operator's path, by name.
-        room: Where it drives, see `room_of`.
-        link_loss: `halt` or `hold`, unless the operator's site says otherwise.
-        watchdog: T_loss, and how old a message may be [s].
-        reports: How often it says where it is [1/s].
-        token_file: Its tokens.
-        until_eof: Whether it ends with standard input.
-        operator_loss: What becomes of what it does by itself when the operator is lost, `stop` or `carry-on`.
-        reached_as: Other addresses that it's reached by.
-    """
-    import uvloop
-
-    from interfaces.jobs import RunnerConfig
-    from interfaces.link.proxy import parse_address
-    from interfaces.media import Aloud
-    from interfaces.messages.control import Role
-    from interfaces.messages.jobs import OperatorLoss
-    from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
-    from interfaces.teleop.architectures import architecture as makes
-    from interfaces.teleop.architectures.compositions import CONTROL
-    from interfaces.teleop.driving import DrivenConfig, Hands
-    from interfaces.val2.val_arm import ValArm, in_a_thread
-    from robots.onboard import LossPolicy, WatchdogConfig
-
-    address = parse_address("--listen", listen)
-    makes(architecture)
-    policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
-    timeout, max_age = watchdog
-    dog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
-    beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
-    driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
-    jobs = RunnerConfig(loss=OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss)))
-    hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
-    config = LiveMobileConfig(room_of(room), architecture, driven, jobs, hands, halting=dog, server=software())
-    access, allowed = access_for(address.host, token_file, free={Role.SITE}), asked_for(address.host, reached_as)
-
-    async def main() -> None:
-        await _run(LiveMobileRobot(config, access), address, allowed, until_eof=until_eof)
-
-    uvloop.run(main())
-
-
-async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> None:
-    """Run until a signal comes, or standard input ends."""
-    from interfaces.link.proxy import Address
-    from interfaces.messages.jobs import POLICY_SAYS
-    from interfaces.runtime.live.process import READY
-    from interfaces.runtime.live.robot_server import LARGEST
-    from interfaces.stream import sockets
-    from interfaces.stream.server import application
-    from interfaces.system import hasten
-
-    end_on_signal(robot.ended)
-    robot.met = saying_policy()
-    listening = sockets.bind(address.host, address.port)
-    port = listening.getsockname()[1]
-    app = application(robot.routes, allowed(port))
-    async with sockets.serve(app, listening, largest=LARGEST), robot.running():
-        keep_quiet()
-        hasten(1)
-        typer.echo(f"{READY}ws://{Address(address.host, port)}/site (ipr, {robot.config.architecture})")
-        typer.echo(f"vrs: {POLICY_SAYS[robot.config.jobs.loss]}", err=True)
-        sys.stdout.flush()
-        if until_eof:
-            end_with_input(robot.ended)
-        await robot.ended.wait()
-        await robot.rest()

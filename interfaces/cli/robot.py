@@ -21,7 +21,6 @@ from interfaces.cli.mobile import (
     RoomName,
     left_out,
     room_of,
-    run_mobile,
     without,
 )
 from interfaces.cli.options import (
@@ -46,7 +45,7 @@ if TYPE_CHECKING:
     from interfaces.link.proxy import Address
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
-    from interfaces.runtime.live.robot import LiveRobot
+    from interfaces.runtime.live.robot import LiveBody, LiveRobot
     from robots.bullet.rooms import Room
 
 
@@ -214,47 +213,63 @@ def robot(
 
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
-    from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
-    from interfaces.runtime.physics_messages import BodyKind
-    from interfaces.teleop import RobotHostConfig, RobotSiteConfig
-    from robots import puma560
+    from interfaces.runtime.live.robot import LiveRobot
     from robots.onboard import LossPolicy, WatchdogConfig
 
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
-    if one_of("robot", name, ROBOTS) == "ipr":
-        without(name, {
-            "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, "puma560"),
-            "friction": (friction, True), "pose": (pose, "nominal"),
-        })  # fmt: skip
-        run_mobile(
-            listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
-            reports=reports, token_file=token_file, until_eof=until_eof, operator_loss=operator_loss,
-            reached_as=reached_as or (),
-        )  # fmt: skip
-        return
-    without(name, {
+    arms = {
+        "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, "puma560"),
+        "friction": (friction, True), "pose": (pose, "nominal"),
+    }  # fmt: skip
+    bases = {
         "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM),
         "operator-loss": (operator_loss, OPERATOR_LOSS),
-    })  # fmt: skip
+    }  # fmt: skip
+    mobile = one_of("robot", name, ROBOTS) == "ipr"
+    without(name, arms if mobile else bases)
     address = parse_address("--listen", listen)
-    model = puma560.model()
-    q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], BodyKind(one_of("body", body, BodyKind))
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
-    number_in("lead", lead, 0.01, 0.3, unit=" s")
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
-    watchdog = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
-    site = RobotSiteConfig(
-        fixed_offset=_offset(offset), beat=beat, watchdog=watchdog if policy is LossPolicy.HALT else None
-    )
-    config = LiveRobotConfig(
-        model, q, RobotHostConfig(site=site, lead=lead, halting=watchdog), kind, friction, software()
-    )
+    halting = WatchdogConfig(timeout=timeout, max_age=max_age, max_uncertainty=1.0)
+    watchdog = halting if policy is LossPolicy.HALT else None
     access = access_for(address.host, token_file, free={Role.SITE})
     allowed = asked_for(address.host, reached_as or ())
+    made: LiveBody
+    if mobile:
+        from interfaces.jobs import RunnerConfig
+        from interfaces.media import Aloud
+        from interfaces.messages.jobs import POLICY_SAYS, OperatorLoss
+        from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
+        from interfaces.teleop.architectures.compositions import CONTROL
+        from interfaces.teleop.driving import DrivenConfig, Hands
+        from interfaces.val2.val_arm import ValArm, in_a_thread
+
+        driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=watchdog)
+        loss = OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss))
+        hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
+        made = PacedBody(
+            PacedConfig(room_of(room), architecture, driven, RunnerConfig(loss=loss), hands, halting=halting)
+        )
+        kind, remark = architecture, POLICY_SAYS[loss]
+    else:
+        from interfaces.runtime.live.physics_body import PhysicsBody
+        from interfaces.runtime.physics import PhysicsConfig
+        from interfaces.runtime.physics_messages import BodyKind
+        from interfaces.teleop import RobotHostConfig, RobotSiteConfig
+        from robots import puma560
+
+        model = puma560.model()
+        q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], one_of("body", body, BodyKind)
+        number_in("lead", lead, 0.01, 0.3, unit=" s")
+        site = RobotSiteConfig(fixed_offset=_offset(offset), beat=beat, watchdog=watchdog)
+        host = RobotHostConfig(site=site, lead=lead, halting=halting)
+        made = PhysicsBody(model, PhysicsConfig(model.limits, q, BodyKind(kind), friction), host)
+        remark = ""
 
     async def main() -> str:
-        return await _serve(LiveRobot(config, access), address, allowed, until_eof=until_eof)
+        says = f"{made.name}, {kind}", remark
+        return await _serve(LiveRobot(made, access, server=software()), says, address, allowed, until_eof=until_eof)
 
     problem = uvloop.run(main())
     if problem:
@@ -272,7 +287,9 @@ def _offset(text: str) -> float | None:
     return fixed_offset(text, delay_profile("none"))
 
 
-async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eof: bool) -> str:
+async def _serve(
+    robot: LiveRobot, says: tuple[str, str], address: Address, allowed: Hosts, *, until_eof: bool
+) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.link.proxy import Address
     from interfaces.runtime.live.process import READY
@@ -286,16 +303,19 @@ async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eo
     listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
     app = application(robot.routes, allowed(port))
+    kind, remark = says
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         await robot.ready()
         keep_quiet()
         hasten(1)
         if not robot.ended.is_set():
             here = Address(address.host, port)
-            typer.echo(f"{READY}ws://{here}/site ({robot.config.model.name}, {robot.config.body})")
+            typer.echo(f"{READY}ws://{here}/site ({kind})")
+            if remark:
+                typer.echo(f"vrs: {remark}", err=True)
             sys.stdout.flush()
         if until_eof:
             end_with_input(robot.ended)
         await robot.ended.wait()
         await robot.rest()
-    return robot.problem
+    return robot.body.problem

@@ -11,7 +11,8 @@ from interfaces.clients.appearance import link_shapes
 from interfaces.messages.recording import grid_of, room_of
 from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import ARM, Recording
-from interfaces.stream.meshcat import Committed, MeshcatScene, MobileScene
+from interfaces.stream.meshcat import Committed, TwinScene
+from interfaces.stream.meshcat.meshes import bodies
 from vrs.model import Array
 
 MARGIN = 3.0
@@ -39,7 +40,8 @@ class DriveStage:
         grid = None if facts is None or facts.grid is None else grid_of(facts.grid)
         self._learned_at, self._learned = _learned(recording)
         extent = self._extent(recording.session.q, MARGIN * model.body.length)
-        self.scene: MobileScene = MobileScene(model, recording.session.q, room=room, grid=grid, extent=extent)
+        start, looks = recording.session.q, bodies(model)
+        self.scene = TwinScene(model, start, looks=looks, room=room, grid=grid, extent=extent)
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
@@ -97,15 +99,12 @@ class ArmStage:
     """Two arms."""
 
     def __init__(self, recording: Recording) -> None:
-        self._model = recording.model
-        self.scene: MeshcatScene = MeshcatScene(recording.model)
+        self.scene = TwinScene(recording.model, looks=bodies(recording.model))
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
-        links = self._model.links
         assert frame.q_virtual is not None
-        real = None if frame.q_real is None else links(frame.q_real)
-        self.scene.show(virtual=links(frame.q_virtual), real=real, path=committed, now=now)
+        self.scene.show(virtual=frame.q_virtual, real=frame.q_real, path=committed, now=now)
 
 
 Stage: TypeAlias = ArmStage | DriveStage

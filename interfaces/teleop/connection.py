@@ -11,10 +11,10 @@ the adaptive offset, which needs no clocks at all, and of the age gate, which is
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -204,7 +204,7 @@ class HostConfig:
             number_in(name, getattr(self, name), low, high)
 
 
-class Host(ABC, Generic[E, O, R]):
+class Host(Generic[E, O, R]):
     """Follows one operator at a time. Times are of the robot's own clock, unless they're said to be the site's.
 
     An operator is a session: the same one may come back after a break of the connection, and goes on as the
@@ -212,15 +212,19 @@ class Host(ABC, Generic[E, O, R]):
     first.
     """
 
-    def __init__(self, config: HostConfig, *, now: float, seed: int = 0) -> None:
+    orders: ClassVar[type]
+    """What its operators send."""
+
+    def __init__(self, make: Callable[[float], E], config: HostConfig, *, now: float, seed: int = 0) -> None:
         """Stand at rest, and wait for an operator.
 
         Args:
+            make: Makes the robot's site, from an operator's time [s] on, where the robot stands.
             config: How to behave.
             now: By the robot's clock [s].
             seed: Random number in [0, 2**32), new for each life of the robot: echoes of an earlier one don't count.
         """
-        self._hosting, self._seed = config, seed
+        self._make, self._hosting, self._seed = make, config, seed
         self.session = ""
         """The operator that is followed; empty before the first."""
         self.site: E | None = None
@@ -238,12 +242,7 @@ class Host(ABC, Generic[E, O, R]):
         self._unsent: list[R | Ping] = []
         self._now = now
 
-    @abstractmethod
-    def _make(self, t: float) -> E:
-        """The robot's site, from the operator's time t [s] on, where the robot stands."""
-
-    @abstractmethod
-    def _left(self, site: E, now: float) -> None:
+    def _left(self, now: float) -> None:
         """The operator is left, with the robot at rest."""
 
     def watchdog(self, own: WatchdogConfig | None) -> WatchdogConfig | None:
@@ -295,7 +294,7 @@ class Host(ABC, Generic[E, O, R]):
     def _begin(self, now: float) -> None:
         """Turn to the next operator: nothing of the one before counts any more."""
         if self.site is not None:
-            self._left(self.site, now)
+            self._left(now)
         self.session, self._loss, self._next, self.site = self._next, self._next_loss, "", None
         self._sync = ClockSync()
         self._seed = (self._seed + 1) % 2**32
@@ -358,7 +357,7 @@ class Host(ABC, Generic[E, O, R]):
         messages, self._unsent = self._unsent, []
         if self.site is not None:
             messages += self.site.advance(now=self.site_time(now))
-        if self._next and (self.site is None or self._stands(now)):
+        if self._next and self.rests(now=now):
             messages.clear()
             self._begin(now)
         probe = None if self._trips is None else self._trips.to_send(now=now)
@@ -380,10 +379,9 @@ class Host(ABC, Generic[E, O, R]):
             times.append(self._now)
         return min(times)
 
-    def _stands(self, now: float) -> bool:
-        """Whether the body's references rest already at the robot's time now."""
-        assert self.site is not None
-        return self.site.rests(now=now + self.offset)
+    def rests(self, *, now: float) -> bool:
+        """Whether the robot is to stand still already at its time now [s]."""
+        return self.site is None or self.site.rests(now=now + self.offset)
 
     def halt(self, reason: str, *, now: float) -> None:
         """Stop, and wait for a new epoch."""

@@ -511,6 +511,8 @@ class RobotHost(Host[RobotSite, Orders, Report]):
     never changes.
     """
 
+    orders = Orders
+
     def __init__(
         self, model: RobotModel, q: Array, *, now: float, config: RobotHostConfig | None = None, seed: int = 0
     ) -> None:
@@ -524,18 +526,18 @@ class RobotHost(Host[RobotSite, Orders, Report]):
             seed: Random number in [0, 2**32), new for each life of the robot: echoes of an earlier one don't count.
         """
         self.config = RobotHostConfig() if config is None else config
-        super().__init__(self.config, now=now, seed=seed)
+        super().__init__(self._site_from, self.config, now=now, seed=seed)
         self._model = model
         self._q = np.array(q, float)
 
-    def _make(self, t: float) -> RobotSite:
+    def _site_from(self, t: float) -> RobotSite:
         site = replace(self.config.site, watchdog=self.watchdog(self.config.site.watchdog))
         config = replace(self.config, site=site).decided()
         reported = max(0, math.floor(1000.0 * t))
         return RobotSite(self._model, self._q, now=t, config=config, reported=reported)
 
     @override
-    def _left(self, site: RobotSite, now: float) -> None:
+    def _left(self, now: float) -> None:
         self._q = self.reference(np.array([now])).q[0]
 
     def reference(self, t: Array) -> JointReference:

@@ -22,8 +22,10 @@ import numpy as np
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.control import Role
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
-from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
+from interfaces.runtime.live.physics_body import PhysicsBody
+from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
+from interfaces.runtime.physics import PhysicsConfig
 from interfaces.runtime.physics_messages import BodyKind
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
@@ -44,7 +46,8 @@ class Rows:
 
     def __init__(self, robot: LiveRobot) -> None:
         self.q: dict[int, Any] = {}
-        physics = robot.physics
+        assert isinstance(robot.body, PhysicsBody)
+        physics = robot.body.physics
         assert physics is not None
         feed = physics.feed
 
@@ -75,7 +78,8 @@ async def robot_here(
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
     listening = sockets.bind("127.0.0.1", port)
     port = listening.getsockname()[1]
-    robot = LiveRobot(LiveRobotConfig(MODEL, NOMINAL, host, body), Access(free={Role.SITE}))
+    made = PhysicsBody(MODEL, PhysicsConfig(MODEL.limits, NOMINAL, body), host)
+    robot = LiveRobot(made, Access(free={Role.SITE}))
     app = application(robot.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         await robot.ready()

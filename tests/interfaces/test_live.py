@@ -154,7 +154,7 @@ def test_without_its_operator_the_robot_brakes_in_time() -> None:
             still = ticks[np.abs(qd).max(axis=1) > 0][-1] * 1e-3
             brake = float((LIMITS.qd_max / LIMITS.qdd_max).max())
             assert still <= t_kill + HALT.timeout + 0.02 + 2 * brake
-            assert robot.faults == 0
+            assert robot.health()["faults"] == 0
             await asyncio.wait_for(killer.wait(), 20.0)
 
     asyncio.run(session())

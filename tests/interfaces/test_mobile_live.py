@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -25,7 +26,8 @@ from interfaces.messages.jobs import (
 )
 from interfaces.messages.mobile import Tasks
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
-from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
+from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
+from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
@@ -51,8 +53,8 @@ HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
     robot_at, at = (sockets.bind("127.0.0.1", 0) for _ in range(2))
-    config = LiveMobileConfig(ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
-    robot = LiveMobileRobot(config, Access(free={Role.SITE}))
+    config = PacedConfig(ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
+    robot = LiveRobot(PacedBody(config), Access(free={Role.SITE}))
     port, own = robot_at.getsockname()[1], at.getsockname()[1]
     operator = LiveMobileOperator(
         LiveMobileOperatorConfig(
@@ -140,6 +142,28 @@ def test_goals_jobs_and_an_operator_who_goes(tmp_path: Path, loss: OperatorLoss)
         assert progress.stage is (JobStage.PAUSED if loss is OperatorLoss.STOP else JobStage.DONE)
 
 
+def test_a_robot_whose_body_fails_says_so_and_ends(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise OSError("no such wheel")
+
+    async def run() -> None:
+        body = PacedBody(PacedConfig(EMPTY))
+        robot = LiveRobot(body, Access(free={Role.SITE}))
+        async with robot.running(), asyncio.timeout(20.0):
+            await robot.ready()
+            assert robot.health()["ok"]
+            monkeypatch.setattr(body.body, "drive", fails)
+            await robot.ended.wait()
+            assert not robot.health()["ok"]
+            await robot.rest()
+        assert body.problem == "the body failed: no such wheel"
+
+    asyncio.run(run())
+    assert [record.message for record in caplog.records] == ["the body failed"]
+
+
 def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> None:
     wave = ".PROGRAM wave()\n    DRIVE 1, 5, 50\n.END\n"
     with (
@@ -158,8 +182,8 @@ def test_an_arm_is_no_mobile_robot() -> None:
 
 
 def test_a_robot_finds_its_place_by_its_laser_where_there_is_something_to_see() -> None:
-    assert LiveMobileConfig(ROOM).position == "laser"
-    assert LiveMobileConfig(EMPTY).position == "fused"
-    assert LiveMobileConfig(ROOM, position="truth").position == "truth"
+    assert PacedConfig(ROOM).position == "laser"
+    assert PacedConfig(EMPTY).position == "fused"
+    assert PacedConfig(ROOM, position="truth").position == "truth"
     with pytest.raises(InvalidValueError, match="odometry"):
-        LiveMobileConfig(ROOM, position="stars")
+        PacedConfig(ROOM, position="stars")

@@ -14,7 +14,8 @@ import pytest
 
 from interfaces import connect
 from interfaces.messages.control import Role
-from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
+from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
+from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.physics_messages import PhysicsSetup
 from interfaces.runtime.physics_process import tick_body
 from interfaces.runtime.tick_loop import TickLoop
@@ -101,14 +102,13 @@ def test_what_the_diagrams_show_runs() -> None:
     assert arm - FUNCTIONS - robots - in_process == set()
     assert {"Watchdog", "SensorMonitor", "Engine"} <= robots
     assert "SensorMonitor" in in_process
-    robot = LiveMobileRobot(
-        LiveMobileConfig(place("empty"), driven=DrivenConfig(watchdog=WatchdogConfig())), Access(free={Role.SITE})
-    )
+    body = PacedBody(PacedConfig(place("empty"), driven=DrivenConfig(watchdog=WatchdogConfig())))
+    robot = LiveRobot(body, Access(free={Role.SITE}))
     try:
-        robot.host.site = robot.new_site(robot.clock.now())
+        robot.host.site = body.new_site(robot.clock.now())
         assert mobile - reachable([robot]) == set()
     finally:
-        robot.body.close()
+        body.body.close()
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(test_\w+)\.py::(\w+)`", DOCUMENT.read_text()))))

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from interfaces.messages.drive_sites import Doing
-from interfaces.stream.meshcat import Committed, MobileScene
-from interfaces.stream.meshcat.driving import PIECE
+from interfaces.stream.meshcat import Committed, TwinScene
+from interfaces.stream.meshcat.scene import PIECE
 from interfaces.teleop.driving import DrivingOperator
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
@@ -95,8 +95,8 @@ class MobileDrawing:
             grid: Cells of the virtual environment.
         """
         self._model = model
-        self.scene = MobileScene(model, start, room=None if room is EMPTY else room, grid=grid)
-        """What all viewers see."""
+        self.scene = TwinScene(model, start, room=None if room is EMPTY else room, grid=grid)
+        """What all viewers see, once it's dressed."""
         self._ways: dict[str, _DrivenTrace] = {}
         self._drive = -1
         self._route: tuple[tuple[Point, ...], ArcTimeline] | None = None

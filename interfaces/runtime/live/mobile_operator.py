@@ -30,6 +30,7 @@ from interfaces.stream.access import Access
 from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
+from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop.architectures import OperatorSurroundings
@@ -165,11 +166,12 @@ class LiveMobileOperator(LeasedRobot, Workers):
         )
 
     async def _draw(self) -> None:
-        """Draw both robots for those who look."""
+        """Draw both robots for those who look, once their bodies are made."""
+        self.drawing.scene.dress(await asyncio.to_thread(bodies, self.config.model))
         while True:
             await asyncio.sleep(SHOW)
             self.drawing.follow(self.operator)
-            if self.drawing.scene.viewers:
+            if self.drawing.scene.readers:
                 self.drawing.show(self.operator, now=self.clock.now())
 
     def _turn(self, now: float) -> float | None:

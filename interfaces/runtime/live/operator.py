@@ -28,7 +28,7 @@ from interfaces.runtime.live.robot_client import RobotClient
 from interfaces.stream.access import Access
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.leasing import LeasedRobot
-from interfaces.stream.meshcat import Committed, MeshcatScene
+from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
@@ -118,7 +118,7 @@ class LiveOperator(LeasedRobot):
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         self.hub = Hub(self.site, lease, access, self, config=hub, emulation=self.emulation)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
-        self.scene = MeshcatScene(config.model, dressed=False)
+        self.scene = TwinScene(config.model)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self._wants_resume = self._ending = False
         self._shown: tuple[Report | None, bool, str] = (None, False, "")
@@ -149,17 +149,16 @@ class LiveOperator(LeasedRobot):
 
     async def _draw(self) -> None:
         """Draw both robots for those who look, once their bodies are made."""
-        links = self.config.model.links
         self.scene.dress(await asyncio.to_thread(bodies, self.config.model))
         while True:
             await asyncio.sleep(SHOW)
-            if not self.scene.viewers:
+            if not self.scene.readers:
                 continue
             now, report, timeline = self.clock.now(), self.operator.report, self.operator.engine.timeline
-            real = None if report is None else links(report.q)
             follows = report is not None and not self.operator.halted
             path = Committed(timeline, report.q_at) if follows and report is not None else None
-            self.scene.show(virtual=links(timeline.sample(now)), real=real, path=path, now=now)
+            real = None if report is None else report.q
+            self.scene.show(virtual=timeline.sample(now), real=real, path=path, now=now)
 
     async def begin_recording(self, what: LiveRecording) -> None:
         """Record from now on; the loop doesn't wait for the disk.

@@ -1,37 +1,28 @@
-"""The robot's site, live: it follows one operator at a time, with a body in a process of its own."""
+"""The robot's site, live: it follows one operator at a time, whatever its body is."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import secrets
-from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import AbstractAsyncContextManager
 from typing import Any
 
-import numpy as np
 from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
 
 from interfaces.messages.control import PROTOCOL, Attached, Role
-from interfaces.runtime.live.process import warm
 from interfaces.runtime.live.robot_server import RobotServer
-from interfaces.runtime.physics import (
-    TICK,
-    Feeder,
-    PhysicsConfig,
-    PhysicsProcess,
-    ProcessEnded,
-    Silent,
-)
-from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, PhysicsReady
 from interfaces.stream.access import Access, bearer
-from interfaces.teleop import RobotHost, RobotHostConfig
+from interfaces.stream.codec import Value
+from interfaces.teleop.connection import Host
 from interfaces.timer import Turning
+from robots.onboard import WatchdogConfig
 from vrs.clock import WallClock
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 
 JOINTS = frozenset(("q", "qd", "q_ref", "qd_ref"))
 """Of `/health`, what only an operator's site is told."""
@@ -39,55 +30,77 @@ _REST = 2.0
 """Longest time to come to rest in the end [s]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LiveRobotConfig:
-    """A robot, and how its site behaves."""
+class LiveBody(ABC):
+    """A body that follows what a host decides, while the robot's clock runs."""
 
-    model: RobotModel
-    q: Array
-    """Where it stands [rad], (n,)."""
-    host: RobotHostConfig = field(default_factory=RobotHostConfig)
-    """How its end of the connection behaves."""
-    body: BodyKind = BodyKind.PUMA560
-    """What follows the references."""
-    friction: bool = True
-    """Whether its joints have friction."""
-    server: str = "vrs"
-    """Name and version of the program."""
+    clock: WallClock
+    """The robot's."""
+    host: Host[Any, Any, Any]
+    """The robot's end of the connection, which decides what the body does."""
+    name: str
+    """Name of the robot's model."""
+    about: Mapping[str, str] = {}
+    """What else an operator's site is told when it's met, and `/health` says."""
+    offset: float | None = None
+    """The robot's timeline less session time [s]; None: it adapts."""
+    watchdog: WatchdogConfig | None
+    """The robot's own, for operators who leave that to it; None holds."""
+    ready = True
+    """Whether it stands, and is measured."""
+    problem = ""
+    """Why it can't go on; empty while it can."""
+
+    @property
+    @abstractmethod
+    def q(self) -> Array:
+        """Its measured joints [rad]; of a mobile robot its posture, x, y, θ [m, m, rad]."""
+
+    @abstractmethod
+    def running(self, soon: Callable[[], None]) -> AbstractAsyncContextManager[None]:
+        """Run the body meanwhile.
+
+        Args:
+            soon: To be called when there's something to `advance`.
+        """
+
+    @abstractmethod
+    def health(self) -> dict[str, Any]:
+        """How it is, for `/health`."""
+
+    def decided(self) -> None:  # noqa: B027 - whoever drives a period at a time hears of it in time
+        """The host was told something, or is about to be."""
+
+    def advance(self, *, now: float) -> tuple[Value, ...]:
+        """Do what is due by now [s], and say what is to be sent to the operator."""
+        return self.host.advance(now=now)
+
+    def next_deadline(self) -> float:
+        """When to `advance` even if nothing comes [s]."""
+        return self.host.next_deadline()
 
 
 class LiveRobot:
     """A robot that follows whoever says hello as an operator's site. Enter `running` where its loop runs."""
 
-    def __init__(self, config: LiveRobotConfig, access: Access) -> None:
-        """Take the clock from here on.
+    def __init__(self, body: LiveBody, access: Access, *, server: str = "vrs") -> None:
+        """Stand, and wait for an operator.
 
         Args:
-            config: The robot.
+            body: What follows.
             access: Who may come in as `Role.SITE`.
+            server: Name and version of the program.
         """
-        self.config, self._access = config, access
-        warm(config.model, config.q)
-        self.clock = WallClock()
+        self.body, self.clock, self.host = body, body.clock, body.host
+        self._access, self._program = access, server
         self.instance = secrets.token_urlsafe(9)
-        seed = secrets.randbelow(2**32)
-        self.host = RobotHost(config.model, config.q, now=self.clock.now(), config=config.host, seed=seed)
         self._turning = Turning(self.clock, self._turn)
         self._server = RobotServer(
             self.host, self.clock, access, attached=self._attached, met=self._follow, heard=self._decide
         )
-        self.physics: PhysicsProcess | None = None
-        """The body's own process; None without one."""
-        self._feeder: Feeder | None = None
-        self._measured: Measurement | None = None
         self.ended = asyncio.Event()
         """Set when the robot can't go on; anybody may set it to end it."""
-        self.problem = ""
-        """Why it can't; empty while it can."""
         self.met: Callable[[Attached], None] = lambda _: None
         """Is given what an operator's site is told that is let in."""
-        self.faults = 0
-        """How often the body came to rest by itself."""
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -101,71 +114,37 @@ class LiveRobot:
         Raises:
             PhysicsStartError: If the body can't be made.
         """
-        config = PhysicsConfig(
-            self.config.model.limits, self.config.q, body=self.config.body, friction=self.config.friction
-        )
-        loop = asyncio.get_running_loop()
-        with PhysicsProcess(config, self.clock) as physics:
-            self.physics = physics
-            self._feeder = Feeder(self.host, physics, now=self.clock.now())
-            loop.add_reader(physics.fileno(), self._turning.soon)
+        async with self.body.running(self._turning.soon):
             self._turning.start()
             try:
                 yield self
             finally:
                 self._turning.stop()
-                loop.remove_reader(physics.fileno())
                 self._server.close()
-                self.physics = self._feeder = None
 
     async def ready(self) -> None:
         """Wait until the body stands and is measured."""
-        while self._measured is None and not self.ended.is_set():
+        while not self.body.ready and not self.ended.is_set():
             await asyncio.sleep(0.005)
 
     async def rest(self) -> None:
-        """Stop, and wait until the references rest, if that doesn't take too long."""
+        """Stop, and wait until the robot is to stand, if that doesn't take too long."""
         self._decide()
         self.host.halt("the robot's site stops", now=self.clock.now())
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_REST):
-                while not self.health()["rests"]:
+                while not self.host.rests(now=self.clock.now()):
                     await asyncio.sleep(0.01)
 
     def _turn(self, now: float) -> float:
-        physics, feeder = self.physics, self._feeder
-        assert physics is not None
-        assert feeder is not None
-        for event in physics.poll(now=now):
-            self._take(event, feeder, now)
-        self._server.send(feeder.advance(now=now))
-        return min(feeder.next_deadline(), physics.next_deadline())
-
-    def _take(
-        self, event: PhysicsReady | Measurement | Fault | Silent | ProcessEnded, feeder: Feeder, now: float
-    ) -> None:
-        """Take in what the body's process said."""
-        if isinstance(event, Measurement):
-            self._measured = event
-            if self.host.measured(np.array(event.q), at=event.followed * TICK, now=now):
-                feeder.placed(now=now)
-            return
-        if isinstance(event, Fault):
-            self.faults += 1
-            feeder.failed(event)
-            self.host.fault(f"the body: {event.text}", np.array(event.rest), now=now)
-        elif isinstance(event, Silent):
-            self.host.halt("the body's process stands still", now=now)
-        elif isinstance(event, ProcessEnded):
-            self.host.halt("the body's process has ended", now=now)
-            self.problem = f"the body's process ended with status {event.status}"
+        self._server.send(self.body.advance(now=now))
+        if self.body.problem:
             self.ended.set()
-        feeder.decided()
+        return self.body.next_deadline()
 
     def _decide(self) -> None:
         """Something is decided: let the body have it soon."""
-        if self._feeder is not None:
-            self._feeder.decided()
+        self.body.decided()
         self._turning.soon()
 
     def _follow(self, attached: Attached) -> None:
@@ -173,51 +152,33 @@ class LiveRobot:
         self.met(attached)
 
     def _attached(self) -> Attached:
-        site = self.config.host.site
-        dog = self.host.watchdog(site.watchdog)
+        body, dog = self.body, self.host.watchdog(self.body.watchdog)
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
-        q = np.array(self._measured.q) if self._measured is not None else self.config.q
-        name = self.config.model.name
-        offset, server = site.fixed_offset, self.config.server
-        return Attached(PROTOCOL, name, q, loss, timeout, offset, self.instance, server, max_age=age)
+        return Attached(
+            PROTOCOL, body.name, body.q, loss, timeout, body.offset, self.instance, self._program, max_age=age,
+            **body.about,
+        )  # fmt: skip
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
-        site, measured = self.host.site, self._measured
-        counts = None if measured is None else measured.counts
-        reference = self.host.reference(np.array([self.clock.now()]))
+        site, body = self.host.site, self.body
         return {
-            "ok": not self.problem and measured is not None,
-            "robot": self.config.model.name,
-            "server": self.config.server,
+            "ok": not body.problem and body.ready,
+            "robot": body.name,
+            "server": self._program,
             "instance": self.instance,
             "now": self.clock.now(),
+            **body.about,
             "operator": self._server.connected,
             "epoch": 0 if site is None else site.epoch,
             "halted": "" if site is None else site.halted,
             "link_loss": self._attached().link_loss,
-            "uncertainty": _finite(self.host.uncertainty),
-            "measured_at": None if measured is None else measured.followed * TICK,
-            "q": None if measured is None else list(measured.q),
-            "qd": None if measured is None else list(measured.qd),
-            "doing": None if measured is None else str(measured.doing),
-            "q_ref": reference.q[0].tolist(),
-            "qd_ref": reference.qd[0].tolist(),
-            "rests": not (reference.qd.any() or reference.qdd.any()),
-            "faults": self.faults,
-            "ticks": None if counts is None else {
-                "run": counts.ticks, "late": counts.late, "worst": counts.worst, "skipped": counts.skipped,
-                "merged": counts.merged,
-            },
+            **body.health(),
             "timer_late": self._turning.lateness.worst,
-        }  # fmt: skip
+        }
 
     async def _say_health(self, request: Request) -> JSONResponse:
         facts = self.health()
         if self._access.refusal(Role.SITE, bearer(request.headers.get("authorization", ""))):
             facts = {name: fact for name, fact in facts.items() if name not in JOINTS}
-        return JSONResponse(facts, 503 if self.problem else 200)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+        return JSONResponse(facts, 503 if self.body.problem else 200)

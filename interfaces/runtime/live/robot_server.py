@@ -13,7 +13,6 @@ from starlette.routing import BaseRoute, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
 from interfaces.messages.control import PROTOCOL, Attached, Hello, Pong, Problem, ProblemCode, ProtocolError, Role
-from interfaces.messages.sites import Orders
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.server import Endpoint
@@ -70,7 +69,6 @@ class RobotServer:
         attached: Callable[[], Attached],
         met: Callable[[Attached], None],
         heard: Callable[[], None],
-        orders: type = Orders,
     ) -> None:
         """Serve a host.
 
@@ -81,11 +79,10 @@ class RobotServer:
             attached: What a site is told that is let in.
             met: Is given that when one has been.
             heard: Called when a message comes that the host is given.
-            orders: What its operators send.
         """
         self._host, self._clock, self._access = host, clock, access
         self._attached, self._met, self._heard = attached, met, heard
-        self._coming: Any = orders | Pong
+        self._coming: Any = host.orders | Pong
         self._connection: _OperatorConnection | None = None
 
     @property

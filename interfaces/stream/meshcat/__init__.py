@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from interfaces.stream.meshcat.committed import Committed
-from interfaces.stream.meshcat.driving import MobileScene
 from interfaces.stream.meshcat.newest import ReaderPosition
-from interfaces.stream.meshcat.scene import MeshcatScene
+from interfaces.stream.meshcat.scene import TwinScene
 
-__all__ = ["Committed", "MeshcatScene", "MobileScene", "ReaderPosition"]
+__all__ = ["Committed", "ReaderPosition", "TwinScene"]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Protocol
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from vrs.checks import validated, within
 from vrs.mobile import ArcTimeline
@@ -26,13 +26,6 @@ SPACING = 4e-3
 """Least distance between two points of the line, but for its ends [m]."""
 DISC, SMALL_DISC, BALL = 0.021, 0.012, 0.016
 """Radius of the tick of a whole second, of that of a half, and of the ball at the end [m]."""
-
-
-class Kinematics(Protocol):
-    """Says where a robot's last link is; of a mobile robot, the robot itself."""
-
-    def forward(self, q: ArrayLike) -> Array:
-        """Poses (k, 4, 4) at what timelines give, (k, n)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,16 +72,15 @@ class CommittedPiece:
 class CommittedPath:
     """The path of one plan, sampled once; pieces of equal motion are equal, whatever else the plan holds."""
 
-    def __init__(self, model: Kinematics, timeline: Timeline | ArcTimeline, play: float, tool: Array) -> None:
+    def __init__(self, tool_at: Callable[[Array], Array], timeline: Timeline | ArcTimeline, play: float) -> None:
         """Sample a plan.
 
         Args:
-            model: The robot.
-            timeline: Its plan.
+            tool_at: Says where the drawn point is [m], (k, 3), at what the plan gives, (k, n).
+            timeline: The plan.
             play: Where the path begins [s].
-            tool: The drawn point in the last link's frame [m], (3,).
         """
-        self._model, self._timeline, self._tool = model, timeline, tool
+        self._tool_at, self._timeline = tool_at, timeline
         self.first = math.floor(play / PIECE)
         end = min(timeline.end, play + HORIZON)
         last = max(self.first, math.ceil(end / PIECE) - 1)
@@ -131,7 +123,7 @@ class CommittedPath:
         ends = not self._bounded and index * PIECE < self.end <= (index + 1) * PIECE
         begun = play > t[0]
         if begun:
-            points = np.vstack([self._tool_at(self._timeline.sample(play)), points[t > play + 1e-9]])
+            points = np.vstack([self._tool_at(np.atleast_2d(self._timeline.sample(play))), points[t > play + 1e-9]])
         line = thinned(points)
         marks: list[tuple[Array, float]] = []
         whole = index % round(1 / PIECE) == 0
@@ -161,11 +153,6 @@ class CommittedPath:
         X = np.eye(4)
         X[:3, 0], X[:3, 1], X[:3, 2], X[:3, 3] = x, np.cross(z, x), z, self._points[k]
         return X
-
-    def _tool_at(self, q: Array) -> Array:
-        X = np.asarray(self._model.forward(np.atleast_2d(q)))
-        points: Array = X[:, :3, :3] @ self._tool + X[:, :3, 3]
-        return points
 
 
 def thinned(points: Array) -> Array:

@@ -1,10 +1,18 @@
-"""The newest value of each key, for readers that are as slow as they like."""
+"""The newest value of each key, for readers that are as slow as they like; of a scene, of each of its nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
 
 from vrs.errors import InvalidValueError
+from vrs.model import Array
+
+Json = dict[str, Any]
+ROOT: Final = "/vrs"
+"""The node below which everything of a scene stands."""
 
 MOST_READERS = 1024
 """Readers of one scene."""
@@ -121,3 +129,42 @@ class ReaderPosition:
                 return found[:count]
         self._version = newest.version
         return found
+
+
+def set_transform(path: str, X: Array) -> bytes:
+    """Put a node at X, (4, 4), in its parent's frame; the bytes are those of `meshcat.commands.SetTransform`."""
+    return _encoder.encode({"type": "set_transform", "path": path, "matrix": X.T.ravel().tolist()})
+
+
+def _ext(value: Any) -> msgspec.msgpack.Ext:
+    """MeshCat's typed arrays are extensions of its own msgpack library."""
+    return msgspec.msgpack.Ext(value.type, value.data)
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_ext)
+
+
+class Nodes(Newest):
+    """A scene's nodes by MeshCat's commands: everything once, then what changes."""
+
+    def __init__(self) -> None:
+        """Begin with nothing to be seen."""
+        super().__init__(_encoder.encode({"type": "delete", "path": ROOT}))
+
+    def put_transform(self, path: str, X: Array) -> None:
+        """Put a node at X, (4, 4), in its parent's frame."""
+        self.put(path, set_transform(path, X))
+
+    def put_object(self, path: str, lowered: Json) -> None:
+        """Show an object at a node, in place of the one that's there.
+
+        Args:
+            path: The node; its children and its transform stay.
+            lowered: The object as MeshCat's classes lower it: `geometries`, `materials`, `object`.
+        """
+        self.put(f"{path} object", _encoder.encode({"type": "set_object", "object": lowered, "path": path}))
+
+    def put_property(self, path: str, name: str, value: Any) -> None:
+        """Set a property of a node; the viewer keeps those that it doesn't know with the node."""
+        command = {"type": "set_property", "path": path, "property": name, "value": value}
+        self.put(f"{path} {name}", _encoder.encode(command))

@@ -7,7 +7,7 @@ import json
 from collections.abc import Awaitable, Callable, Sequence
 from functools import lru_cache
 from importlib import resources
-from typing import Final, Protocol
+from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.requests import HTTPConnection, Request
@@ -16,8 +16,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.clients.appearance import viewer_bundle
-from interfaces.stream.meshcat.newest import ReaderPosition
-from interfaces.stream.meshcat.scene import TwinScene
+from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.server import KeptFile
 from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError
@@ -40,16 +39,6 @@ HEARD_PERIOD: Final = 10.0
 POLICY_VIOLATION, TRY_AGAIN_LATER, UNAUTHORISED = 1008, 1013, 4401
 
 
-class SceneSource(Protocol):
-    """What viewers look at: a `MeshcatScene`, a `Newest`."""
-
-    def join(self, changed: Callable[[], None] = lambda: None) -> ReaderPosition:
-        """Give a viewer a place; see `Newest.join`."""
-
-    def leave(self, slot: ReaderPosition) -> None:
-        """Give a place back."""
-
-
 def same_origin(connection: HTTPConnection) -> bool:
     """Whether a request comes from a page of this server, or from no page at all."""
     origin = connection.headers.get("origin")
@@ -61,7 +50,7 @@ class Viewers:
 
     def __init__(
         self,
-        source: SceneSource,
+        source: Newest,
         admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         *,
@@ -137,7 +126,7 @@ class _Viewer:
     def __init__(
         self,
         websocket: WebSocket,
-        source: SceneSource,
+        source: Newest,
         batches: bool,
         hear: Callable[[str], str] | None,
         most_heard: int,
@@ -255,7 +244,7 @@ _TYPES: Final = {".html": "text/html", ".css": "text/css", ".js": "text/javascri
 
 
 def routes(
-    scene: TwinScene,
+    scene: Newest,
     *,
     admit: Callable[[HTTPConnection], bool] | None = None,
     authorize: Callable[[str | None], bool] | None = None,

@@ -1,63 +1,29 @@
-"""Scenes of a virtual and a real robot as MeshCat's commands: everything once, then what changes."""
+"""The scene of a virtual and a real robot, for all who look: two arms, or two mobile robots in their room."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Callable
-from types import ModuleType
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Final
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece, Kinematics
-from interfaces.stream.meshcat.meshes import Bodies, bodies
-from interfaces.stream.meshcat.newest import Newest, ReaderPosition
-from vrs.checks import number_in
-from vrs.errors import InvalidValueError
-from vrs.mobile import ArcTimeline
+from interfaces.clients.appearance import parts_at
+from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece
+from interfaces.stream.meshcat.meshes import Bodies
+from interfaces.stream.meshcat.newest import ROOT, Nodes
+from interfaces.stream.meshcat.room import DrawnRoom
+from vrs.checks import finite_array, number_in
+from vrs.mobile import ArcTimeline, Grid, MobileModel
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.timeline import Timeline
 
-Json = dict[str, Any]
+if TYPE_CHECKING:
+    from robots.bullet.rooms import Room
 
-
-def set_transform(path: str, X: Array) -> bytes:
-    """Put a node at X, (4, 4), in its parent's frame; the bytes are those of `meshcat.commands.SetTransform`."""
-    return _encoder.encode({"type": "set_transform", "path": path, "matrix": X.T.ravel().tolist()})
-
-
-def set_object(path: str, lowered: Json) -> bytes:
-    """Show an object at a node, in place of the one that's there.
-
-    Args:
-        path: The node; its children and its transform stay.
-        lowered: The object as MeshCat's classes lower it: `geometries`, `materials`, `object`.
-    """
-    return _encoder.encode({"type": "set_object", "object": lowered, "path": path})
-
-
-def set_property(path: str, name: str, value: Any) -> bytes:
-    """Set a property of a node; the viewer keeps those that it doesn't know with the node."""
-    return _encoder.encode({"type": "set_property", "path": path, "property": name, "value": value})
-
-
-def delete(path: str) -> bytes:
-    """Take a node away, and all below it; where there's none, nothing happens."""
-    return _encoder.encode({"type": "delete", "path": path})
-
-
-def _ext(value: Any) -> msgspec.msgpack.Ext:
-    """MeshCat's typed arrays are extensions of its own msgpack library."""
-    return msgspec.msgpack.Ext(value.type, value.data)
-
-
-_encoder = msgspec.msgpack.Encoder(enc_hook=_ext)
-
-
-ROOT: Final = "/vrs"
-"""The node below which everything stands."""
 PATH_PERIOD: Final = 0.1
 """The committed path is renewed, trimmed and the traces are drawn at most this often [s]."""
 NODES: Final = 64
@@ -65,49 +31,184 @@ NODES: Final = 64
 STILL: Final = 2e-7
 """A link is put anew where an element of its pose, (4, 4), is off by more than this [m, 1]."""
 COLOURS: Final = {"virtual": 0x2F7DE1, "real": 0x8A8578}
+TRACE: Final = 3.0
+"""How long an arm without shapes leaves a trace [s]."""
+OPACITY: Final = {"virtual": 0.42, "real": 1.0}
+PIECE: Final = 64
+"""Points of a piece of the path that was driven: what is driven later leaves it as it is."""
+DRIVEN: Final = {"virtual": (0.10, 0x2F7DE1), "real": (0.26, 0x6E675C)}
+"""Width of a path that was driven, as a share of the robot, and its colour: where both lie, both are seen."""
+SCREEN_LIFT: Final = 0.011
+"""How far a message shines before the middle of the robot's display [m]: just before its glass."""
+_USUAL = 0.2
+"""Length of a robot whose committed path is as thick as an arm's [m]."""
+_HEIGHTS: Final = {"real": 0.008, "virtual": 0.012, "committed": 0.03}
+"""Of paths above the floor [m], so that none hides in another."""
 
 
-class TwinScene:
+class TwinScene(Nodes):
     """What all viewers see, each as quickly as it can: a value that is overtaken is sent to nobody.
 
     The virtual robot is a ghost, the real one solid; the committed path runs ahead of the real one.
     """
 
-    def __init__(self, kinematics: Kinematics, tool: Array, *, scale: float = 1.0) -> None:
-        """Begin with nothing to be seen.
+    def __init__(
+        self,
+        model: RobotModel | MobileModel,
+        start: ArrayLike | None = None,
+        *,
+        looks: Bodies | None = None,
+        room: Room | None = None,
+        grid: Grid | None = None,
+        extent: ArrayLike | None = None,
+    ) -> None:
+        """Make the scene, with both robots at the start and only the virtual one shown.
 
         Args:
-            kinematics: Say where the robot is.
-            tool: The point whose path is drawn, in the last link's frame [m], (3,).
-            scale: What the thickness of the committed path is multiplied by.
+            model: The robot; an arm that has no shapes is shown by its frames and traces.
+            start: Where both begin: joints [rad], (n,), the first of an arm's named poses unless given; of a mobile
+                robot its posture (x, y, θ) [m, m, rad], (3,).
+            looks: `bodies` of the model; unless given, nothing is to be seen until `dress`.
+            room: See `DrawnRoom`; so are `grid` and `extent`.
+            grid: Of the cells of the virtual environment.
+            extent: What is to be seen of the floor.
+
+        Raises:
+            InvalidValueError: If something isn't finite or has another shape.
         """
-        self._kinematics, self._tool, self._scale = kinematics, tool, scale
-        self._newest = Newest(delete(ROOT))
+        from interfaces.stream.meshcat import objects
+
+        super().__init__()
+        self._model, self._objects = model, objects
+        self._links: Callable[[ArrayLike], Array]
+        self._surroundings = room, grid, extent
+        self._room: DrawnRoom | None = None
+        if isinstance(model, MobileModel):
+            from robots.ipr.chassis import chassis
+
+            n, self._length = 3, chassis(getattr(model, "kind", "ipr")).length
+            self._links = partial(parts_at, model)
+            tool: ArrayLike = (0.0, 0.0, _HEIGHTS["committed"] * min(self._length / 0.45, 1.0))
+        else:
+            n, self._length = model.limits.dof, _USUAL
+            self._links, tool = model.links, _tool_of(model)
+            if start is None:
+                start = next(iter(model.poses.values()), 0.5 * (model.limits.q_min + model.limits.q_max))
+        self.tool = frozen_array(tool)
+        """The point whose path is drawn, in the last link's frame [m], (3,), read-only."""
+        self._shape = (n,)
+        self._start = self._checked("start", () if start is None else start)
         self._poses: dict[str, Array] = {}
         self._path: tuple[Timeline | ArcTimeline, CommittedPath] | None = None
         self._drawn: dict[int, CommittedPiece] = {}
+        self._driven: dict[tuple[str, int], tuple[int, bytes]] = {}
+        self._trails: dict[str, deque[tuple[float, Array]]] = {twin: deque(maxlen=128) for twin in COLOURS}
         self.path_due = float("-inf")
-        self._objects: ModuleType
+        if looks is not None:
+            self.dress(looks)
 
-    @property
-    def viewers(self) -> int:
-        """How many viewers there are."""
-        return self._newest.readers
-
-    def join(self, changed: Callable[[], None] = lambda: None) -> ReaderPosition:
-        """Give a viewer a place: it gets the scene, and from then on what changes.
+    def dress(self, looks: Bodies) -> None:
+        """Show the robots from now on; once.
 
         Args:
-            changed: Is called when there may be something to take; it must return at once.
+            looks: From `bodies` of the scene's model, which takes its time and may be asked for in a thread.
+        """
+        assert not self._poses
+        model, objects, meshes = self._model, self._objects, looks.meshes
+        rest = np.asarray(self._links(self._start))
+        rods: list[Array | None] = []
+        if isinstance(model, MobileModel):
+            self._room = DrawnRoom(self, self._start, *self._surroundings)
+        else:
+            self.put_property(ROOT, "box", _box(model, looks.floor))
+            # Below the floor by a hair: no stripes where a foot stands on it.
+            self.put_transform("/Grid", _at(0.0, 0.0, looks.floor - 0.001))
+            self.put_property("/Axes", "visible", False)
+            if not meshes:
+                rods = [None, *(_rod(model, i) for i in range(1, len(rest)))]
+        self._traced = bool(rods)
+        for twin in COLOURS:
+            for i, mesh in enumerate(meshes):
+                path = f"{ROOT}/{twin}/body/{i}"
+                self.put_object(path, (objects.ghost if twin == "virtual" else objects.solid)(path, mesh))
+            for i, rod in enumerate(rods):
+                path = f"{ROOT}/{twin}/body/{i}"
+                self.put_object(path, objects.frame(path, rod, COLOURS[twin], OPACITY[twin]))
+            self._move(twin, rest)
+        self.put_property(f"{ROOT}/real", "visible", False)
+        self.wake()
+
+    def show(
+        self,
+        *,
+        virtual: ArrayLike,
+        real: ArrayLike | None = None,
+        path: Committed | None = None,
+        driven: Mapping[str, Array] | None = None,
+        learned: tuple[tuple[int, int], ...] = (),
+        t: float = 0.0,
+        now: float,
+    ) -> None:
+        """Show both robots where they are now; to be called at the rate of frames, also while they rest.
+
+        Args:
+            virtual: Joints of the virtual robot [rad], (n,), or its posture (x, y, θ) [m, m, rad], (3,).
+            real: The real one's; None hides it.
+            path: What the real robot is committed to; None for no path.
+            driven: Where `virtual` and `real` drove until now [m], (k, 2) each; all of it, so that what was given
+                before begins with it or is its beginning. None leaves what is drawn.
+            learned: Cells that the virtual environment has.
+            t: Time in the room [s]: who walks in it, and what comes and goes.
+            now: [s], never less than before; the same origin as ever, it only spaces updates.
 
         Raises:
-            InvalidValueError: If there are too many.
+            InvalidValueError: If joints or a posture have another shape or aren't finite; nothing changes then.
         """
-        return self._newest.join(changed)
+        number_in("now", now, -1e15, 1e15)
+        number_in("t", t, -1e9, 1e9)
+        assert self._poses
+        shown = {"virtual": virtual} | ({} if real is None else {"real": real})
+        poses = {twin: np.asarray(self._links(self._checked(twin, q))) for twin, q in shown.items()}
+        before = self.version
+        for twin, links in poses.items():
+            self._move(twin, links)
+        self.put_property(f"{ROOT}/real", "visible", real is not None)
+        if self._room is not None:
+            self._room.show(t)
+        if now >= self.path_due:
+            self.path_due = now + PATH_PERIOD
+            self._draw(path)
+            for twin, points in (driven or {}).items():
+                self._drive(twin, points)
+            if self._room is not None:
+                self._room.learn(learned)
+            if self._traced:
+                self._trace(poses, now)
+        if self.version != before:
+            self.wake()
 
-    def leave(self, slot: ReaderPosition) -> None:
-        """Give a place back; one that was given back already is none."""
-        self._newest.leave(slot)
+    def say(self, text: str) -> None:
+        """Show a message on the real robot's screen; an empty one clears it."""
+        path = f"{ROOT}/real/body/0/screen"
+        if text:
+            from robots.ipr.shapes import SCREEN_SIZE, screen_pose
+
+            X = screen_pose()
+            X[:3, 3] += SCREEN_LIFT * X[:3, 0]
+            self.put_object(path, self._objects.sign(path, self._objects.text_picture(text), SCREEN_SIZE, X))
+        self.put_property(path, "visible", bool(text))
+        self.wake()
+
+    def _checked(self, name: str, q: ArrayLike) -> Array:
+        return finite_array(name, q, self._shape, f"finite numbers of shape {self._shape}")
+
+    def _tool_at(self, q: Array) -> Array:
+        """Where the tool is [m], (k, 3), at joints or postures (k, n)."""
+        if isinstance(self._model, MobileModel):
+            return np.column_stack([q[:, :2], np.full(len(q), self.tool[2])])
+        X = np.asarray(self._model.forward(q))
+        points: Array = X[:, :3, :3] @ self.tool + X[:, :3, 3]
+        return points
 
     def _move(self, twin: str, links: Array) -> None:
         """Put the parts of a robot where they are, (m, 4, 4)."""
@@ -116,8 +217,7 @@ class TwinScene:
             shown = self._poses[twin] = np.full_like(links, np.inf)
         moved = np.abs(links - shown).max(axis=(1, 2)) > STILL
         for i in np.flatnonzero(moved).tolist():
-            path = f"{ROOT}/{twin}/body/{i}"
-            self._put(path, set_transform(path, links[i]))
+            self.put_transform(f"{ROOT}/{twin}/body/{i}", links[i])
         shown[moved] = links[moved]
 
     def _draw(self, committed: Committed | None) -> None:
@@ -128,14 +228,14 @@ class TwinScene:
             known = self._path
             # A path reaches only so far ahead: it's sampled again as the robot comes nearer to where it was cut.
             if known is None or known[0] is not timeline or not known[1].reaches(play):
-                known = self._path = timeline, CommittedPath(self._kinematics, timeline, play, self._tool)
+                known = self._path = timeline, CommittedPath(self._tool_at, timeline, play)
             pieces = known[1].pieces(play)
             if pieces:
-                self._set(f"{ROOT}/committed", "play", round(play, 2))
+                self.put_property(f"{ROOT}/committed", "play", round(play, 2))
         wanted = {piece.index % NODES: piece for piece in pieces if piece}
         for node in self._drawn.keys() - wanted.keys():
             del self._drawn[node]
-            self._set(f"{ROOT}/committed/{node}", "visible", False)
+            self.put_property(f"{ROOT}/committed/{node}", "visible", False)
         for node, piece in wanted.items():
             known_piece = self._drawn.get(node)
             if known_piece is not None and known_piece.equals(piece):
@@ -143,126 +243,32 @@ class TwinScene:
             self._drawn[node] = piece
             where = f"{ROOT}/committed/{node}"
             label = {} if piece.t is None else {"t": round(piece.t, 3), "end": piece.ends}
-            points, marks, scale = piece.points, piece.marks, self._scale
-            self._set_object(where, self._objects.committed_piece(where, points, marks, label, scale=scale))
-            self._set(where, "visible", True)
+            points, marks, scale = piece.points, piece.marks, self._length / _USUAL
+            self.put_object(where, self._objects.committed_piece(where, points, marks, label, scale=scale))
+            self.put_property(where, "visible", True)
 
-    def _set_object(self, path: str, lowered: dict[str, Any]) -> None:
-        self._put(f"{path} object", set_object(path, lowered))
-
-    def _set(self, path: str, name: str, value: Any) -> None:
-        self._put(f"{path} {name}", set_property(path, name, value))
-
-    def _put(self, key: str, command: bytes) -> None:
-        self._newest.put(key, command)
-
-
-TRACE: Final = 3.0
-"""How long a robot without shapes leaves a trace [s]."""
-OPACITY: Final = {"virtual": 0.42, "real": 1.0}
-
-
-class MeshcatScene(TwinScene):
-    """Two arms: see `TwinScene`. The committed path runs ahead of the real one's tool."""
-
-    def __init__(self, model: RobotModel, *, tool: ArrayLike | None = None, dressed: bool = True) -> None:
-        """Make the scene, with both robots at the first of the model's named poses and only the virtual one shown.
-
-        Args:
-            model: The robot; if it has no shapes, its frames and traces are shown.
-            tool: The point whose path is drawn, in the last link's frame [m], (3,); the flange where that's known.
-            dressed: Whether to make the robot's bodies now; else nothing is to be seen until `dress`.
-        """
-        self._model = model
-        point = frozen_array(_tool_of(model) if tool is None else tool)
-        if point.shape != (3,) or not np.isfinite(point).all():
-            raise InvalidValueError("tool", tool, "finite, of shape (3,)")
-        super().__init__(model, point)
-        self._trails: dict[str, deque[tuple[float, Array]]] = {twin: deque(maxlen=128) for twin in COLOURS}
-        self._dressed = False
-        if dressed:
-            self.dress(bodies(model))
-
-    def dress(self, looks: Bodies) -> None:
-        """Show the robots from now on; once.
-
-        Args:
-            looks: From `bodies` of the scene's model, which takes its time and may be asked for in a thread.
-        """
-        from interfaces.stream.meshcat import objects
-
-        assert not self._dressed
-        self._dressed = True
-        self._objects = objects
-        model, meshes = self._model, looks.meshes
-        self._traced = not meshes
-        q = next(iter(model.poses.values()), 0.5 * (model.limits.q_min + model.limits.q_max))
-        rest = np.asarray(model.links(q))
-        self._set(ROOT, "box", _box(model, looks.floor))
-        # Below the floor by a hair: no stripes where a foot stands on it.
-        self._put("/Grid", set_transform("/Grid", _at(0.0, 0.0, looks.floor - 0.001)))
-        self._set("/Axes", "visible", False)
-        for twin in COLOURS:
-            for i in range(len(rest)):
-                path = f"{ROOT}/{twin}/body/{i}"
-                if meshes:
-                    body = (objects.ghost if twin == "virtual" else objects.solid)(path, meshes[i])
-                else:
-                    before = None if i == 0 else _rod(model, i)
-                    body = objects.frame(path, before, COLOURS[twin], OPACITY[twin])
-                self._set_object(path, body)
-            self._move(twin, rest)
-        self._set(f"{ROOT}/real", "visible", False)
-        self._newest.wake()
-
-    @property
-    def tool(self) -> Array:
-        """The point whose path is drawn, in the last link's frame [m], (3,), read-only."""
-        return self._tool
-
-    def show(
-        self, *, virtual: ArrayLike, real: ArrayLike | None = None, path: Committed | None = None, now: float
-    ) -> None:
-        """Show both robots where they are now; to be called at the rate of frames, also while they rest.
-
-        Args:
-            virtual: Poses of the virtual robot's base and links, (n + 1, 4, 4), as `model.links(q)`.
-            real: The real one's; None hides it.
-            path: What the real robot is committed to; None for no path.
-            now: [s], never less than before; the same origin as ever, it only spaces updates.
-
-        Raises:
-            InvalidValueError: If poses have another shape or aren't finite; nothing changes then.
-        """
-        number_in("now", now, -1e15, 1e15)
-        assert self._dressed
-        poses = {"virtual": self._checked("virtual", virtual)}
-        if real is not None:
-            poses["real"] = self._checked("real", real)
-        before = self._newest.version
-        for twin, links in poses.items():
-            self._move(twin, links)
-        self._set(f"{ROOT}/real", "visible", real is not None)
-        if now >= self.path_due:
-            self.path_due = now + PATH_PERIOD
-            self._draw(path)
-            if self._traced:
-                self._trace(poses, now)
-        if self._newest.version != before:
-            self._newest.wake()
-
-    def _checked(self, name: str, links: ArrayLike) -> Array:
-        X = np.asarray(links, dtype=np.float64)
-        shape = (self._model.limits.dof + 1, 4, 4)
-        if X.shape != shape or not np.isfinite(X).all():
-            raise InvalidValueError(name, X.shape, f"finite poses of shape {shape}")
-        return X
+    def _drive(self, twin: str, points: Array) -> None:
+        """Draw where a robot drove, in pieces that stay as they are once they're whole."""
+        places = np.column_stack([points, np.full(len(points), _HEIGHTS[twin])])
+        count = max(math.ceil((len(points) - 1) / PIECE), 0)
+        for k in range(count):
+            piece = places[k * PIECE : (k + 1) * PIECE + 1]
+            state = len(piece), piece[-1].tobytes()
+            if self._driven.get((twin, k)) != state:
+                path = f"{ROOT}/driven/{twin}/{k}"
+                width, colour = DRIVEN[twin]
+                self.put_object(path, self._objects.band(path, piece, width * self._length, colour))
+                self.put_property(path, "visible", True)
+                self._driven[twin, k] = state
+        for _, k in [key for key in self._driven if key[0] == twin and key[1] >= count]:
+            self.put_property(f"{ROOT}/driven/{twin}/{k}", "visible", False)
+            del self._driven[twin, k]
 
     def _trace(self, poses: dict[str, Array], now: float) -> None:
         for twin, trail in self._trails.items():
             links = poses.get(twin)
             if links is not None:
-                point = links[-1, :3, :3] @ self._tool + links[-1, :3, 3]
+                point = links[-1, :3, :3] @ self.tool + links[-1, :3, 3]
                 if not trail or np.linalg.norm(point - trail[-1][1]) > 1e-3:
                     trail.append((now, point))
             while trail and trail[0][0] < now - TRACE:
@@ -270,8 +276,8 @@ class MeshcatScene(TwinScene):
             path = f"{ROOT}/{twin}/trace"
             if len(trail) > 1:
                 points = np.array([point for _, point in trail])
-                self._set_object(path, self._objects.trace(path, points, COLOURS[twin]))
-            self._set(path, "visible", len(trail) > 1)
+                self.put_object(path, self._objects.trace(path, points, COLOURS[twin]))
+            self.put_property(path, "visible", len(trail) > 1)
 
 
 def _tool_of(model: RobotModel) -> ArrayLike:

@@ -12,7 +12,7 @@ from typing_extensions import override
 from interfaces.messages.drive_sites import Doing, DriveOrders, DriveReport, Errand, SensedPoints, TaskReport
 from interfaces.messages.fields import Epoch
 from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
-from interfaces.teleop.connection import LOST, Host, HostConfig, OrderExecutor, lost
+from interfaces.teleop.connection import LOST, Host, OrderExecutor, lost
 from interfaces.teleop.driving.autonomy import Autonomy
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, is_still, kept
@@ -313,25 +313,7 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
 class DrivenHost(Host[DrivenRobot, DriveOrders, DriveReport]):
     """See `Host`; what the body is to do is a drive for each control period."""
 
-    def __init__(
-        self, make: Callable[[float], DrivenRobot], config: HostConfig, *, now: float, seed: int = 0
-    ) -> None:
-        """Stand at rest, and wait for an operator.
-
-        Args:
-            make: Makes the robot's site for an operator's time [s].
-            config: How to behave.
-            now: By the robot's clock [s].
-            seed: See `Host`.
-        """
-        super().__init__(config, now=now, seed=seed)
-        self._make_site = make
-
-    def _make(self, t: float) -> DrivenRobot:
-        return self._make_site(t)
-
-    def _left(self, site: DrivenRobot, now: float) -> None:
-        """Nothing is to be kept: the next site finds the robot where it stands."""
+    orders = DriveOrders
 
     def drive(self, *, now: float) -> Drive:
         """What to drive for the next period, from the robot's time now [s] on."""

@@ -12,12 +12,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from interfaces.stream.meshcat import Committed, MeshcatScene
+from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.committed import PIECE, CommittedPath
-from interfaces.stream.meshcat.meshes import shaded, tube
-from interfaces.stream.meshcat.newest import MOST_READERS, Newest
+from interfaces.stream.meshcat.meshes import bodies, shaded, tube
+from interfaces.stream.meshcat.newest import MOST_READERS, Newest, set_transform
 from interfaces.stream.meshcat.objects import module
-from interfaces.stream.meshcat.scene import set_transform
 from robots import puma560
 from robots.puma560.parameters import FLANGE
 from robots.puma560.shapes import LinkShape
@@ -42,20 +41,20 @@ class Shapeless:
 
 
 @pytest.fixture(scope="module")
-def made() -> MeshcatScene:
-    return MeshcatScene(MODEL)
+def made() -> TwinScene:
+    return TwinScene(MODEL, looks=bodies(MODEL))
 
 
 @pytest.fixture
-def scene(made: MeshcatScene) -> MeshcatScene:
+def scene(made: TwinScene) -> TwinScene:
     """The one scene of this file, with both robots at the nominal pose and nothing planned."""
     made.path_due = -np.inf
     show(made, NOMINAL, now=0.0)
     return made
 
 
-def show(scene: MeshcatScene, q: Array, real: Array | None = None, *, now: float, **named: Any) -> None:
-    scene.show(virtual=MODEL.links(q), real=MODEL.links(q if real is None else real), now=now, **named)
+def show(scene: TwinScene, q: Array, real: Array | None = None, *, now: float, **named: Any) -> None:
+    scene.show(virtual=q, real=q if real is None else real, now=now, **named)
 
 
 def taken(slot: Any) -> list[dict[str, Any]]:
@@ -87,9 +86,13 @@ def plan(*offsets: float, speed: float = 0.5) -> Timeline:
     return engine.timeline
 
 
-def tool(timeline: Timeline, t: Any) -> Array:
-    X = MODEL.forward(np.atleast_2d(timeline.sample(np.atleast_1d(t))))
+def tool_at(q: Array) -> Array:
+    X = MODEL.forward(q)
     return X[:, :3, :3] @ TOOL + X[:, :3, 3]
+
+
+def tool(timeline: Timeline, t: Any) -> Array:
+    return tool_at(np.atleast_2d(timeline.sample(np.atleast_1d(t))))
 
 
 def path_of(state: dict[Any, Any]) -> dict[str, Any]:
@@ -118,7 +121,7 @@ def test_no_other_server_is_loaded() -> None:
     assert done.stdout.split() == []
 
 
-def test_a_viewer_gets_the_scene_once_and_then_transforms_alone(scene: MeshcatScene) -> None:
+def test_a_viewer_gets_the_scene_once_and_then_transforms_alone(scene: TwinScene) -> None:
     slot = scene.join()
     first = taken(slot)
     assert first[0] == {"type": "delete", "path": "/vrs"}
@@ -133,7 +136,7 @@ def test_a_viewer_gets_the_scene_once_and_then_transforms_alone(scene: MeshcatSc
     scene.leave(slot)
 
 
-def test_a_robot_at_rest_sends_nothing_and_one_joint_only_what_it_carries(scene: MeshcatScene) -> None:
+def test_a_robot_at_rest_sends_nothing_and_one_joint_only_what_it_carries(scene: TwinScene) -> None:
     slot = scene.join()
     taken(slot)
     for k in range(200):
@@ -145,7 +148,7 @@ def test_a_robot_at_rest_sends_nothing_and_one_joint_only_what_it_carries(scene:
     scene.leave(slot)
 
 
-def test_a_slow_drift_is_seldom_sent_and_never_off_by_more_than_is_said(scene: MeshcatScene) -> None:
+def test_a_slow_drift_is_seldom_sent_and_never_off_by_more_than_is_said(scene: TwinScene) -> None:
     slot = scene.join()
     state = seen(taken(slot))
     sent = 0
@@ -162,7 +165,7 @@ def test_a_slow_drift_is_seldom_sent_and_never_off_by_more_than_is_said(scene: M
     scene.leave(slot)
 
 
-def test_one_who_joins_late_or_reads_slowly_sees_the_same(scene: MeshcatScene) -> None:
+def test_one_who_joins_late_or_reads_slowly_sees_the_same(scene: TwinScene) -> None:
     quick, slow = scene.join(), scene.join()
     timeline = plan(0.5, -0.4, 0.3)
     state, sluggish = seen(taken(quick)), {}
@@ -181,7 +184,7 @@ def test_one_who_joins_late_or_reads_slowly_sees_the_same(scene: MeshcatScene) -
         scene.leave(slot)
 
 
-def test_bytes_are_made_once_for_all(scene: MeshcatScene) -> None:
+def test_bytes_are_made_once_for_all(scene: TwinScene) -> None:
     slots = [scene.join() for _ in range(3)]
     for slot in slots:
         taken(slot)
@@ -191,7 +194,7 @@ def test_bytes_are_made_once_for_all(scene: MeshcatScene) -> None:
     assert all(other is one for other in others)
     for slot in slots:
         scene.leave(slot)
-    assert scene.viewers == 0
+    assert scene.readers == 0
 
 
 def test_a_reader_gets_no_more_than_it_asks_for_and_nothing_overtaken() -> None:
@@ -217,7 +220,7 @@ def test_a_reader_gets_no_more_than_it_asks_for_and_nothing_overtaken() -> None:
     assert slot.take(ALL) == ()
 
 
-def test_viewers_are_bounded_and_a_place_is_given_back_once(scene: MeshcatScene) -> None:
+def test_viewers_are_bounded_and_a_place_is_given_back_once(scene: TwinScene) -> None:
     slots = [scene.join() for _ in range(MOST_READERS)]
     with pytest.raises(InvalidValueError, match="at most"):
         scene.join()
@@ -226,10 +229,10 @@ def test_viewers_are_bounded_and_a_place_is_given_back_once(scene: MeshcatScene)
     slots[0] = scene.join()
     for slot in slots:
         scene.leave(slot)
-    assert scene.viewers == 0
+    assert scene.readers == 0
 
 
-def test_waiting_viewers_are_woken_when_something_changed_and_only_then(scene: MeshcatScene) -> None:
+def test_waiting_viewers_are_woken_when_something_changed_and_only_then(scene: TwinScene) -> None:
     woken: list[int] = []
     slot = scene.join(lambda: woken.append(1))
     show(scene, NOMINAL, now=1.0)
@@ -242,29 +245,29 @@ def test_waiting_viewers_are_woken_when_something_changed_and_only_then(scene: M
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_no_pose_changes_nothing(scene: MeshcatScene, bad: float) -> None:
+def test_what_is_no_pose_changes_nothing(scene: TwinScene, bad: float) -> None:
     slot = scene.join()
     taken(slot)
-    links = MODEL.links(NOMINAL + 0.3)
-    broken = links.copy()
-    broken[3, 1, 2] = bad
-    for wrong in (broken, links[:5], links[0]):
-        for named in ({"virtual": links, "real": wrong}, {"virtual": wrong, "real": links}):
+    q = NOMINAL + 0.3
+    broken = q.copy()
+    broken[3] = bad
+    for wrong in (broken, q[:5], np.tile(q, (2, 1))):
+        for named in ({"virtual": q, "real": wrong}, {"virtual": wrong, "real": q}):
             with pytest.raises(InvalidValueError):
                 scene.show(**named, now=5.0)
     with pytest.raises(InvalidValueError):
         Committed(plan(0.1), bad)
     with pytest.raises(InvalidValueError):
-        scene.show(virtual=links, now=bad)
+        scene.show(virtual=q, now=bad)
     assert taken(slot) == []
     scene.leave(slot)
 
 
-def test_a_robot_that_is_away_is_hidden_and_comes_back(scene: MeshcatScene) -> None:
+def test_a_robot_that_is_away_is_hidden_and_comes_back(scene: TwinScene) -> None:
     slot = scene.join()
     state = seen(taken(slot))
     assert state["/vrs/real", "set_property", "visible"] is True
-    scene.show(virtual=MODEL.links(NOMINAL), now=1.0)
+    scene.show(virtual=NOMINAL, now=1.0)
     assert [command["value"] for command in taken(slot)] == [False]
     show(scene, NOMINAL, now=2.0)
     assert [command["value"] for command in taken(slot)] == [True]
@@ -274,7 +277,7 @@ def test_a_robot_that_is_away_is_hidden_and_comes_back(scene: MeshcatScene) -> N
 @pytest.mark.parametrize("play", [0.0, 0.3, 1.0, 1.26])
 def test_the_path_goes_from_the_real_tool_to_where_it_rests(play: float) -> None:
     timeline = plan(0.5, -0.4)
-    pieces = CommittedPath(MODEL, timeline, play, TOOL).pieces(play)
+    pieces = CommittedPath(tool_at, timeline, play).pieces(play)
     line = np.vstack([piece.points for piece in pieces])
     np.testing.assert_allclose(line[0], tool(timeline, play)[0], atol=1e-9)
     np.testing.assert_allclose(line[-1], tool(timeline, timeline.end)[0], atol=1e-4)
@@ -291,7 +294,7 @@ def test_the_path_goes_from_the_real_tool_to_where_it_rests(play: float) -> None
 
 def test_ticks_stand_where_the_tool_will_be_at_halves_of_a_second() -> None:
     timeline = plan(0.5, -0.4)
-    pieces = CommittedPath(MODEL, timeline, 0.3, TOOL).pieces(0.3)
+    pieces = CommittedPath(tool_at, timeline, 0.3).pieces(0.3)
     ticks = {piece.index * PIECE: piece.marks[0] for piece in pieces if piece.marks and piece.marks[0][1] > 0}
     assert set(ticks) == set(np.arange(0.5, timeline.end, 0.5))
     for t, (X, radius) in ticks.items():
@@ -315,7 +318,7 @@ def test_ticks_stand_where_the_tool_will_be_at_halves_of_a_second() -> None:
 def test_a_turn_of_the_flange_alone_has_an_end_and_no_line() -> None:
     engine = Engine(MODEL, q=NOMINAL, clock=ManualClock(0.0))
     engine.execute(MotionCommand(target=JointTarget(NOMINAL + np.array([0, 0, 0, 0, 0, 1.0])), speed=0.3))
-    pieces = CommittedPath(MODEL, engine.timeline, 0.0, TOOL).pieces(0.0)
+    pieces = CommittedPath(tool_at, engine.timeline, 0.0).pieces(0.0)
     assert sum(len(piece.points) for piece in pieces) == 0
     assert [piece.ends for piece in pieces if piece] == [True]
 
@@ -323,11 +326,11 @@ def test_a_turn_of_the_flange_alone_has_an_end_and_no_line() -> None:
 def test_a_plan_that_is_over_or_empty_draws_nothing() -> None:
     for timeline in (plan(), plan(0.3)):
         end = timeline.end + 1e-9
-        assert CommittedPath(MODEL, timeline, end, TOOL).pieces(end) == ()
-        assert CommittedPath(MODEL, timeline, 1e6, TOOL).pieces(1e6) == ()
+        assert CommittedPath(tool_at, timeline, end).pieces(end) == ()
+        assert CommittedPath(tool_at, timeline, 1e6).pieces(1e6) == ()
 
 
-def test_a_long_plan_is_drawn_as_far_as_the_horizon_and_renewed(scene: MeshcatScene) -> None:
+def test_a_long_plan_is_drawn_as_far_as_the_horizon_and_renewed(scene: TwinScene) -> None:
     timeline = plan(*[0.5, -0.5] * 15)
     assert timeline.end > 30
     slot = scene.join()
@@ -349,7 +352,7 @@ def test_a_long_plan_is_drawn_as_far_as_the_horizon_and_renewed(scene: MeshcatSc
     scene.leave(slot)
 
 
-def test_only_what_changed_of_the_path_is_sent_again_and_not_often(scene: MeshcatScene) -> None:
+def test_only_what_changed_of_the_path_is_sent_again_and_not_often(scene: TwinScene) -> None:
     slot = scene.join()
     taken(slot)
     short, long = plan(0.5, -0.4), plan(0.5, -0.4, 0.6)
@@ -411,7 +414,7 @@ def test_a_tube_lies_round_its_line_with_its_outside_out(turn_back: bool) -> Non
 
 
 def test_a_robot_without_shapes_shows_frames_and_traces() -> None:
-    scene = MeshcatScene(Shapeless())
+    scene = TwinScene(Shapeless(), looks=bodies(Shapeless()))
     slot = scene.join()
     state = seen(taken(slot))
     for i in range(7):

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from interfaces.clients.appearance import parts_at
-from interfaces.stream.meshcat import Committed, MobileScene
+from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.objects import SCREEN_INK
 from robots import ipr
@@ -41,8 +41,8 @@ def objects(slot: Any) -> set[str]:
     return {key.split()[0] for key in told(slot) if key.endswith("set_object")}
 
 
-def opened(**named: Any) -> tuple[MobileScene, Any]:
-    scene = MobileScene(MODEL, (0.0, 0.0, 0.0), looks=LOOKS, **named)
+def opened(**named: Any) -> tuple[TwinScene, Any]:
+    scene = TwinScene(MODEL, (0.0, 0.0, 0.0), looks=LOOKS, **named)
     slot = scene.join()
     told(slot)
     return scene, slot

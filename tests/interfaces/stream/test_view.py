@@ -14,7 +14,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from interfaces.stream.meshcat import Committed, MeshcatScene
+from interfaces.stream.meshcat import Committed, TwinScene
+from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import BATCHES, PATIENCE, UNAUTHORISED, routes
 from robots import puma560
 from tests.interfaces.pages import until, wait
@@ -36,23 +37,22 @@ def plan() -> Timeline:
 
 
 @pytest.fixture(scope="module")
-def made() -> MeshcatScene:
-    return MeshcatScene(MODEL)
+def made() -> TwinScene:
+    return TwinScene(MODEL, looks=bodies(MODEL))
 
 
 @pytest.fixture
-def server(made: MeshcatScene) -> Iterator[Serving]:
+def server(made: TwinScene) -> Iterator[Serving]:
     with served(routes(made)) as running:
         show(running, made, NOMINAL, NOMINAL)
         yield running
-    assert made.viewers == 0
+    assert made.readers == 0
 
 
-def show(server: Serving, scene: MeshcatScene, virtual: Array, real: Array | None, **named: Any) -> None:
+def show(server: Serving, scene: TwinScene, virtual: Array, real: Array | None, **named: Any) -> None:
     """Show both robots, and the path without its usual pauses."""
     scene.path_due = -np.inf
-    links = None if real is None else MODEL.links(real)
-    server.call(scene.show, virtual=MODEL.links(virtual), real=links, now=0.0, **named)
+    server.call(scene.show, virtual=virtual, real=real, now=0.0, **named)
 
 
 @contextmanager
@@ -120,7 +120,7 @@ def shares(page: Any) -> dict[str, float]:
 
 
 def test_the_page_shows_both_robots_where_they_are_and_the_path(
-    server: Serving, made: MeshcatScene, open_page: Any
+    server: Serving, made: TwinScene, open_page: Any
 ) -> None:
     page = open_page(server)
     timeline = plan()
@@ -148,7 +148,7 @@ def test_the_page_shows_both_robots_where_they_are_and_the_path(
     assert shares(page)["real"] > 0.01
 
 
-def test_one_who_comes_late_sees_the_same(server: Serving, made: MeshcatScene, open_page: Any) -> None:
+def test_one_who_comes_late_sees_the_same(server: Serving, made: TwinScene, open_page: Any) -> None:
     early = open_page(server)
     timeline = plan()
     for t in np.linspace(0.0, 1.3, 40):
@@ -189,7 +189,7 @@ def test_the_page_fits_its_window(server: Serving, open_page: Any, width: int, s
     assert page.evaluate("view.viewer.camera.aspect") == pytest.approx(1.4)
 
 
-def test_the_page_connects_again_by_itself(made: MeshcatScene, open_page: Any) -> None:
+def test_the_page_connects_again_by_itself(made: TwinScene, open_page: Any) -> None:
     with served(routes(made)) as first:
         show(first, made, NOMINAL, NOMINAL, path=Committed(plan(), 0.1))
         page = open_page(first)
@@ -198,7 +198,7 @@ def test_the_page_connects_again_by_itself(made: MeshcatScene, open_page: Any) -
     wait(page, "document.getElementById('status').dataset.state === 'lost'")
     assert "trying again" in page.locator("#status-text").text_content()
     # A server that was started anew knows nothing of what the page shows.
-    other = MeshcatScene(Shapeless())
+    other = TwinScene(Shapeless(), looks=bodies(Shapeless()))
     with served(routes(other), port) as second:
         show(second, other, NOMINAL + 0.2, None)
         wait(page, "document.getElementById('status').dataset.state === 'live'")
@@ -208,7 +208,7 @@ def test_the_page_connects_again_by_itself(made: MeshcatScene, open_page: Any) -
         assert page.evaluate("view.node('vrs', 'committed').children.some((node) => node.visible)") is False
 
 
-def test_a_token_is_asked_for_where_one_is_needed(made: MeshcatScene, open_page: Any) -> None:
+def test_a_token_is_asked_for_where_one_is_needed(made: TwinScene, open_page: Any) -> None:
     with served(routes(made, authorize=lambda token: token == "right")) as server:
         page = open_page(server, live=False)
         page.wait_for_selector("#enter:not([hidden])")
@@ -230,7 +230,7 @@ def test_a_token_is_asked_for_where_one_is_needed(made: MeshcatScene, open_page:
                 assert websocket.close_code == UNAUTHORISED
 
 
-def test_meshcats_own_page_may_connect_too(server: Serving, made: MeshcatScene) -> None:
+def test_meshcats_own_page_may_connect_too(server: Serving, made: TwinScene) -> None:
     with viewer(server) as websocket:
         commands = first_scene(websocket)
         assert {command["type"] for command in commands} >= {"delete", "set_object", "set_transform"}
@@ -239,7 +239,7 @@ def test_meshcats_own_page_may_connect_too(server: Serving, made: MeshcatScene) 
         assert paths == {f"/vrs/virtual/body/{i}" for i in range(1, 7)}
 
 
-def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Serving, made: MeshcatScene) -> None:
+def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Serving, made: TwinScene) -> None:
     stalled = socket.socket()
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     stalled.connect(("127.0.0.1", server.port))
@@ -252,7 +252,7 @@ def test_one_who_does_not_read_is_let_go_and_holds_up_nobody(server: Serving, ma
         first_scene(websocket)
         begun = time.monotonic()
         delays = []
-        while made.viewers == 2:
+        while made.readers == 2:
             k = len(delays) + 1
             sent = time.monotonic()
             show(server, made, NOMINAL + 1e-3 * k, NOMINAL)
@@ -298,7 +298,7 @@ def test_one_who_says_too_much_is_closed_and_beats_are_answered(server: Serving)
         assert websocket.close_code == 1008
 
 
-def test_many_come_and_go_and_nothing_stays(server: Serving, made: MeshcatScene) -> None:
+def test_many_come_and_go_and_nothing_stays(server: Serving, made: TwinScene) -> None:
     import asyncio
 
     def tasks() -> int:
@@ -309,7 +309,7 @@ def test_many_come_and_go_and_nothing_stays(server: Serving, made: MeshcatScene)
         with viewer(server, subprotocols=[BATCHES]) as websocket:
             if k % 2:
                 websocket.recv(timeout=5.0)
-    until(lambda: made.viewers == 0)
+    until(lambda: made.readers == 0)
     until(lambda: bool(server.call(tasks) <= before))
 
 

@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.messages.control import Role
 from interfaces.messages.drive_sites import DriveReport
-from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRobot
-from interfaces.stream.access import Access
+from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.halt import Halt, HaltCause
@@ -167,7 +165,7 @@ def test_one_bad_reading_is_no_fault() -> None:
 @pytest.mark.parametrize(("name", "sensor"), [("shafts", "left wheel's encoder"), ("distances", "sonar ring")])
 def test_a_live_robot_halts(name: str, sensor: str) -> None:
     async def run() -> None:
-        robot = LiveMobileRobot(LiveMobileConfig(place("empty")), Access(free={Role.SITE}))
+        robot = PacedBody(PacedConfig(place("empty")))
         try:
             now = robot.clock.now()
             robot.host.site = robot.new_site(now)
