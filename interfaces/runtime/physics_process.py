@@ -31,7 +31,8 @@ from vrs.errors import FormatError
 from vrs.model import Array
 
 if TYPE_CHECKING:
-    from robots.puma560.body import Prepared, RealArm
+    from robots.puma560.body import RealArm
+    from robots.robot import Prepared
 
 _SETUP_TIME = 10.0
 """How long to wait for the first message [s]."""
