@@ -10,15 +10,15 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robots.base import MobileBase
 from robots.solids import LinkShape
 from vrs.checks import one_of
 from vrs.errors import FormatError, InvalidValueError
-from vrs.mobile import MobileModel
 from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ FOUND: Final[Mapping[str, str]] = {
 """Robots of this package: where each is."""
 USUAL: Final = "puma560"
 """The robot unless another is asked for."""
+USUAL_BASE: Final = "ipr"
+"""The same of mobile robots."""
 USUAL_CLIENT: Final = "cubo"
 """The same of robots that are thin clients."""
 EXACT: Final = "exact"
@@ -168,8 +170,7 @@ class ThinClient:
     """Bindings of its effectors."""
 
 
-Device: TypeAlias = Gripper | Display | HeadCamera | ThinClient
-_D = TypeVar("_D", Gripper, Display, HeadCamera, ThinClient)
+_D = TypeVar("_D")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,16 +179,22 @@ class Robot:
 
     name: str
     """Short name, as people and recordings know it."""
-    model: RobotModel | MobileModel
+    model: RobotModel | MobileBase
     """What an engine needs: limits, named poses, kinematics; or, of a base, its limits and wheels."""
     appearance: Appearance | None = None
     """None draws an arm's frames and traces."""
     bodies: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
-    """What can be real of it, by name, the usual one first: of an arm an `ArmMaker` each."""
-    devices: tuple[Device, ...] = ()
-    """What it carries."""
+    """What can be real of it, by name, the usual one first. Of an arm an `ArmMaker` each; of a base what makes a
+    `robots.ipr.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
+    devices: tuple[object, ...] = ()
+    """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
     found_by: str = ""
     """What `load` finds it by, so that other processes can; empty for one that was made up on the spot."""
+
+    @property
+    def is_base(self) -> bool:
+        """Whether it's a mobile robot, and no arm."""
+        return isinstance(self.model, MobileBase)
 
     @property
     def arm(self) -> RobotModel:
@@ -196,8 +203,19 @@ class Robot:
         Raises:
             InvalidValueError: If the robot is none.
         """
-        if isinstance(self.model, MobileModel):
+        if isinstance(self.model, MobileBase):
             raise InvalidValueError("robot", self.name, "an arm; this one is a mobile robot")
+        return self.model
+
+    @property
+    def base(self) -> MobileBase:
+        """The model of a mobile robot.
+
+        Raises:
+            InvalidValueError: If the robot is none.
+        """
+        if not isinstance(self.model, MobileBase):
+            raise InvalidValueError("robot", self.name, "a mobile robot; this one is an arm")
         return self.model
 
     @property
@@ -206,22 +224,35 @@ class Robot:
         gripper = self.device(Gripper)
         return (0.0, 0.0, 0.0) if gripper is None else gripper.point
 
+    def shapes(self) -> tuple[LinkShape, ...]:
+        """Its shapes; none where it has no appearance."""
+        return () if self.appearance is None else tuple(self.appearance.shapes())
+
+    def placed(self, where: ArrayLike) -> Array:
+        """Poses of its shapes, (m, 4, 4), at joints (n,) or at a posture (x, y, θ), (3,)."""
+        return np.empty((0, 4, 4)) if self.appearance is None else self.appearance.poses(where)
+
     def device(self, kind: type[_D]) -> _D | None:
         """What it carries of a kind; None where it carries none."""
         return next((device for device in self.devices if isinstance(device, kind)), None)
 
-    def body(self, name: str | None = None) -> tuple[str, ArmMaker]:
-        """The name of an arm's body, and what makes it.
+    @property
+    def usual_body(self) -> str:
+        """Name of the body that an arm has unless another is asked for."""
+        return next(iter(self.bodies), EXACT)
+
+    def body(self, name: str = "") -> Callable[..., Any]:
+        """What makes a body: of an arm an `ArmMaker`.
 
         Args:
-            name: One of `bodies`, or `exact`; the usual one unless given.
+            name: One of `bodies`, of an arm also `exact`; the usual one unless given.
 
         Raises:
             InvalidValueError: If it has no such body.
         """
-        bodies: dict[str, ArmMaker] = {**self.bodies, EXACT: exact_arm}
-        chosen = next(iter(bodies)) if name is None else one_of(f"body of {self.name}", name, bodies)
-        return chosen, bodies[chosen]
+        exact: dict[str, Callable[..., Any]] = {} if self.is_base else {EXACT: exact_arm}
+        bodies = {**self.bodies, **exact}
+        return bodies[one_of(f"body of {self.name}", name or self.usual_body, bodies)]
 
 
 def names() -> tuple[str, ...]:

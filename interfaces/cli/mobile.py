@@ -25,6 +25,7 @@ from interfaces.cli.options import (
     start_robot,
 )
 from interfaces.system import software
+from robots.robot import HeadCamera
 from vrs.checks import number_in, one_of
 from vrs.errors import FormatError, InvalidValueError
 
@@ -36,19 +37,17 @@ if TYPE_CHECKING:
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
     from robots.onboard import LossPolicy
+    from robots.robot import Robot
 
-ROBOTS = ("puma560", "ipr")
-"""Robots that can be served."""
 ARCHITECTURE, ROOM, OPERATOR_LOSS, JOBS = "timeline", "empty", "stop", Path("jobs.json")
 """Unless others are asked for."""
-RobotName: TypeAlias = Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560 or ipr.")]
 Architecture: TypeAlias = Annotated[
     str,
     typer.Option(
         "--architecture",
         metavar="NAME",
-        help="Of an ipr, what it does with the operator's path: I, II, III, III-capped, extended, timeline, or "
-        "MODULE:NAME of your own.",
+        help="Of a mobile robot, what it does with the operator's path: I, II, III, III-capped, extended, "
+        "timeline, or MODULE:NAME of your own.",
     ),
 ]
 CAMERA = 6.0
@@ -56,7 +55,7 @@ CAMERA = 6.0
 CameraRate: TypeAlias = Annotated[
     float,
     typer.Option(
-        "--camera", metavar="RATE", help="Of an ipr, pictures a second of its camera, 1 to 30; 0 for no camera."
+        "--camera", metavar="RATE", help="Pictures a second of a robot's camera, 1 to 30; 0 for no camera."
     ),
 ]
 OperatorLossName: TypeAlias = Annotated[
@@ -64,7 +63,7 @@ OperatorLossName: TypeAlias = Annotated[
     typer.Option(
         "--operator-loss",
         metavar="POLICY",
-        help="Of an ipr, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
+        help="Of a mobile robot, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
     ),
 ]
 RoomName: TypeAlias = Annotated[
@@ -72,7 +71,7 @@ RoomName: TypeAlias = Annotated[
     typer.Option(
         "--room",
         metavar="NAME|FILE",
-        help="Of an ipr or with --rsp, where it drives: a room's name, or a .room file.",
+        help="Of a mobile robot or with --rsp, where it drives: a room's name, or a .room file.",
     ),
 ]
 
@@ -120,7 +119,9 @@ def room_of(text: str) -> Room:
 
 @dataclass(frozen=True, slots=True)
 class MobileServing:
-    """What `vrs serve --robot ipr` serves, and where."""
+    """What `vrs serve` serves of a mobile robot, and where."""
+
+    robot: Robot
 
     host: str
     port: int
@@ -147,7 +148,7 @@ class MobileServing:
     def options(self) -> tuple[str, ...]:
         """Of the robot that is started."""
         return (
-            "--robot", "ipr", "--room", self.room, "--architecture", self.architecture,
+            "--robot", self.robot.found_by, "--room", self.room, "--architecture", self.architecture,
             "--max-age", f"{self.max_age:g}", "--operator-loss", self.operator_loss,
         )  # fmt: skip
 
@@ -179,20 +180,19 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         from interfaces.station.panels import MOBILE_PANELS
         from interfaces.stream.server import application
         from interfaces.val2.val_arm import lasts
-        from robots import ipr
         from robots.onboard.lease import LeaseState
 
-        model = ipr.model()
+        seeing = bool(serving.camera) and serving.robot.device(HeadCamera) is not None
         config = LiveMobileOperatorConfig(
-            model, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
+            serving.robot, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
             None if serving.jobs is None else JobFile(serving.jobs),
-            camera=CameraConfig(serving.camera) if serving.camera else None, link_loss=serving.link_loss,
+            camera=CameraConfig(serving.camera) if seeing else None, link_loss=serving.link_loss,
             arm=lasts,
         )  # fmt: skip
         operator = LiveMobileOperator(config, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
-        panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
-        station = Station({"mobile": True, "name": model.name}, panels=panels)
+        panels = tuple(panel for panel in MOBILE_PANELS if seeing or panel.name != "camera")
+        station = Station({"mobile": True, "name": serving.robot.name}, panels=panels)
         app = application([*operator.routes, *station.routes], serving.allowed(port))
         await stack.enter_async_context(station.running())
         await stack.enter_async_context(sockets.serve(app, listening))
@@ -201,7 +201,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
         stack.callback(tidying.cancel)
         shown = Address(host, port)
-        typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
+        typer.echo(f"vrs: serving {serving.robot.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")
         sys.stdout.flush()
         if serving.until_eof:
@@ -221,6 +221,7 @@ def _load() -> None:
 
 
 def run_mobile(
+    robot: Robot,
     listen: str,
     *,
     architecture: str,
@@ -236,6 +237,7 @@ def run_mobile(
     """Run a mobile robot and its site, until Ctrl-C or SIGTERM.
 
     Args:
+        robot: Which one.
         listen: Where, HOST:PORT.
         architecture: What it does with the operator's path, by name.
         room: Where it drives, see `room_of`.
@@ -270,7 +272,9 @@ def run_mobile(
     driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=dog if policy is LossPolicy.HALT else None)
     jobs = RunnerConfig(loss=OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss)))
     hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
-    config = LiveMobileConfig(room_of(room), architecture, driven, jobs, hands, halting=dog, server=software())
+    config = LiveMobileConfig(
+        robot, room_of(room), architecture, driven, jobs, hands, halting=dog, server=software()
+    )
     access, allowed = access_for(address.host, token_file, free={Role.SITE}), asked_for(address.host, reached_as)
 
     async def main() -> None:
@@ -297,7 +301,8 @@ async def _run(robot: LiveMobileRobot, address: Address, allowed: Hosts, *, unti
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
         keep_quiet()
         hasten(1)
-        typer.echo(f"{READY}ws://{Address(address.host, port)}/site (ipr, {robot.config.architecture})")
+        here, config = Address(address.host, port), robot.config
+        typer.echo(f"{READY}ws://{here}/site ({config.base.name}, {config.architecture})")
         typer.echo(f"vrs: {POLICY_SAYS[robot.config.jobs.loss]}", err=True)
         sys.stdout.flush()
         if until_eof:

@@ -1,4 +1,4 @@
-"""vrs robot: only the real robot, for an operator's site somewhere else; with --rsp the thin client CUBO."""
+"""vrs robot: only the real robot, for an operator's site somewhere else; with --rsp a thin client."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ import typer
 from interfaces.cli.mobile import (
     ARCHITECTURE,
     OPERATOR_LOSS,
-    ROBOTS,
     ROOM,
     Architecture,
     OperatorLossName,
-    RobotName,
     RoomName,
     left_out,
     room_of,
@@ -25,8 +23,10 @@ from interfaces.cli.mobile import (
     without,
 )
 from interfaces.cli.options import (
+    BodyName,
     Hosts,
     ReachedAs,
+    RobotName,
     TokenFile,
     access_for,
     asked_for,
@@ -37,25 +37,31 @@ from interfaces.cli.options import (
     saying_policy,
 )
 from interfaces.system import software
+from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import socket
+    from contextlib import AbstractContextManager
 
     from interfaces.link.proxy import Address
+    from interfaces.rsp.host import HostedBody
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
     from interfaces.runtime.live.robot import LiveRobot
     from robots.bullet.rooms import Room
 
 
-def thin_client(address: str, model: Path | None, room: Room, token_file: Path | None, *, until_eof: bool) -> None:
-    """Run a CUBO until a signal comes or its body fails.
+def thin_client(
+    name: str, address: str, model: Path | None, room: Room, token_file: Path | None, *, until_eof: bool
+) -> None:
+    """Run a thin client until a signal comes or its body fails.
 
     Args:
+        name: What `robots.load` finds it by.
         address: Where it listens for RSP, HOST:PORT.
-        model: Of its devices; CUBO's own unless given.
+        model: Of its devices; its own unless given.
         room: Where it drives.
         token_file: Keys; needed off loopback, made if it's missing.
         until_eof: Whether it ends with standard input.
@@ -69,13 +75,16 @@ def thin_client(address: str, model: Path | None, room: Room, token_file: Path |
     from interfaces.link.proxy import parse_address
     from interfaces.rsp.live import bind
     from interfaces.rsp.model import read_model
-    from robots.cubo.parameters import MODEL_FILE
 
     where = parse_address("--rsp", address)
-    robot = read_model(MODEL_FILE if model is None else model)
+    client = load(name)
+    device = client.device(ThinClient)
+    if device is None:
+        raise InvalidValueError("robot", name, f"a thin client with --rsp, as {USUAL_CLIENT} is")
+    robot = read_model(device.model if model is None else model)
     keys = _keys(where.host, token_file)
     sock = bind(where.host, where.port)
-    problem = uvloop.run(_serve_rsp(robot, room, keys, sock, until_eof=until_eof))
+    problem = uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof))
     if problem:
         typer.echo(f"vrs: {problem}", err=True)
         raise typer.Exit(1)
@@ -93,7 +102,13 @@ def _keys(host: str, token_file: Path | None) -> Keyring | None:
 
 
 async def _serve_rsp(
-    model: RobotModel, room: Room, keys: Keyring | None, sock: socket.socket, *, until_eof: bool
+    made: AbstractContextManager[HostedBody],
+    device: ThinClient,
+    model: RobotModel,
+    keys: Keyring | None,
+    sock: socket.socket,
+    *,
+    until_eof: bool,
 ) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.rsp.host import RspHost
@@ -101,14 +116,15 @@ async def _serve_rsp(
     from interfaces.rsp.robot import RobotCore
     from interfaces.runtime.live.process import READY
     from interfaces.system import hasten
-    from robots.cubo.body import MOVES, CuboBody
     from vrs.clock import WallClock
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    with CuboBody(room=room) as body:
+    with made as body:
         clock = WallClock()
-        host = RspHost(RobotCore(model, secrets.token_bytes, keys=keys), body, frozenset(MOVES), now=clock.now())
+        host = RspHost(
+            RobotCore(model, secrets.token_bytes, keys=keys), body, frozenset(device.moves), now=clock.now()
+        )
         server = RspServer(host, sock, clock)
         server.failed.add_done_callback(lambda _: ended.set())
         address, port = sock.getsockname()[:2]
@@ -136,18 +152,18 @@ def robot(
         typer.Option(
             "--rsp",
             metavar="HOST:PORT",
-            help="Be a thin client instead, CUBO, that is driven by RSP over UDP here.",
+            help="Be a thin client instead, that is driven by RSP over UDP here.",
         ),
     ] = None,
     rsp_model: Annotated[
         Path | None,
-        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than CUBO's own."),
+        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than its own."),
     ] = None,
     listen: Annotated[
         str,
         typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
     ] = LISTEN,
-    name: RobotName = "puma560",
+    name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     offset: Annotated[
@@ -183,9 +199,7 @@ def robot(
             "--lead", metavar="S", help="How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay."
         ),
     ] = 0.05,
-    body: Annotated[
-        str, typer.Option("--body", metavar="BODY", help="puma560 (simulated physics) or exact (follows exactly).")
-    ] = "puma560",
+    body: BodyName = "",
     friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
     pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = "nominal",
     reports: Annotated[
@@ -200,13 +214,15 @@ def robot(
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
     if rsp is not None:
         left_out("a thin client has nothing of the kind", {
-            "listen": (listen, LISTEN), "robot": (name, "puma560"), "architecture": (architecture, ARCHITECTURE),
+            "listen": (listen, LISTEN), "architecture": (architecture, ARCHITECTURE),
             "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "timeout": (timeout, 0.5),
             "operator-loss": (operator_loss, OPERATOR_LOSS), "max-age": (max_age, 0.5), "lead": (lead, 0.05),
-            "body": (body, "puma560"), "friction": (friction, True), "pose": (pose, "nominal"),
+            "body": (body, ""), "friction": (friction, True), "pose": (pose, "nominal"),
             "reports": (reports, 30.0), "reached-as": (reached_as, None),
         })  # fmt: skip
-        thin_client(rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
+        thin_client(
+            USUAL_CLIENT if name == USUAL else name, rsp, rsp_model, room_of(room), token_file, until_eof=until_eof
+        )
         return
     if rsp_model is not None:
         raise InvalidValueError("--model", str(rsp_model), "given with --rsp only")
@@ -215,20 +231,19 @@ def robot(
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
     from interfaces.runtime.live.robot import LiveRobot, LiveRobotConfig
-    from interfaces.runtime.physics_messages import BodyKind
     from interfaces.teleop import RobotHostConfig, RobotSiteConfig
-    from robots import puma560
     from robots.onboard import LossPolicy, WatchdogConfig
 
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
-    if one_of("robot", name, ROBOTS) == "ipr":
+    chosen = load(name)
+    if chosen.is_base:
         without(name, {
-            "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, "puma560"),
+            "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, ""),
             "friction": (friction, True), "pose": (pose, "nominal"),
         })  # fmt: skip
         run_mobile(
-            listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
+            chosen, listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
             reports=reports, token_file=token_file, until_eof=until_eof, operator_loss=operator_loss,
             reached_as=reached_as or (),
         )  # fmt: skip
@@ -238,8 +253,9 @@ def robot(
         "operator-loss": (operator_loss, OPERATOR_LOSS),
     })  # fmt: skip
     address = parse_address("--listen", listen)
-    model = puma560.model()
-    q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], BodyKind(one_of("body", body, BodyKind))
+    model = chosen.arm
+    q = model.poses[one_of("pose", pose, sorted(model.poses))]
+    chosen.body(body)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("lead", lead, 0.01, 0.3, unit=" s")
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
@@ -248,7 +264,7 @@ def robot(
         fixed_offset=_offset(offset), beat=beat, watchdog=watchdog if policy is LossPolicy.HALT else None
     )
     config = LiveRobotConfig(
-        model, q, RobotHostConfig(site=site, lead=lead, halting=watchdog), kind, friction, software()
+        chosen, q, RobotHostConfig(site=site, lead=lead, halting=watchdog), body, friction, software()
     )
     access = access_for(address.host, token_file, free={Role.SITE})
     allowed = asked_for(address.host, reached_as or ())
@@ -292,7 +308,7 @@ async def _serve(robot: LiveRobot, address: Address, allowed: Hosts, *, until_eo
         hasten(1)
         if not robot.ended.is_set():
             here = Address(address.host, port)
-            typer.echo(f"{READY}ws://{here}/site ({robot.config.model.name}, {robot.config.body})")
+            typer.echo(f"{READY}ws://{here}/site ({robot.config.robot.name}, {robot.config.body})")
             sys.stdout.flush()
         if until_eof:
             end_with_input(robot.ended)

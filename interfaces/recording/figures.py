@@ -200,7 +200,7 @@ class _Reading:
 
     def run(self) -> TwinRun:
         """The run on its even grid."""
-        recording, begin, model = self.recording, self.begin, self.recording.model
+        recording, begin = self.recording, self.begin
         track = recording.track(REAL)
         t = self._grid(track)
         play, q_real, q_reference = self._real(track, t)
@@ -219,7 +219,7 @@ class _Reading:
             receipts = tuple(r for r in receipts if r.command_id > newest or (r.end or -math.inf) > begin.t)
         answers, messages = recording.receipts("real"), recording.messages()
         return TwinRun(
-            model=model,
+            robot=recording.robot,
             title=begin.title,
             seed=0 if begin.seed is None else begin.seed,
             delay=begin.delay,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -12,7 +12,6 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from typing_extensions import override
 
 from interfaces.recording.errors import Damage
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline, Chain, RecordedEdit
@@ -33,6 +32,7 @@ from interfaces.recording.messages import (
 )
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
 from interfaces.runs.twin_run import CommandPacket, RunEvent
+from robots.robot import Robot, load, names
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.model import Array, RobotModel, frozen_array
@@ -78,23 +78,17 @@ def shows(begin: Begin) -> list[str]:
     return ["driven"] if begin.drive.grid is None else ["driven", "learned"]
 
 
-def _puma560() -> RobotModel:
-    from robots import puma560
-
-    return puma560.model()
-
-
-MODELS: Final[dict[str, Callable[[], RobotModel]]] = {"puma560": _puma560}
-"""Arms that recordings may be of."""
-
-
-def open_recording(path: Path | str) -> Recording:
+def open_recording(path: Path | str, robot: Robot | None = None) -> Recording:
     """Open a recording, complete, cut, damaged or still being written.
+
+    Args:
+        path: The file.
+        robot: What it may be of, if it has that name; else the robot is found by its name.
 
     Raises:
         FormatError: If it's none, or if what it begins with is destroyed.
     """
-    return Recording(Path(path))
+    return Recording(Path(path), robot)
 
 
 class Recording:
@@ -103,9 +97,8 @@ class Recording:
     What is missing stands in `damage`; nothing is made up for it.
     """
 
-    @override
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, robot: Robot | None = None) -> None:
+        self.path, self._robot = path, robot
         self._source = FileSource(path)
         try:
             self._blocks = Blocks(self._source)
@@ -121,7 +114,6 @@ class Recording:
             """What its robot is."""
             self._tracks = Tracks(self._blocks, len(begin.q), references(begin), str(path))
             self._chain, self._applied = Chain(str(path)), 0
-            self._model: RobotModel | None = None
         except FormatError:
             self._source.close()
             raise
@@ -186,21 +178,38 @@ class Recording:
         return found
 
     @property
-    def model(self) -> RobotModel:
-        """The arm.
+    def robot(self) -> Robot:
+        """The robot that it's of.
 
         Raises:
             FormatError: If it's none that is known here, or has other joints.
         """
-        if self._model is None:
-            if self.session.drive is not None:
-                raise FormatError(str(self.path), "of a mobile robot, which has no joints")
-            made = MODELS.get(self.session.robot)
-            model = None if made is None else made()
-            if model is None or model.limits.dof != len(self.session.q):
-                raise FormatError(str(self.path), f"of a robot that isn't known here: {self.session.robot!r}")
-            self._model = model
-        return self._model
+        begin = self.session
+        # Mobile robots of one family have its name, and a body of their own.
+        own = begin.drive is not None and begin.drive.body in names()
+        name = begin.drive.body if own and begin.drive is not None else begin.robot
+        robot = self._robot
+        if (robot is None or robot.name != name) and name in names():
+            robot = self._robot = load(name)
+        if robot is None or robot.name != name:
+            raise FormatError(
+                str(self.path), f"of a robot that isn't known here: {name!r}; --robot says where it is"
+            )
+        numbers = 3 if begin.drive is not None else robot.arm.limits.dof
+        if len(begin.q) != numbers:
+            raise FormatError(str(self.path), f"of a {name!r} with {len(begin.q)} numbers to say where it is")
+        return robot
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm.
+
+        Raises:
+            FormatError: If it's none, or none that is known here.
+        """
+        if self.session.drive is not None:
+            raise FormatError(str(self.path), "of a mobile robot, which has no joints")
+        return self.robot.arm
 
     @property
     def span(self) -> tuple[float, float]:

@@ -12,8 +12,6 @@ from interfaces.recording import capture, history
 from interfaces.recording.history import AnyChange, AnyHistory, AnyTimeline
 from interfaces.recording.messages import Anchor, CommandEntry, Late
 from interfaces.recording.recording import Recording
-from robots.ipr.model import Ipr
-from robots.ipr.model import model as ipr_model
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
 from vrs.engine import Engine
@@ -21,11 +19,6 @@ from vrs.errors import FormatError, VrsError
 from vrs.ledger import Receipt, Standing, Status
 from vrs.mobile import ArcTimeline
 from vrs.timeline import Timeline
-
-POSTURE = 3
-"""Numbers of a posture."""
-NAME = "ipr"
-"""The mobile robot that is known here."""
 
 
 def begun(recording: Recording) -> tuple[Engine, ManualClock]:
@@ -65,7 +58,8 @@ def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
 
 def _mobile(recording: Recording) -> tuple[Engine, ManualClock]:
     begin, where = recording.session, str(recording.path)
-    model = mobile_model(recording)
+    assert begin.drive is not None
+    model = replace(recording.robot.base, period=begin.drive.period)
     if begin.late is not None:
         raise FormatError(where, "it begins in the middle of a session, which isn't known of mobile robots")
     try:
@@ -73,19 +67,6 @@ def _mobile(recording: Recording) -> tuple[Engine, ManualClock]:
         return Engine(model, posture=begin.q, clock=clock, lateness=Lateness(begin.lateness)), clock
     except ValueError as error:
         raise FormatError(where, f"its beginning: {error}") from None
-
-
-def mobile_model(recording: Recording) -> Ipr:
-    """The mobile robot of a recording.
-
-    Raises:
-        FormatError: If it's none that is known here.
-    """
-    begin = recording.session
-    facts = begin.drive
-    if facts is None or begin.robot != NAME or len(begin.q) != POSTURE:
-        raise FormatError(str(recording.path), f"of a robot that isn't known here: {begin.robot!r}")
-    return ipr_model("micro" if facts.body == "micro" else "ipr", period=facts.period)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

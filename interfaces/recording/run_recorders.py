@@ -71,10 +71,10 @@ class RunRecorder:
 
     def begin(self, facts: RunFacts, operator: OperatorSite) -> None:
         """Begin the file."""
-        self._capture = Capture(operator, facts.model, now=0.0, step=facts.step, every=True)
+        self._capture = Capture(operator, facts.robot.arm, now=0.0, step=facts.step, every=True)
         begin = Begin(
             t=0.0,
-            robot=facts.model.name,
+            robot=facts.robot.name,
             driver="laboratory",
             title=facts.title,
             seed=facts.seed,

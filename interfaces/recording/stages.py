@@ -7,13 +7,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from interfaces.clients.appearance import link_shapes
 from interfaces.recording.messages import grid_of, room_of
 from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import ARM, Recording
-from interfaces.recording.rerun import mobile_model
 from interfaces.stream.meshcat import Committed, MeshcatScene, MobileScene
-from robots.ipr.model import Ipr
 from vrs.model import Array
 
 MARGIN = 3.0
@@ -25,7 +22,7 @@ THIN = 2
 class DriveStage:
     """Two mobile robots, what they drove, the room, and what was learned of it."""
 
-    def __init__(self, recording: Recording, model: Ipr) -> None:
+    def __init__(self, recording: Recording) -> None:
         """Take what was driven, and make the scene.
 
         Raises:
@@ -40,8 +37,10 @@ class DriveStage:
         room = None if entry is None else room_of(entry, str(recording.path))
         grid = None if facts is None or facts.grid is None else grid_of(facts.grid)
         self._learned_at, self._learned = _learned(recording)
-        extent = self._extent(recording.session.q, MARGIN * model.body.length)
-        self.scene: MobileScene = MobileScene(model, recording.session.q, room=room, grid=grid, extent=extent)
+        extent = self._extent(recording.session.q, MARGIN * recording.robot.base.body.length)
+        self.scene: MobileScene = MobileScene(
+            recording.robot, recording.session.q, room=room, grid=grid, extent=extent
+        )
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
@@ -100,7 +99,7 @@ class ArmStage:
 
     def __init__(self, recording: Recording) -> None:
         self._model = recording.model
-        self.scene: MeshcatScene = MeshcatScene(recording.model)
+        self.scene: MeshcatScene = MeshcatScene(recording.robot)
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
@@ -116,7 +115,7 @@ Stage: TypeAlias = ArmStage | DriveStage
 
 def stage_of(recording: Recording) -> Stage:
     """The robots of a recording for a page."""
-    return ArmStage(recording) if recording.kind is ARM else DriveStage(recording, mobile_model(recording))
+    return ArmStage(recording) if recording.kind is ARM else DriveStage(recording)
 
 
 def prepare(recording: Recording) -> None:
@@ -124,5 +123,5 @@ def prepare(recording: Recording) -> None:
     if recording.kind is ARM:
         recording.model.links(recording.virtual(recording.span[0]))
         return
-    link_shapes(mobile_model(recording))
+    recording.robot.shapes()
     recording.virtual(recording.span[0])

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.clients.appearance import link_shapes
 from interfaces.runs.twin_run import TwinRun
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
-    from robots.puma560.shapes import LinkShape
+    from robots.solids import LinkShape
 
 MAX_SAMPLES: Final = 24_000
 """Most samples of a twin that a page carries; longer runs are thinned."""
@@ -36,7 +35,7 @@ def scene(run: TwinRun) -> Json:
     """
     stride = max(1, -(-len(run.t) // MAX_SAMPLES))
     base, chain = revolute_chain(run.model)
-    shapes = link_shapes(run.model)
+    shapes = run.robot.shapes()
     floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=-0.7)
     low, high = _box(run, floor)
     return {

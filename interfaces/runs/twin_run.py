@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
 from interfaces.link.delays import MAX_DELAY
 from interfaces.teleop import Correction, OperatorSite
+from robots.robot import Robot
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
 from vrs.comparison import measured_rows
@@ -121,8 +122,8 @@ class TwinRun:
     Equal timeline time compares the real robot at t with the virtual one at p(t).
     """
 
-    model: RobotModel
-    """The robot that both twins are."""
+    robot: Robot
+    """The arm that both twins are."""
     title: str
     """Title of the plan."""
     seed: int
@@ -181,6 +182,11 @@ class TwinRun:
             if value.ndim != 2 or len(value) != len(self.t):
                 raise InvalidValueError(name, value.shape, f"of shape ({len(self.t)}, n)")
             object.__setattr__(self, name, value)
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm's kinematics and limits."""
+        return self.robot.arm
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -334,7 +340,7 @@ def correction_text(end: float, error: Array, reason: str) -> str:
 class RunFacts:
     """What is known of a run before it begins; the fields of `TwinRun` of the same names."""
 
-    model: RobotModel
+    robot: Robot
     start: Array
     """Joints at the start [rad], (n,)."""
     title: str

@@ -27,15 +27,6 @@ Row: TypeAlias = tuple[float, ...]
 """A number a joint."""
 
 
-class BodyKind(StrEnum):
-    """Which body the process runs."""
-
-    EXACT = "exact"
-    """It is where its reference is."""
-    PUMA560 = "puma560"
-    """The PyBullet PUMA 560."""
-
-
 class FaultKind(StrEnum):
     """Why the body came to rest by itself."""
 
@@ -65,7 +56,10 @@ class PhysicsActivity(StrEnum):
 class PhysicsSetup(msgspec.Struct, frozen=True, tag="setup"):
     """The first message to the process."""
 
-    body: BodyKind
+    robot: str
+    """What `robots.load` finds it by; nothing is looked up for a body that's exact."""
+    body: str
+    """Which of its bodies."""
     friction: bool
     tick: float
     """Length of a tick [s]."""

@@ -9,10 +9,11 @@ that take longer are then postponed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,15 +34,13 @@ from interfaces.runs.twin_run import (
     spelled,
     waits,
 )
-from interfaces.runtime.laboratory import Laboratory, RobotBody
+from interfaces.runtime.laboratory import Laboratory
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
-from interfaces.teleop import JointReference, OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from robots.robot import ArmBody, Robot, exact_arm
 from vrs import Lateness, Receipt, Status
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 from vrs.timeline import Timeline
-
-if TYPE_CHECKING:
-    from robots.puma560.body import RealArm
 
 TICK = 0.001
 """Period of the real robot's servo [s]."""
@@ -59,16 +58,6 @@ LINK_LOSS = "hold"
 """What the robot does when messages stay away."""
 
 
-class ArmBody(RobotBody, Protocol):
-    """A robot's body, with a hand."""
-
-    def attach(self, mass: float) -> None:
-        """Take a load [kg] that the servo doesn't know."""
-
-    def release(self) -> None:
-        """Drop the load."""
-
-
 ArmFactory: TypeAlias = Callable[[Array], AbstractContextManager[ArmBody]]
 """Makes a body at rest at the given joints [rad]."""
 Progress: TypeAlias = Callable[[float], None]
@@ -81,7 +70,7 @@ class TwinSession:
     def __init__(
         self,
         start: Array,
-        model: RobotModel,
+        robot: Robot,
         conditions: LinkConditions,
         body: ArmBody,
         *,
@@ -94,7 +83,7 @@ class TwinSession:
 
         Args:
             start: Joints [rad], (n,).
-            model: The robot.
+            robot: Which robot.
             conditions: What the link does.
             body: The real robot's.
             title: What the run is called.
@@ -102,6 +91,7 @@ class TwinSession:
             offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
             keeper: Who writes it down while it goes on.
         """
+        model = robot.arm
         self._start, self._model, self._offset, self._body = start, model, offset, body
         self.operator = OperatorSite(model, start, now=0.0, lateness=Lateness.POSTPONE)
         config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
@@ -124,7 +114,7 @@ class TwinSession:
         """When the operator did something last, or will [s]; infinity while that's unknown."""
         link = conditions.forward
         self._facts = RunFacts(
-            model, start, text(title), seed, text(link.delay.name), spelled(offset), str(link.service),
+            robot, start, text(title), seed, text(link.delay.name), spelled(offset), str(link.service),
             LINK_LOSS, STEP,
         )  # fmt: skip
         self._keeper = keeper
@@ -241,7 +231,7 @@ class TwinSession:
         arrivals = [(m.sent, math.nan if m.arrived is None else m.arrived) for m in self._messages]
         facts = self._facts
         run = TwinRun(
-            model=facts.model,
+            robot=facts.robot,
             title=facts.title,
             seed=facts.seed,
             delay=facts.delay,
@@ -306,63 +296,11 @@ def unheard(t: float) -> None:
     """Report no progress."""
 
 
-class ExactArm:
-    """A body with no dynamics: it is where its reference is, whatever it holds."""
-
-    def follow(self, reference: JointReference) -> Array:
-        """Return the references (m, n) [rad]."""
-        return reference.q
-
-    def attach(self, mass: float) -> None:
-        """Take a load, which changes nothing."""
-
-    def release(self) -> None:
-        """Drop the load, which changes nothing."""
-
-
-class _Puma:
-    """The PyBullet PUMA 560 behind the driver's interface."""
-
-    def __init__(self, arm: RealArm) -> None:
-        self.arm = arm
-
-    def follow(self, reference: JointReference) -> Array:
-        return self.arm.run(*reference).q
-
-    def attach(self, mass: float) -> None:
-        from robots.bullet import Payload
-
-        self.arm.attach(Payload(mass=mass))
-
-    def release(self) -> None:
-        self.arm.release()
-
-
-@contextmanager
-def exact_arm(_q: Array) -> Iterator[ArmBody]:
-    """Make a body that follows exactly."""
-    yield ExactArm()
-
-
-def simulated_puma(*, friction: bool = True) -> ArmFactory:
-    """Say how to make a PyBullet PUMA 560, with or without friction in its joints."""
-
-    @contextmanager
-    def make(q: Array) -> Iterator[ArmBody]:
-        from robots.bullet import Reality
-        from robots.puma560.body import RealArm
-
-        with RealArm(reality=Reality(friction=friction), q=q) as arm:
-            yield _Puma(arm)
-
-    return make
-
-
 def run_twins(
     plan: RunPlan,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
-    arm: ArmFactory,
+    arm: ArmFactory | None = None,
     *,
     seed: int,
     offset: float | None = None,
@@ -374,9 +312,9 @@ def run_twins(
 
     Args:
         plan: What the operator does.
-        model: The robot.
+        robot: Which robot.
         profile: The link's delay, either way.
-        arm: Makes the real robot's body.
+        arm: Makes the real robot's body; its usual one unless given.
         seed: Seed of the link, ≥ 0.
         offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
         service: Order of delivery on the link.
@@ -387,9 +325,9 @@ def run_twins(
         The record, every 20 ms of user time, until both robots have been at rest for 2 s.
     """
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
-    with arm(plan.start) as body:
+    with (arm or robot.body())(plan.start) as body:
         session = TwinSession(
-            plan.start, model, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
+            plan.start, robot, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
         )
         for motion in plan.motions:
             session.lab.schedule(motion.registered_at, lambda now, motion=motion: _register(session, motion, now))  # type: ignore[misc]
@@ -410,7 +348,7 @@ def _register(session: TwinSession, item: PlannedMotion, now: float) -> None:
 def run_without(
     causes: frozenset[str],
     plan: RunPlan,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
     *,
     seed: int,
@@ -426,7 +364,7 @@ def run_without(
             `payload_and_friction` the hand stays empty and the joints turn freely; without `servo` the body
             is where its reference is.
         plan: What the operator does.
-        model: The robot.
+        robot: Which robot.
         profile: The link's delay, unless it is switched off.
         seed: Seed of the link.
         offset: A fixed D [s], ≤ 0, unless the network is switched off; None adapts it.
@@ -439,15 +377,15 @@ def run_without(
     free = "payload_and_friction" in causes
     if free:
         plan = replace(plan, payloads=())
-    arm = exact_arm if "servo" in causes else simulated_puma(friction=not free)
+    arm = exact_arm if "servo" in causes else partial(robot.body(), friction=not free)
     return run_twins(
-        plan, model, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
+        plan, robot, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
     )
 
 
 def offset_outcome(
     plan: RunPlan,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
     *,
     seed: int,
@@ -457,7 +395,7 @@ def offset_outcome(
 ) -> OffsetOutcome:
     """Run a plan for the sake of its offset: see `interfaces.runtime.session.run_twins`."""
     run = run_twins(
-        replace(plan, payloads=()), model, profile, exact_arm,
+        replace(plan, payloads=()), robot, profile, exact_arm,
         seed=seed, offset=offset, service=service, progress=progress,
     )  # fmt: skip
     kinds = [event.kind for event in run.events]

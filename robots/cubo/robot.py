@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from typing import Final
 
+from robots.base import Footprint, MobileBase
 from robots.cubo.body import MOVES, CuboBody
 from robots.cubo.parameters import CUBO, LIMITS, MASS, MODEL_FILE, WHEEL_BASE, WHEEL_RADIUS
 from robots.cubo.shapes import links, shapes
-from robots.ipr.model import Body, Ipr
+from robots.ipr.model import PERIOD
 from robots.robot import Appearance, Robot, ThinClient
 from vrs.mobile import Wheels
 
 ROBOT: Final = Robot(
     "cubo",
-    Ipr(
+    MobileBase(
         LIMITS,
         Wheels(WHEEL_BASE, WHEEL_RADIUS),
-        Body(CUBO.length, CUBO.width, CUBO.height, MASS, -CUBO.centre_x),
-        name="cubo",
+        Footprint(CUBO.length, CUBO.width, CUBO.height, MASS, -CUBO.centre_x),
+        PERIOD,
+        "cubo",
     ),
     Appearance(shapes, links),
     {"bullet": CuboBody},

@@ -34,7 +34,7 @@ from interfaces.stream.connection import MobileConnection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving import DrivenConfig
-from robots import ipr
+from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
 from robots.onboard.journey import Goal, JourneyState
@@ -43,6 +43,7 @@ from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
 from vrs.errors import InvalidValueError
 
+ROBOT = load("ipr")
 ROOM = place("empty")
 HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
 
@@ -51,13 +52,11 @@ HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
     robot_at, at = (sockets.bind("127.0.0.1", 0) for _ in range(2))
-    config = LiveMobileConfig(ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
+    config = LiveMobileConfig(ROBOT, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
     robot = LiveMobileRobot(config, Access(free={Role.SITE}))
     port, own = robot_at.getsockname()[1], at.getsockname()[1]
     operator = LiveMobileOperator(
-        LiveMobileOperatorConfig(
-            ipr.model(), ROOM, f"ws://127.0.0.1:{port}/site", LinkConditions(), jobs=JobFile(jobs)
-        ),
+        LiveMobileOperatorConfig(ROBOT, ROOM, f"ws://127.0.0.1:{port}/site", LinkConditions(), jobs=JobFile(jobs)),
         Access(free=OPEN),
     )
     async with (
@@ -158,8 +157,8 @@ def test_an_arm_is_no_mobile_robot() -> None:
 
 
 def test_a_robot_finds_its_place_by_its_laser_where_there_is_something_to_see() -> None:
-    assert LiveMobileConfig(ROOM).position == "laser"
-    assert LiveMobileConfig(EMPTY).position == "fused"
-    assert LiveMobileConfig(ROOM, position="truth").position == "truth"
+    assert LiveMobileConfig(ROBOT, ROOM).position == "laser"
+    assert LiveMobileConfig(ROBOT, EMPTY).position == "fused"
+    assert LiveMobileConfig(ROBOT, ROOM, position="truth").position == "truth"
     with pytest.raises(InvalidValueError, match="odometry"):
-        LiveMobileConfig(ROOM, position="stars")
+        LiveMobileConfig(ROBOT, ROOM, position="stars")

@@ -17,7 +17,7 @@ from interfaces.report.tables import time_lines
 from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun
 from interfaces.teleop import Correction
-from robots import puma560
+from robots import load, puma560
 from vrs.ledger import Receipt, Status
 from vrs.model import Array
 
@@ -44,7 +44,7 @@ def make_run(title: str = "Sines", reason: str = "late", k: int = 401) -> TwinRu
     corrections = (Correction(12.0, 13.0, np.full(6, 0.1), reason),)
     events = (RunEvent(3.0, "payload", reason), RunEvent(13.0, "slowed", reason))
     return TwinRun(
-        puma560.model(), title, 7, "thu", "adaptive", "datagram", "hold", t, play, curve(t), curve(t), real,
+        load("puma560"), title, 7, "thu", "adaptive", "datagram", "hold", t, play, curve(t), curve(t), real,
         real, real, answers, answers, packets, messages, corrections, events,
     )  # fmt: skip
 

@@ -54,16 +54,15 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     q = robot.arm.poses["ready"]
     still = np.tile(q, (20, 1)), np.zeros((20, 6)), np.zeros((20, 6))
     for name in ("bullet", EXACT):
-        chosen, make = robot.body(name)
-        assert chosen == name
-        with make(q, friction=False) as body:
+        with robot.body(name)(q, friction=False) as body:
             body.attach(2.5)
             measured = body.follow(body.prepare(*still))
             body.release()
         assert measured.q.shape == (20, 6)
         assert np.abs(measured.q - q).max() == pytest.approx(0.0 if name == EXACT else 1e-3, abs=1e-3)
-    assert robot.body()[0] == "bullet"
-    assert Robot("bare", robot.model).body()[0] == EXACT
+    assert robot.usual_body == "bullet"
+    assert robot.body() is robot.bodies["bullet"]
+    assert Robot("bare", robot.model).usual_body == EXACT
     with pytest.raises(InvalidValueError, match="body of puma560 must be one of bullet, exact; given: 'jelly'"):
         robot.body("jelly")
 

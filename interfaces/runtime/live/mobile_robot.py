@@ -38,16 +38,16 @@ from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.driving import Autonomy, DrivenConfig, DrivenHost, DrivenRobot, Hands, JourneyPilot
 from interfaces.timer import Turning
 from robots.bullet.rooms import Room
-from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses
 from robots.ipr.navigation import BodyNavigator
 from robots.ipr.position import LaserPosition
 from robots.ipr.robot import MobileRobot
 from robots.onboard import WatchdogConfig
-from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
+from robots.onboard.driving import STAND, Drive, Posture
 from robots.onboard.following import SoundPosition
 from robots.onboard.journey import GOING, Goal
 from robots.onboard.laser import LaserModel, LaserScan, beam_angles
+from robots.robot import Robot
 from vrs.checks import one_of
 from vrs.clock import WallClock
 
@@ -140,6 +140,8 @@ _REST = 3.0
 class LiveMobileConfig:
     """A mobile robot, and how its site behaves."""
 
+    base: Robot
+    """Which mobile robot."""
     room: Room
     """Where it drives; it stands at first where the room says."""
     architecture: str = "timeline"
@@ -181,9 +183,10 @@ class LiveMobileRobot:
             access: Who may come in as `Role.SITE`.
         """
         self.config = config
-        senses = Senses(laser=LaserModel())
+        senses = Senses(laser=config.base.device(LaserModel) or LaserModel())
         rng = np.random.default_rng(config.seed)
-        self.body = MobileBody("ipr", room=config.room, rng=rng, senses=senses)
+        limits = config.base.base.limits
+        self.body: MobileRobot = config.base.body()(room=config.room, rng=rng, senses=senses, limits=limits)
         body, position = self.body, POSITIONS[config.position](self.body)
         self._position = SoundPosition(position, lambda: body.time)
         # The first look of its senses, before anybody waits for it.
@@ -287,7 +290,7 @@ class LiveMobileRobot:
         return DrivenRobot(
             self._architecture,
             self._position,
-            IPR_LIMITS,
+            body.limits,
             now=t,
             world=lambda: body.time,
             config=driven,
@@ -302,7 +305,7 @@ class LiveMobileRobot:
         around = None
         if config.architecture in SENSING:
             around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
-        return ArchitectureRobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
+        return ArchitectureRobotSite(made, self._position, body.limits, period=CONTROL, surroundings=around)
 
     def _turn(self, now: float) -> float:
         self._server.send(self.host.advance(now=now))
@@ -317,7 +320,7 @@ class LiveMobileRobot:
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         posture = np.array(self._position.posture())
         return Attached(
-            PROTOCOL, "ipr", posture, loss, timeout, None, self.instance, config.server, max_age=age,
+            PROTOCOL, config.base.name, posture, loss, timeout, None, self.instance, config.server, max_age=age,
             architecture=config.architecture, room=config.room.name,
         )  # fmt: skip
 
@@ -326,7 +329,7 @@ class LiveMobileRobot:
         site, body = self.host.site, self.body
         return {
             "ok": not self.ended.is_set(),
-            "robot": "ipr",
+            "robot": self.config.base.name,
             "server": self.config.server,
             "instance": self.instance,
             "now": self.clock.now(),

@@ -36,10 +36,11 @@ from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine
 from interfaces.timer import Turning
 from robots.onboard import LossPolicy
 from robots.onboard.lease import Ended, Grant, Lease
+from robots.robot import Robot
 from vrs.clock import WallClock, seconds_since_1970
 from vrs.commands import Stop
 from vrs.errors import InvalidValueError, VrsError
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 
 SHOW = 1.0 / 60.0
 """Time between two frames of the view [s]."""
@@ -57,7 +58,8 @@ NOT_MET = "the robot hasn't been met yet"
 class LiveOperatorConfig:
     """An operator's site."""
 
-    model: RobotModel
+    arm: Robot
+    """Which arm."""
     q: Array
     """Where the virtual robot stands at first [rad], (n,); it goes to where the real one is met."""
     robot: str
@@ -94,9 +96,10 @@ class LiveOperator(LeasedRobot):
             RecordingError: If it's to be recorded and the file can't be made.
         """
         self.config = config
-        warm(config.model, config.q)
+        model = config.arm.arm
+        warm(model, config.q)
         self.clock = WallClock()
-        self.operator = OperatorSite(config.model, config.q, now=0.0, config=config.site, halted=NOT_MET)
+        self.operator = OperatorSite(model, config.q, now=0.0, config=config.site, halted=NOT_MET)
         self.site = Site(self.operator.engine)
         self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self.recorder: LiveRecorder | None = None
@@ -104,7 +107,7 @@ class LiveOperator(LeasedRobot):
         self._recording_changes, self._closed = asyncio.Lock(), False
         if config.recording is not None:
             began = seconds_since_1970() - self.clock.now()
-            self.recorder = LiveRecorder(config.recording, self.line, config.model, seed=config.seed, began=began)
+            self.recorder = LiveRecorder(config.recording, self.line, model, seed=config.seed, began=began)
             self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
@@ -117,7 +120,7 @@ class LiveOperator(LeasedRobot):
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         self.hub = Hub(self.site, lease, access, self, config=hub, emulation=self.emulation)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
-        self.scene = MeshcatScene(config.model, dressed=False)
+        self.scene = MeshcatScene(config.arm, dressed=False)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self._wants_resume = self._ending = False
         self._shown: tuple[Report | None, bool, str] = (None, False, "")
@@ -148,8 +151,8 @@ class LiveOperator(LeasedRobot):
 
     async def _draw(self) -> None:
         """Draw both robots for those who look, once their bodies are made."""
-        links = self.config.model.links
-        self.scene.dress(await asyncio.to_thread(bodies, self.config.model))
+        links = self.config.arm.arm.links
+        self.scene.dress(await asyncio.to_thread(bodies, self.config.arm))
         while True:
             await asyncio.sleep(SHOW)
             if not self.scene.viewers:
@@ -172,7 +175,7 @@ class LiveOperator(LeasedRobot):
                 raise InvalidValueError("recording", what.path.name, "begun once the other one has ended")
             now, config = self.clock.now(), self.config
             recorder = LiveRecorder(
-                what, self.line, config.model, seed=config.seed, began=seconds_since_1970(), now=now
+                what, self.line, config.arm.arm, seed=config.seed, began=seconds_since_1970(), now=now
             )
             try:
                 await asyncio.to_thread(recorder.open)
@@ -249,7 +252,7 @@ class LiveOperator(LeasedRobot):
 
     def _unfit(self, robot: Attached) -> str:
         """Why a robot isn't the one that is driven here; empty if it is."""
-        name = self.config.model.name
+        name = self.config.arm.name
         return "" if robot.robot == name else f"it's a {robot.robot}, and this site drives a {name}"
 
     def _end_lease(self, now: float) -> None:

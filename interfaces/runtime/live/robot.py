@@ -26,12 +26,13 @@ from interfaces.runtime.physics import (
     ProcessEnded,
     Silent,
 )
-from interfaces.runtime.physics_messages import BodyKind, Fault, Measurement, PhysicsReady
+from interfaces.runtime.physics_messages import Fault, Measurement, PhysicsReady
 from interfaces.stream.access import Access, bearer
 from interfaces.teleop import RobotHost, RobotHostConfig
 from interfaces.timer import Turning
+from robots.robot import Robot
 from vrs.clock import WallClock
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 
 JOINTS = frozenset(("q", "qd", "q_ref", "qd_ref"))
 """Of `/health`, what only an operator's site is told."""
@@ -43,17 +44,21 @@ _REST = 2.0
 class LiveRobotConfig:
     """A robot, and how its site behaves."""
 
-    model: RobotModel
+    robot: Robot
+    """An arm."""
     q: Array
-    """Where it stands [rad], (n,)."""
+    """Where it stands [rad], of prismatic joints [m], (n,)."""
     host: RobotHostConfig = field(default_factory=RobotHostConfig)
     """How its end of the connection behaves."""
-    body: BodyKind = BodyKind.PUMA560
-    """What follows the references."""
+    body: str = ""
+    """Which of its bodies follows the references; the usual one unless given."""
     friction: bool = True
     """Whether its joints have friction."""
     server: str = "vrs"
     """Name and version of the program."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "body", self.body or self.robot.usual_body)
 
 
 class LiveRobot:
@@ -67,11 +72,12 @@ class LiveRobot:
             access: Who may come in as `Role.SITE`.
         """
         self.config, self._access = config, access
-        warm(config.model, config.q)
+        model = config.robot.arm
+        warm(model, config.q)
         self.clock = WallClock()
         self.instance = secrets.token_urlsafe(9)
         seed = secrets.randbelow(2**32)
-        self.host = RobotHost(config.model, config.q, now=self.clock.now(), config=config.host, seed=seed)
+        self.host = RobotHost(model, config.q, now=self.clock.now(), config=config.host, seed=seed)
         self._turning = Turning(self.clock, self._turn)
         self._server = RobotServer(
             self.host, self.clock, access, attached=self._attached, met=self._follow, heard=self._decide
@@ -101,9 +107,8 @@ class LiveRobot:
         Raises:
             PhysicsStartError: If the body can't be made.
         """
-        config = PhysicsConfig(
-            self.config.model.limits, self.config.q, body=self.config.body, friction=self.config.friction
-        )
+        made = self.config
+        config = PhysicsConfig(made.robot, made.q, body=made.body, friction=made.friction)
         loop = asyncio.get_running_loop()
         with PhysicsProcess(config, self.clock) as physics:
             self.physics = physics
@@ -177,7 +182,7 @@ class LiveRobot:
         dog = self.host.watchdog(site.watchdog)
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         q = np.array(self._measured.q) if self._measured is not None else self.config.q
-        name = self.config.model.name
+        name = self.config.robot.name
         offset, server = site.fixed_offset, self.config.server
         return Attached(PROTOCOL, name, q, loss, timeout, offset, self.instance, server, max_age=age)
 
@@ -188,7 +193,7 @@ class LiveRobot:
         reference = self.host.reference(np.array([self.clock.now()]))
         return {
             "ok": not self.problem and measured is not None,
-            "robot": self.config.model.name,
+            "robot": self.config.robot.name,
             "server": self.config.server,
             "instance": self.instance,
             "now": self.clock.now(),

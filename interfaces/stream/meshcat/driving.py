@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.clients.appearance import parts_at
 from interfaces.stream.meshcat.committed import Committed
 from interfaces.stream.meshcat.meshes import Bodies, bodies, shaded
 from interfaces.stream.meshcat.scene import COLOURS, PATH_PERIOD, ROOT, TwinScene, set_transform
+from robots.robot import Display, Robot
 from vrs.checks import finite_array, number_in
-from vrs.mobile import Grid, MobileModel
+from vrs.mobile import Grid
 from vrs.model import Array
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class MobileScene(TwinScene):
 
     def __init__(
         self,
-        model: MobileModel,
+        robot: Robot,
         start: ArrayLike,
         *,
         room: Room | None = None,
@@ -72,31 +72,30 @@ class MobileScene(TwinScene):
         """Make the scene, with both robots at the start and only the virtual one shown.
 
         Args:
-            model: The robot.
+            robot: A mobile robot.
             start: Where both begin (x, y, θ) [m, m, rad], (3,).
             room: Where they drive; an endless floor unless given.
             grid: Of the cells of the virtual environment, where there's one.
             extent: Least and largest x and y that are to be seen [m], (2, 2); the room, or some of the floor around
                 the start, unless given.
-            looks: `bodies` of the model, which take their time and may be made in a thread.
+            looks: `bodies` of the robot, which take their time and may be made in a thread.
 
         Raises:
             InvalidValueError: If something isn't finite or has another shape.
         """
         from interfaces.stream.meshcat import objects
-        from robots.ipr.chassis import chassis
 
         posture = finite_array("start", start, (3,), "three finite numbers (x, y, θ)")
-        length = chassis(getattr(model, "kind", "ipr")).length
+        length = robot.base.body.length
         tool = np.array([0.0, 0.0, _HEIGHTS["committed"] * min(length / 0.45, 1.0)])
         super().__init__(_OnFloor(), tool, scale=length / 0.2)
-        self._objects, self._model, self._grid = objects, model, grid
+        self._objects, self._robot, self._grid = objects, robot, grid
         self._length = length
         self._pieces: dict[tuple[str, int], tuple[int, bytes]] = {}
         self._cells: tuple[tuple[int, int], ...] = ()
         self._room = room
         self._furnish(posture, extent)
-        self._put_robots(posture, bodies(model) if looks is None else looks)
+        self._put_robots(posture, bodies(robot) if looks is None else looks)
         self._newest.wake()
 
     def show(
@@ -127,9 +126,9 @@ class MobileScene(TwinScene):
         """
         number_in("now", now, -1e15, 1e15)
         number_in("t", t, -1e9, 1e9)
-        poses = {"virtual": parts_at(self._model, virtual)}
+        poses = {"virtual": self._robot.placed(virtual)}
         if real is not None:
-            poses["real"] = parts_at(self._model, real)
+            poses["real"] = self._robot.placed(real)
         before = self._newest.version
         for twin, links in poses.items():
             self._move(twin, links)
@@ -145,20 +144,22 @@ class MobileScene(TwinScene):
             self._newest.wake()
 
     def say(self, text: str) -> None:
-        """Show a message on the real robot's screen; an empty one clears it."""
+        """Show a message on the real robot's display, if it has one; an empty one clears it."""
+        display = self._robot.device(Display)
+        if display is None:
+            return
         path = f"{ROOT}/real/body/0/screen"
         if text:
             from interfaces.stream.meshcat.objects import text_picture
-            from robots.ipr.shapes import SCREEN_SIZE, screen_pose
 
-            X = screen_pose()
+            X = display.pose()
             X[:3, 3] += SCREEN_LIFT * X[:3, 0]
-            self._set_object(path, self._objects.sign(path, text_picture(text), SCREEN_SIZE, X))
+            self._set_object(path, self._objects.sign(path, text_picture(text), display.size, X))
         self._set(path, "visible", bool(text))
         self._newest.wake()
 
     def _put_robots(self, posture: Array, looks: Bodies) -> None:
-        rest = parts_at(self._model, posture)
+        rest = self._robot.placed(posture)
         for twin in COLOURS:
             for i, mesh in enumerate(looks.meshes):
                 path = f"{ROOT}/{twin}/body/{i}"

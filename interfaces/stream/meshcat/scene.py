@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece, Kinematics
 from interfaces.stream.meshcat.meshes import Bodies, bodies
 from interfaces.stream.meshcat.newest import Newest, ReaderPosition
+from robots.robot import Robot
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import ArcTimeline
@@ -165,29 +166,29 @@ OPACITY: Final = {"virtual": 0.42, "real": 1.0}
 class MeshcatScene(TwinScene):
     """Two arms: see `TwinScene`. The committed path runs ahead of the real one's tool."""
 
-    def __init__(self, model: RobotModel, *, tool: ArrayLike | None = None, dressed: bool = True) -> None:
+    def __init__(self, robot: Robot, *, tool: ArrayLike | None = None, dressed: bool = True) -> None:
         """Make the scene, with both robots at the first of the model's named poses and only the virtual one shown.
 
         Args:
-            model: The robot; if it has no shapes, its frames and traces are shown.
-            tool: The point whose path is drawn, in the last link's frame [m], (3,); the flange where that's known.
+            robot: An arm; if it has no shapes, its frames and traces are shown.
+            tool: The point whose path is drawn, in the last link's frame [m], (3,); the robot's own unless given.
             dressed: Whether to make the robot's bodies now; else nothing is to be seen until `dress`.
         """
-        self._model = model
-        point = frozen_array(_tool_of(model) if tool is None else tool)
+        self._model = model = robot.arm
+        point = frozen_array(robot.tool if tool is None else tool)
         if point.shape != (3,) or not np.isfinite(point).all():
             raise InvalidValueError("tool", tool, "finite, of shape (3,)")
         super().__init__(model, point)
         self._trails: dict[str, deque[tuple[float, Array]]] = {twin: deque(maxlen=128) for twin in COLOURS}
         self._dressed = False
         if dressed:
-            self.dress(bodies(model))
+            self.dress(bodies(robot))
 
     def dress(self, looks: Bodies) -> None:
         """Show the robots from now on; once.
 
         Args:
-            looks: From `bodies` of the scene's model, which takes its time and may be asked for in a thread.
+            looks: From `bodies` of the scene's robot, which takes its time and may be asked for in a thread.
         """
         from interfaces.stream.meshcat import objects
 
@@ -272,14 +273,6 @@ class MeshcatScene(TwinScene):
                 points = np.array([point for _, point in trail])
                 self._set_object(path, self._objects.trace(path, points, COLOURS[twin]))
             self._set(path, "visible", len(trail) > 1)
-
-
-def _tool_of(model: RobotModel) -> ArrayLike:
-    if model.name == "puma560":
-        from robots.puma560.parameters import FLANGE
-
-        return (0.0, 0.0, FLANGE)
-    return (0.0, 0.0, 0.0)
 
 
 def _at(x: float, y: float, z: float) -> Array:

@@ -21,10 +21,11 @@ from interfaces.recording.track import REAL, VIRTUAL
 from interfaces.runs.summary import summarize, to_json
 from interfaces.runs.twin_run import RunEvent, RunFacts, Turn
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import exact_arm, run_twins
+from interfaces.runtime.session import run_twins
 from interfaces.teleop import OperatorSite
+from robots.robot import exact_arm
 from tests.interfaces.recording import shown
-from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
+from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, ROBOT, Sitting, taken
 from vrs import JointTarget, MotionCommand, Status
 from vrs.commands import ParameterChange, PositionQuery, Retime, ScaleTime
 from vrs.errors import UnknownCommandError
@@ -127,7 +128,7 @@ def test_names_of_files_that_are_long_or_no_utf_8_can_be_read_back(tmp_path):
 
 def test_texts_of_any_length_can_be_read_back(tmp_path):
     recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
-    recorder.begin(RunFacts(MODEL, NOMINAL, "a", 0, "none", "adaptive", "datagram", "hold", 0.02), site)
+    recorder.begin(RunFacts(ROBOT, NOMINAL, "a", 0, "none", "adaptive", "datagram", "hold", 0.02), site)
     recorder.turn(
         Turn(
             0.0, 0, *(np.empty((0, *n)) for n in ((), (6,), (6,))), (), (), (RunEvent(0.0, "late", "x" * 3000),), ()
@@ -163,7 +164,7 @@ def test_both_robots_are_shown_where_their_joints_put_them(tmp_path):
 @pytest.mark.parametrize("full", ["/dev/full", "{tmp}/no/such/folder/run.mcap"])
 def test_a_disk_that_takes_nothing_ends_the_recording_and_not_the_run(tmp_path, full):
     recorder = RunRecorder(Path(full.format(tmp=tmp_path)))
-    run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
+    run = run_twins(PLAN, ROBOT, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
     recorder.finish()
     assert recorder.problem.startswith("recording failed: ")
     assert to_json(summarize(run)) == to_json(summarize(taken(tmp_path / "run.mcap")))
@@ -193,7 +194,7 @@ def small(monkeypatch):
 @pytest.mark.usefixtures("small")
 def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path):
     recorder = RunRecorder(tmp_path / "run.mcap")
-    run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
+    run = run_twins(PLAN, ROBOT, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
     recorder.finish()
     assert "takes no more after 30000 bytes" in recorder.problem
     with open_recording(tmp_path / "run.mcap") as recording:
@@ -206,7 +207,7 @@ def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path):
 @pytest.mark.usefixtures("small")
 def test_a_disk_that_fills_up_amid_commands_stops_no_command(tmp_path):
     recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
-    facts = RunFacts(MODEL, NOMINAL, "many", 0, "none", "adaptive", "datagram", "hold", 0.02)
+    facts = RunFacts(ROBOT, NOMINAL, "many", 0, "none", "adaptive", "datagram", "hold", 0.02)
     recorder.begin(facts, site)
     for k in range(1100):
         site.execute(MotionCommand(JointTarget(NOMINAL), execute_at=10.0 + 0.5 * k), now=0.001 * k)

@@ -18,9 +18,10 @@ from interfaces.stream.meshcat.meshes import shaded, tube
 from interfaces.stream.meshcat.newest import MOST_READERS, Newest
 from interfaces.stream.meshcat.objects import module
 from interfaces.stream.meshcat.scene import set_transform
-from robots import puma560
+from robots import load, puma560
 from robots.puma560.parameters import FLANGE
 from robots.puma560.shapes import LinkShape
+from robots.robot import Robot
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Timeline
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -43,7 +44,7 @@ class Shapeless:
 
 @pytest.fixture(scope="module")
 def made() -> MeshcatScene:
-    return MeshcatScene(MODEL)
+    return MeshcatScene(load("puma560"))
 
 
 @pytest.fixture
@@ -411,7 +412,7 @@ def test_a_tube_lies_round_its_line_with_its_outside_out(turn_back: bool) -> Non
 
 
 def test_a_robot_without_shapes_shows_frames_and_traces() -> None:
-    scene = MeshcatScene(Shapeless())
+    scene = MeshcatScene(Robot("shapeless", Shapeless()))
     slot = scene.join()
     state = seen(taken(slot))
     for i in range(7):

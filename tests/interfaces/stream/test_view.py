@@ -16,7 +16,8 @@ from websockets.sync.client import connect
 
 from interfaces.stream.meshcat import Committed, MeshcatScene
 from interfaces.stream.meshcat.page import BATCHES, PATIENCE, UNAUTHORISED, routes
-from robots import puma560
+from robots import load, puma560
+from robots.robot import Robot
 from tests.interfaces.pages import until, wait
 from tests.interfaces.stream.serving import Serving, served
 from tests.interfaces.stream.test_meshcat import Shapeless
@@ -37,7 +38,7 @@ def plan() -> Timeline:
 
 @pytest.fixture(scope="module")
 def made() -> MeshcatScene:
-    return MeshcatScene(MODEL)
+    return MeshcatScene(load("puma560"))
 
 
 @pytest.fixture
@@ -198,7 +199,7 @@ def test_the_page_connects_again_by_itself(made: MeshcatScene, open_page: Any) -
     wait(page, "document.getElementById('status').dataset.state === 'lost'")
     assert "trying again" in page.locator("#status-text").text_content()
     # A server that was started anew knows nothing of what the page shows.
-    other = MeshcatScene(Shapeless())
+    other = MeshcatScene(Robot("shapeless", Shapeless()))
     with served(routes(other), port) as second:
         show(second, other, NOMINAL + 0.2, None)
         wait(page, "document.getElementById('status').dataset.state === 'live'")

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
-from interfaces.clients.appearance import parts_at
 from interfaces.recording import open_recording
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
-from interfaces.recording.rerun import mobile_model
 from interfaces.recording.stages import DriveStage
 from tests.interfaces.pages import until, wait
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
@@ -118,7 +116,7 @@ def test_a_report_has_the_figures_and_the_pictures(tmp_path: Path) -> None:
 def test_the_stage_shows_what_was_known_then() -> None:
     drive, path = recorded(WANDER)
     with open_recording(path) as recording:
-        stage = DriveStage(recording, mobile_model(recording))
+        stage = DriveStage(recording)
         told = {}
         stage.scene.show = lambda **named: told.update(named)  # type: ignore[method-assign]
         playback = Playback([recording])
@@ -134,7 +132,7 @@ def test_the_stage_shows_what_was_known_then() -> None:
 def test_a_page_shows_both_robots_and_their_room(new_page) -> None:
     drive, path = recorded(WANDER)
     with open_recording(path) as recording:
-        model = mobile_model(recording)
+        robot = recording.robot
     with served(path) as server:
         page = new_page(server.url, 640, 480, "light", expected="WebSocket connection")
         page.goto(f"{server.url}/replay")
@@ -143,7 +141,7 @@ def test_a_page_shows_both_robots_and_their_room(new_page) -> None:
         page.evaluate("replay.wish('seek', { t: 9 })")
         near(server, 9.0)
         for twin, posture in (("virtual", drive.virtual[180]), ("real", drive.real[180])):
-            expected = np.array([X.T.ravel() for X in parts_at(model, posture)])
+            expected = np.array([X.T.ravel() for X in robot.placed(posture)])
             until(lambda: np.abs(np.array(page.evaluate(POSES, twin)) - expected).max() < 1e-6)  # noqa: B023
         wait(page, "replay.node(0, 'vrs', 'driven', 'virtual', '0').children.length === 1")
         wait(page, "replay.node(0, 'vrs', 'room', '0').children.length === 1")

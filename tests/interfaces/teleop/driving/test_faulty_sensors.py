@@ -16,6 +16,7 @@ from interfaces.runtime.live.mobile_robot import LiveMobileConfig, LiveMobileRob
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
+from robots import load
 from robots.ipr.chassis import Senses
 from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture
@@ -166,7 +167,7 @@ def test_one_bad_reading_is_no_fault() -> None:
 @pytest.mark.parametrize(("name", "sensor"), [("shafts", "left wheel's encoder"), ("distances", "sonar ring")])
 def test_a_live_robot_halts(name: str, sensor: str) -> None:
     async def run() -> None:
-        robot = LiveMobileRobot(LiveMobileConfig(place("empty")), Access(free={Role.SITE}))
+        robot = LiveMobileRobot(LiveMobileConfig(load("ipr"), place("empty")), Access(free={Role.SITE}))
         try:
             now = robot.clock.now()
             robot.host.site = robot.new_site(now)
