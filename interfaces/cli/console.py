@@ -18,6 +18,7 @@ from interfaces.cli.options import RobotName
 from interfaces.system import software
 from robots.robot import USUAL, load
 from vrs.errors import InvalidValueError, VrsError
+from vrs.model import home
 
 if TYPE_CHECKING:
     from interfaces.val2.monitor.control import Control
@@ -88,7 +89,7 @@ def _alone(robot: Robot, files: Path) -> None:
     from vrs.engine import Engine
 
     model = robot.arm
-    engine = Engine(model, q=model.poses["nominal"], clock=ManualClock(0.0))
+    engine = Engine(model, q=home(model), clock=ManualClock(0.0))
     _converse(arm_for(engine), Free(), WallClock(), files, f"{software()}, a virtual {robot.name} alone")
 
 

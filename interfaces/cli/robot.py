@@ -40,6 +40,7 @@ from interfaces.system import software
 from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
+from vrs.model import home
 
 if TYPE_CHECKING:
     import socket
@@ -142,6 +143,8 @@ async def _serve_rsp(
     return "" if error is None else f"the body failed: {error}"
 
 
+POSE = "nominal"
+"""Pose to begin in, unless told otherwise; see `vrs.model.home`."""
 LISTEN = "127.0.0.1:8601"
 """Where an operator's site connects, unless told otherwise."""
 
@@ -201,7 +204,7 @@ def robot(
     ] = 0.05,
     body: BodyName = "",
     friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
-    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = "nominal",
+    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = POSE,
     reports: Annotated[
         float, typer.Option("--reports", metavar="N", help="How often it says where it is [1/s], 1 to 200.")
     ] = 30.0,
@@ -217,7 +220,7 @@ def robot(
             "listen": (listen, LISTEN), "architecture": (architecture, ARCHITECTURE),
             "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "timeout": (timeout, 0.5),
             "operator-loss": (operator_loss, OPERATOR_LOSS), "max-age": (max_age, 0.5), "lead": (lead, 0.05),
-            "body": (body, ""), "friction": (friction, True), "pose": (pose, "nominal"),
+            "body": (body, ""), "friction": (friction, True), "pose": (pose, POSE),
             "reports": (reports, 30.0), "reached-as": (reached_as, None),
         })  # fmt: skip
         thin_client(
@@ -240,7 +243,7 @@ def robot(
     if chosen.is_base:
         without(name, {
             "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, ""),
-            "friction": (friction, True), "pose": (pose, "nominal"),
+            "friction": (friction, True), "pose": (pose, POSE),
         })  # fmt: skip
         run_mobile(
             chosen, listen, architecture=architecture, room=room, link_loss=link_loss, watchdog=(timeout, max_age),
@@ -254,7 +257,7 @@ def robot(
     })  # fmt: skip
     address = parse_address("--listen", listen)
     model = chosen.arm
-    q = model.poses[one_of("pose", pose, sorted(model.poses))]
+    q = home(model) if pose == POSE else model.poses[one_of("pose", pose, sorted(model.poses))]
     chosen.body(body)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("lead", lead, 0.01, 0.3, unit=" s")

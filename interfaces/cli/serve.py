@@ -50,6 +50,7 @@ from interfaces.system import software
 from robots.robot import USUAL, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
+from vrs.model import home
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -331,7 +332,7 @@ async def _serve(
 
         model = arm.arm
         config = LiveOperatorConfig(
-            arm, model.poses["nominal"], "", conditions, robot_token, seed,
+            arm, home(model), "", conditions, robot_token, seed,
             server=software(), recording=recording, link_loss=link_loss,
         )  # fmt: skip
         operator = LiveOperator(config, access)

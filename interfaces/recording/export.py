@@ -19,7 +19,7 @@ from interfaces.recording.recording import ARM, Recording
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import ArcTimeline
-from vrs.model import Array
+from vrs.model import Array, unit_of
 
 RADIANS = "rad"
 _POSE = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""))
@@ -74,8 +74,12 @@ def seconds(name: str, values: Sequence[float | None]) -> TableColumn:
     return TableColumn(f"{name}_s", "s", float, values)
 
 
-def _joints(name: str, q: Array) -> list[TableColumn]:
-    return [TableColumn(f"{name}{i}_rad", RADIANS, float, column.tolist()) for i, column in enumerate(q.T, start=1)]
+def _joints(recording: Recording, name: str, q: Array) -> list[TableColumn]:
+    units = [unit_of(j, recording.prismatic) for j in range(q.shape[1])]
+    return [
+        TableColumn(f"{name}{i}_{unit}", unit, float, column.tolist())
+        for i, (column, unit) in enumerate(zip(q.T, units, strict=True), start=1)
+    ]
 
 
 def _pose(X: Array) -> list[TableColumn]:
@@ -100,7 +104,7 @@ def _tool(recording: Recording, q: Array) -> list[TableColumn]:
 def _virtual(recording: Recording) -> RecordingTable:
     t = recording.track(VIRTUAL).t
     q = recording.virtual(t)
-    return table("virtual", seconds("t", t.tolist()), _joints("q", q), _tool(recording, q))
+    return table("virtual", seconds("t", t.tolist()), _joints(recording, "q", q), _tool(recording, q))
 
 
 def _real(recording: Recording) -> RecordingTable:
@@ -109,8 +113,8 @@ def _real(recording: Recording) -> RecordingTable:
         "real",
         seconds("t", track.t.tolist()),
         seconds("play", track.play.tolist()),
-        _joints("q", track.q),
-        _joints("reference", track.reference),
+        _joints(recording, "q", track.q),
+        _joints(recording, "reference", track.reference),
         _tool(recording, track.q),
     )
 
@@ -136,7 +140,7 @@ def commands_table(recording: Recording) -> RecordingTable:
         TableColumn("command_id", "", int, told("command_id")),
         TableColumn("status", "", str, [None if status is None else str(status) for status in told("status")]),
         [seconds(name, told(name)) for name in _STAMPS],
-        _joints("q", q),
+        _joints(recording, "q", q),
         TableColumn("refused", "", bool, [isinstance(entry, CommandEntry) and entry.refused for entry in entries]),
         TableColumn("reason", "", str, [_reason(entry) for entry in entries]),
         TableColumn("content", "", str, [_content(entry) for entry in entries]),
@@ -190,6 +194,7 @@ def _segments(recording: Recording) -> RecordingTable:
         for joint, powers in enumerate(segment.coefficients.T.tolist(), start=1):
             rows.append((number, segment.start, segment.duration, segment.command_id, joint, powers))
     most = max((len(row[-1]) for row in rows), default=1)
+    base = f"{RADIANS}_or_m" if recording.prismatic else RADIANS
     return table(
         "segments",
         TableColumn("segment", "", int, [row[0] for row in rows]),
@@ -199,16 +204,19 @@ def _segments(recording: Recording) -> RecordingTable:
         TableColumn("joint", "", int, [row[4] for row in rows]),
         [
             TableColumn(
-                f"c{k}_{_power(k, '_per_')}", _power(k, "/"), float, [(row[5] + [0.0] * most)[k] for row in rows]
+                f"c{k}_{_power(base, k, '_per_')}",
+                _power(base, k, "/"),
+                float,
+                [(row[5] + [0.0] * most)[k] for row in rows],
             )
             for k in range(most)
         ],
     )
 
 
-def _power(k: int, per: str) -> str:
+def _power(base: str, k: int, per: str) -> str:
     """Unit of a coefficient of a power."""
-    return RADIANS if k == 0 else f"{RADIANS}{per}s{k if k > 1 else ''}"
+    return base if k == 0 else f"{base}{per}s{k if k > 1 else ''}"
 
 
 def edits_table(recording: Recording) -> RecordingTable:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -210,6 +210,19 @@ class Recording:
         if self.session.drive is not None:
             raise FormatError(str(self.path), "of a mobile robot, which has no joints")
         return self.robot.arm
+
+    @property
+    def prismatic(self) -> Collection[int]:
+        """Joints that are, from 0; none where the robot has none, or isn't known."""
+        try:
+            return () if self.session.drive is not None else self.model.prismatic
+        except FormatError:
+            return ()
+
+    @property
+    def unit(self) -> str:
+        """Of how far the real robot is from the virtual one: `rad`, or `m` of an arm without a joint that turns."""
+        return "m" if len(self.prismatic) == len(self.session.q) else self.kind.unit
 
     @property
     def span(self) -> tuple[float, float]:

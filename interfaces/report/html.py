@@ -60,7 +60,7 @@ def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
         licences=escape(licences),
         data=_script_json(scene(run)),
         viewer=_script(viewer),
-        script=_script(_asset("report.js")),
+        script=_script(_chain() + _asset("report.js")),
     )
 
 
@@ -110,6 +110,12 @@ def _events(run: TwinRun) -> str:
 
 def _asset(name: str) -> str:
     return resources.files("interfaces.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _chain() -> str:
+    """The station's `Chain`, as a plain script."""
+    text = resources.files("interfaces.station").joinpath("static/chain.js").read_text(encoding="utf-8")
+    return text.replace("export ", "")
 
 
 def _script_json(value: object) -> str:

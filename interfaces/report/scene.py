@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.runs.twin_run import TwinRun
-from vrs.errors import InvalidValueError
-from vrs.model import Array, RobotModel
+from interfaces.station.chain import described
+from vrs.model import Array
 
 if TYPE_CHECKING:
     from robots.solids import LinkShape
@@ -26,22 +26,20 @@ def scene(run: TwinRun) -> Json:
     """Describe both twins for the viewer.
 
     Returns:
-        A JSON value: `links` (meshes in link frames), `base` and `chain` (constant transforms, column-major),
-        `t`, `q_virtual`, `q_real` (NaN where nothing was measured), `behind` (−D; base64 of little-endian
+        A JSON value: `links` (meshes in link frames), `chain` (see `interfaces.station.chain.described`), `t`,
+         `q_virtual`, `q_real` (NaN where nothing was measured), `behind` (−D; base64 of little-endian
         float32), `floor`, `box` and `markers`.
 
     Raises:
-        InvalidValueError: If the model isn't a chain of revolute joints in standard Denavit-Hartenberg frames.
+        InvalidValueError: If the model isn't a chain of revolute and prismatic joints.
     """
     stride = max(1, -(-len(run.t) // MAX_SAMPLES))
-    base, chain = revolute_chain(run.model)
     shapes = run.robot.shapes()
-    floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=-0.7)
+    floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
     low, high = _box(run, floor)
     return {
         "links": [_mesh(shape) for shape in shapes],
-        "base": _column_major(base),
-        "chain": [_column_major(X) for X in chain],
+        "chain": described(run.model, np.array(run.robot.tool)),
         "t": _packed(run.t[::stride] - run.t[0]),
         "t_start": float(run.t[0]),
         "t_end": float(run.t[::stride][-1]),
@@ -52,29 +50,6 @@ def scene(run: TwinRun) -> Json:
         "box": [low, high],
         "markers": markers(run),
     }
-
-
-def revolute_chain(model: RobotModel) -> tuple[Array, Array]:
-    """Split a model's kinematics into constants, so that X_i = X_(i-1) Rz(q_i) A_i.
-
-    Returns:
-        The base pose, (4, 4), and A, (n, 4, 4).
-
-    Raises:
-        InvalidValueError: If the model's links don't move so.
-    """
-    n = model.limits.dof
-    rest = np.asarray(model.links(np.zeros(n)))
-    A = np.linalg.inv(rest[:-1]) @ rest[1:]
-    q = 0.3 + 0.4 * np.arange(n)
-    X = rest[0]
-    for i, angle in enumerate(q):
-        turn = np.eye(4)
-        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-        X = X @ turn @ A[i]
-        if not np.allclose(X, np.asarray(model.links(q))[i + 1], atol=1e-9):
-            raise InvalidValueError("model", model.name, "a chain of revolute joints about their z axes")
-    return rest[0], A
 
 
 def markers(run: TwinRun) -> list[Json]:
@@ -115,10 +90,6 @@ def _mesh(shape: LinkShape) -> Json:
         "colours": _base64(index.astype(np.uint8)),
         "palette": [[float(x) for x in colour] for colour in palette],
     }
-
-
-def _column_major(X: Array) -> list[float]:
-    return [float(x) for x in X.T.ravel()]
 
 
 def _packed(values: Array | Sequence[float]) -> str:

@@ -81,7 +81,7 @@ class PhysicsConfig:
     def __post_init__(self) -> None:
         limits = self.robot.arm.limits
         q = finite_array("q", self.q, (limits.dof,), f"finite joint values [rad], shape ({limits.dof},)")
-        limits.check(q)
+        limits.check(q, self.robot.arm.prismatic)
         object.__setattr__(self, "q", q)
         object.__setattr__(self, "body", self.body or self.robot.usual_body)
         self.robot.body(self.body)
@@ -163,6 +163,7 @@ class PhysicsProcess:
             PhysicsSetup(
                 config.robot.found_by, config.body, config.friction, TICK, config.every, clock.origin, os.getpid(),
                 tuple(config.q.tolist()), tuple(tuple(bound.tolist()) for bound in bounds),  # type: ignore[arg-type]
+                tuple(config.robot.arm.prismatic),
             )
         )  # fmt: skip
 

@@ -72,7 +72,9 @@ class PhysicsSetup(msgspec.Struct, frozen=True, tag="setup"):
     q: Row
     """Where the body stands [rad]."""
     limits: tuple[Row, Row, Row, Row, Row]
-    """q_min, q_max [rad], qd_max [rad/s], qdd_max [rad/s²], qddd_max [rad/s³]."""
+    """q_min, q_max [rad], qd_max [rad/s], qdd_max [rad/s²], qddd_max [rad/s³]; of prismatic joints in m for rad."""
+    prismatic: tuple[int, ...] = ()
+    """Which are, from 0."""
 
     def joint_limits(self) -> Limits:
         """The limits as a value."""

@@ -146,6 +146,7 @@ def run(connection: socket.socket) -> int:
             every=setup.every,
             now=clock.now(),
             realtime=realtime,
+            prismatic=setup.prismatic,
         )
         _tick(loop, parent, clock)
     connection.settimeout(_LAST_WORDS)

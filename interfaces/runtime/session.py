@@ -169,7 +169,7 @@ class TwinSession:
         self._messages += there
         self._lost |= {m.sent for m in there if m.lost is not None or m.attempts > 1}
         packets = self._settle()
-        self._events += correction_events(corrections[self._corrected :])
+        self._events += correction_events(corrections[self._corrected :], self._model.prismatic)
         self._corrected = len(corrections)
         for epoch in sorted(lab.halts.keys() - self._halted):
             self._halted.add(epoch)

@@ -18,6 +18,7 @@ from interfaces.val2.source import SourceFile
 from robots.robot import Robot
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt
+from vrs.model import home
 
 LONGEST: Final = 600.0
 """How long a program may take [s], by default."""
@@ -112,7 +113,7 @@ def play(
     Raises:
         ValError: If the program can't be begun.
     """
-    start = robot.arm.poses["nominal"]
+    start = home(robot.arm)
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
     with (arm or robot.body())(start) as body:
         session = TwinSession(

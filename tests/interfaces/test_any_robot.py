@@ -1,0 +1,129 @@
+"""Robots that nobody here knows: made up in a few lines, they go through every room that takes a robot."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from interfaces.cli.main import app, exit_status
+from tests.interfaces import own_arm
+
+HERE = Path(__file__).parent
+ARM = "tests.interfaces.own_arm:ROBOT"
+PLAN = """{"title": "Lifting"}
+{"issue": 0.0, "execute": 0.5, "move": [40, 0.4, -60], "speed": 0.8}
+{"issue": 1.0, "payload": {"mass_kg": 2.0}}
+{"issue": 2.0, "execute": 2.5, "move": {"pose": "low"}}
+"""
+
+
+def vrs(*arguments: object) -> str:
+    """What a command says on standard output; it ends well."""
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def code_lines(path: Path) -> int:
+    """Lines of a module that aren't blank, documentation or imports."""
+    text = path.read_text(encoding="utf-8")
+    left: set[int] = set()
+    for node in ast.walk(ast.parse(text)):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and body and isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            first = body[0]
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                left |= set(range(first.lineno, (first.end_lineno or 0) + 1))
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            left |= set(range(node.lineno, (node.end_lineno or 0) + 1))
+    return sum(bool(line.strip()) and number not in left for number, line in enumerate(text.splitlines(), start=1))
+
+
+def test_a_robot_is_made_up_in_60_lines() -> None:
+    assert code_lines(Path(own_arm.__file__)) <= 60
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a demo of the arm leaves."""
+    out = tmp_path_factory.mktemp("arm")
+    (out / "plan.jsonl").write_text(PLAN)
+    vrs("demo", "--robot", ARM, "--commands", out / "plan.jsonl", "--delay", "wed", "--out", out / "out")
+    return out / "out"
+
+
+def test_a_demo_tells_joints_that_turn_in_degrees_and_those_that_slide_in_metres(demo: Path) -> None:
+    summary = json.loads((demo / "summary.json").read_text())
+    assert summary["robot"] == "crane"
+    servo = summary["errors"]["servo"]
+    assert [x is None for x in servo["joint_rms_deg"]] == [False, True, False]
+    assert [x is None for x in servo["joint_rms_m"]] == [True, False, True]
+    # Its load of 2 kg is taken in mid-run, and it sags by a millimetre a kilogram.
+    assert servo["joint_max_m"][1] == pytest.approx(2e-3, abs=1e-3)
+    assert servo["worst_joint"] == 2
+    assert summary["receipts_virtual"][0]["q_m"] == [None, 0.4, None]
+    assert summary["receipts_virtual"][0]["q_deg"] == pytest.approx([40.0, None, -60.0])
+    assert summary["commands"]["real"]["accepted"] == 2
+
+
+def test_its_recording_says_what_the_run_said(demo: Path, tmp_path: Path) -> None:
+    path = demo / "run.mcap"
+    assert vrs("compare", path, "--robot", ARM, "--json") == (demo / "summary.json").read_text()
+    assert "2 commands and corrections, 2 timelines compared" in vrs("replay", path, "--commands", "--robot", ARM)
+    shown = json.loads(vrs("replay", path, "--headless", "--at", 2.0, "--json", "--robot", ARM).splitlines()[-1])
+    assert shown["q_virtual"] == pytest.approx([np.radians(40), 0.4, np.radians(-60)])
+    vrs("export", path, "--csv", tmp_path, "--report", tmp_path / "report.html", "--robot", ARM)
+    assert (tmp_path / "report.html").read_bytes() == (demo / "report.html").read_bytes()
+    with open(tmp_path / "real.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {"q1_rad", "q2_m", "q3_rad", "reference2_m"} <= rows[0].keys()
+    last = [float(rows[-1][name]) for name in ("q1_rad", "q2_m", "q3_rad")]
+    assert last == pytest.approx([0.5, 0.05 - 2e-3, -1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("arguments", [("compare",), ("replay", "--commands"), ("export", "--report", "r.html")])
+def test_without_the_robot_its_recording_says_what_is_missing(
+    demo: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, *more = arguments
+    assert exit_status([name, str(demo / "run.mcap"), *more]) == 2
+    assert "of a robot that isn't known here: 'crane'; --robot says where it is" in capsys.readouterr().err
+
+
+def test_a_demo_needs_no_plan(tmp_path: Path) -> None:
+    vrs("demo", "--robot", ARM, "--delay", "none", "--out", tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["title"] == "Round trip"
+    assert summary["commands"]["virtual"]["rejected"] == 0
+    assert summary["path"]["progress"] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("move", "said"),
+    [("[40, 0.6, 0]", "joint 2 must be within [0, 0.5] m"),
+     ("[200, 0.1, 0]", "joint 1 must be within [-2.5, 2.5] rad"),
+     ("[1, 2]", "3 finite joint values [deg, of prismatic joints m]")],
+)  # fmt: skip
+def test_errors_are_in_the_joints_units(
+    tmp_path: Path, move: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "plan.jsonl").write_text(f'{{"issue": 0.0, "move": {move}}}')
+    asked = ["demo", "--robot", ARM, "--commands", str(tmp_path / "plan.jsonl"), "--out", str(tmp_path)]
+    assert exit_status(asked) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> None:
+    page = new_page((demo / "report.html").as_uri(), 1280, 900, "light", offline=True)
+    page.goto((demo / "report.html").as_uri())
+    page.wait_for_function("window.report !== undefined")
+    titles = page.locator("figure h3").all_text_contents()
+    assert {"Joint errors", "Errors of prismatic joints", "Joint 3"} <= set(titles)
+    assert page.locator("#no-3d").is_hidden()
