@@ -17,8 +17,7 @@
   const floats = (text) => new Float32Array(bytes(text));
 
   const times = floats(run.t);
-  const chain = new Chain(run.chain);
-  const n = chain.screws.length;
+  const n = run.chain.length;
   const behind = floats(run.behind);
   const samples = { virtual: floats(run.q_virtual), real: floats(run.q_real) };
   const duration = run.t_end - run.t_start;
@@ -55,6 +54,26 @@
     const span = times[high] - behind[high] - from;
     const share = span > 0 ? Math.min(1, Math.max(0, (tau - from) / span)) : 0;
     return times[low] + share * (times[high] - times[low]);
+  }
+
+  // Column-major products of rigid transforms, X_i = X_(i-1) Rz(q_i) A_i.
+  function times4(a, b) {
+    const out = new Array(16);
+    for (let c = 0; c < 4; c++)
+      for (let r = 0; r < 4; r++)
+        out[4 * c + r] =
+          a[r] * b[4 * c] + a[4 + r] * b[4 * c + 1] + a[8 + r] * b[4 * c + 2] + a[12 + r] * b[4 * c + 3];
+    return out;
+  }
+  function links(q) {
+    const out = [run.base];
+    for (let i = 0; i < n; i++) {
+      const c = Math.cos(q[i]);
+      const s = Math.sin(q[i]);
+      const turn = [c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+      out.push(times4(times4(out[i], turn), run.chain[i]));
+    }
+    return out;
   }
 
   // Corner normals: the mean of the faces around a corner that meet without a crease.
@@ -131,22 +150,12 @@
     return group;
   }
 
-  // A robot without shapes is a line through the origins of its links.
-  function bones(twin) {
-    const THREE = MeshCat.THREE;
-    const shape = new THREE.BufferGeometry();
-    shape.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * (n + 1)), 3));
-    const line = new THREE.Line(shape, new THREE.LineBasicMaterial({ color: COLOURS[twin], linewidth: 2 }));
-    line.frustumCulled = false;
-    return line;
-  }
-
   function trace(twin) {
     const THREE = MeshCat.THREE;
     const points = new Float32Array(3 * times.length);
     for (let k = 0; k < times.length; k++) {
       const q = Array.from(samples[twin].subarray(k * n, (k + 1) * n));
-      points.set(chain.links(q)[n].slice(12, 15), 3 * k);
+      points.set(links(q)[n].slice(12, 15), 3 * k);
     }
     const attribute = new THREE.BufferAttribute(points, 3);
     const make = () => new THREE.BufferGeometry().setAttribute("position", attribute);
@@ -188,8 +197,7 @@
     dark.addEventListener("change", floor);
 
     const meshes = run.links.map(geometry);
-    const drawn = meshes.length ? (twin) => body(twin, meshes) : bones;
-    const twins = { virtual: drawn("virtual"), real: drawn("real") };
+    const twins = { virtual: body("virtual", meshes), real: body("real", meshes) };
     const traces = { virtual: trace("virtual"), real: trace("real") };
     for (const twin of ["real", "virtual"]) {
       viewer.set_object(["twins", twin], twins[twin]);
@@ -225,14 +233,9 @@
       home,
       show(t, tReal) {
         for (const [twin, at] of [["virtual", t], ["real", tReal]]) {
-          const poses = chain.links(joints(twin, at));
+          const poses = links(joints(twin, at));
           // Where nothing was measured, there's no robot.
           twins[twin].visible = poses[n].every(Number.isFinite);
-          if (!meshes.length) {
-            const place = twins[twin].geometry.getAttribute("position");
-            poses.forEach((X, i) => place.setXYZ(i, X[12], X[13], X[14]));
-            place.needsUpdate = true;
-          }
           twins[twin].children.forEach((link, i) => {
             link.matrix.fromArray(poses[i]);
             link.matrixWorldNeedsUpdate = true;
@@ -332,5 +335,5 @@
     });
 
   seek(0);
-  window.report = { links: (q) => chain.links(q), joints, whenPlayed, seek, play, scene, time: () => t + run.t_start };
+  window.report = { links, joints, whenPlayed, seek, play, scene, time: () => t + run.t_start };
 })();

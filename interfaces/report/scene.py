@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.runs.twin_run import TwinRun
-from interfaces.station.chain import described
-from vrs.model import Array
+from interfaces.station.chain import screws
+from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
     from robots.solids import LinkShape
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 MAX_SAMPLES: Final = 24_000
 """Most samples of a twin that a page carries; longer runs are thinned."""
 
+_THICK: Final = 0.02
+"""Half of the thickness of a knob [m]."""
 Json = dict[str, Any]
 
 
@@ -26,7 +29,7 @@ def scene(run: TwinRun) -> Json:
     """Describe both twins for the viewer.
 
     Returns:
-        A JSON value: `links` (meshes in link frames), `chain` (see `interfaces.station.chain.described`), `t`,
+        A JSON value: `links` (meshes in link frames), the chain (see `chain_of`), `t`,
          `q_virtual`, `q_real` (NaN where nothing was measured), `behind` (−D; base64 of little-endian
         float32), `floor`, `box` and `markers`.
 
@@ -34,12 +37,12 @@ def scene(run: TwinRun) -> Json:
         InvalidValueError: If the model isn't a chain of revolute and prismatic joints.
     """
     stride = max(1, -(-len(run.t) // MAX_SAMPLES))
-    shapes = run.robot.shapes()
+    shapes = run.robot.shapes() or rods(run.model)
     floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
     low, high = _box(run, floor)
     return {
         "links": [_mesh(shape) for shape in shapes],
-        "chain": described(run.model, np.array(run.robot.tool)),
+        **chain_of(run.model),
         "t": _packed(run.t[::stride] - run.t[0]),
         "t_start": float(run.t[0]),
         "t_end": float(run.t[::stride][-1]),
@@ -50,6 +53,51 @@ def scene(run: TwinRun) -> Json:
         "box": [low, high],
         "markers": markers(run),
     }
+
+
+def chain_of(model: RobotModel) -> Json:
+    """A model's kinematics, as the page's script takes them.
+
+    Returns:
+        `base` and `chain`, constant transforms, column-major, so that X_i = X_(i-1) Rz(q_i) A_i; where the model
+        doesn't move so, `home` and `chain` from `interfaces.station.chain.screws`.
+
+    Raises:
+        InvalidValueError: If the model isn't a chain of revolute and prismatic joints.
+    """
+    n = model.limits.dof
+    rest = np.asarray(model.links(np.zeros(n)))
+    A = np.linalg.inv(rest[:-1]) @ rest[1:]
+    q = 0.3 + 0.4 * np.arange(n)
+    X = rest[0]
+    for i, angle in enumerate(q):
+        turn = np.eye(4)
+        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        X = X @ turn @ A[i]
+        if not np.allclose(X, np.asarray(model.links(q))[i + 1], atol=1e-9):
+            home, S = screws(model)
+            return {"home": [_column_major(X) for X in home], "chain": S.tolist()}
+    return {"base": _column_major(rest[0]), "chain": [_column_major(X) for X in A]}
+
+
+def rods(model: RobotModel) -> tuple[LinkShape, ...]:
+    """What an arm without shapes is drawn as: a knob a link, and a rod from the one before where that's constant."""
+    from robots.solids import Builder, hull
+
+    low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
+    corners = _THICK * np.array(list(product((-1.0, 1.0), repeat=3)))
+    found = []
+    for i in range(model.limits.dof + 1):
+        build = Builder(f"link {i}", (0.62, 0.64, 0.67))
+        build.add(hull(corners))
+        if i:
+            one, other = (
+                (np.linalg.inv(X[i]) @ X[i - 1])[:3, 3] for X in model.links(low + np.outer((0.4, 0.6), span))
+            )
+            if np.allclose(one, other, atol=1e-9) and np.linalg.norm(one) > _THICK:
+                build.add(hull(np.vstack([0.4 * corners, one + 0.4 * corners])))
+        found.append(build.shape())
+    return tuple(found)
 
 
 def markers(run: TwinRun) -> list[Json]:
@@ -90,6 +138,10 @@ def _mesh(shape: LinkShape) -> Json:
         "colours": _base64(index.astype(np.uint8)),
         "palette": [[float(x) for x in colour] for colour in palette],
     }
+
+
+def _column_major(X: Array) -> list[float]:
+    return [float(x) for x in X.T.ravel()]
 
 
 def _packed(values: Array | Sequence[float]) -> str:

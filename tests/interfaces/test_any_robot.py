@@ -127,3 +127,11 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
     titles = page.locator("figure h3").all_text_contents()
     assert {"Joint errors", "Errors of prismatic joints", "Joint 3"} <= set(titles)
     assert page.locator("#no-3d").is_hidden()
+    q = np.array([0.7, 0.4, -1.0])
+    np.testing.assert_allclose(
+        page.evaluate("(q) => report.links(q)", q.tolist()),
+        [X.T.ravel() for X in own_arm.ROBOT.arm.links(q)],
+        atol=1e-9,
+    )
+    shapes = json.loads(page.locator("#run-data").text_content())["links"]
+    assert [shape["name"] for shape in shapes] == ["link 0", "link 1", "link 2", "link 3"]

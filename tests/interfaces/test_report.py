@@ -12,11 +12,10 @@ import pytest
 
 from interfaces.report.html import render, write_report
 from interfaces.report.plots import plots
-from interfaces.report.scene import scene
+from interfaces.report.scene import chain_of, scene
 from interfaces.report.tables import time_lines
 from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import CommandPacket, RunEvent, TwinRun
-from interfaces.station.chain import place
 from interfaces.teleop import Correction
 from robots import load, puma560
 from vrs.ledger import Receipt, Status
@@ -110,10 +109,16 @@ def test_a_summary_of_other_names_is_still_shown() -> None:
 
 
 def test_the_chain_rebuilds_the_models_links() -> None:
-    chain = scene(make_run())["chain"]
+    model = puma560.model()
+    chain = chain_of(model)
+    base, *A = (np.reshape(X, (4, 4)).T for X in (chain["base"], *chain["chain"]))
     q = np.random.default_rng(3).uniform(-2, 2, 6)
-    home = np.array(chain["home"]).reshape(7, 4, 4).swapaxes(1, 2)
-    np.testing.assert_allclose(place(home, np.array(chain["screws"]), q), puma560.model().links(q), atol=1e-12)
+    X = base
+    for i in range(6):
+        turn = np.eye(4)
+        turn[:2, :2] = [[np.cos(q[i]), -np.sin(q[i])], [np.sin(q[i]), np.cos(q[i])]]
+        X = X @ turn @ A[i]
+        np.testing.assert_allclose(X, model.links(q)[i + 1], atol=1e-12)
 
 
 def test_the_summary_takes_the_clock_offset_out_and_says_what_it_was() -> None:
