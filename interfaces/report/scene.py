@@ -81,7 +81,7 @@ def chain_of(model: RobotModel) -> Json:
 
 
 def rods(model: RobotModel) -> tuple[LinkShape, ...]:
-    """What an arm without shapes is drawn as: a knob a link, and a rod from the one before where that's constant."""
+    """What an arm without shapes is drawn as: a knob a link, a rod from the one before where that's constant."""
     from robots.solids import Builder, hull
 
     low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
