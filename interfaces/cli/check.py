@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.options import RobotName
+from interfaces.cli.options import RobotName, val_robot
 from interfaces.cli.run import text_of
-from robots.robot import USUAL, load
+from robots.robot import USUAL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +41,7 @@ def check(
     source, found = check_text(text_of(program), program.name)
     wrong = any(finding.severity == "error" for finding in found)
     if source is not None and not static and not wrong:
-        found += _rehearsed(source, load(name).arm)
+        found += _rehearsed(source, val_robot(name).arm)
     found = _once(found)
     wrong = any(finding.severity == "error" for finding in found)
     if as_json:

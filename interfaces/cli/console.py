@@ -14,9 +14,9 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from interfaces.cli.options import RobotName
+from interfaces.cli.options import RobotName, val_robot
 from interfaces.system import software
-from robots.robot import USUAL, load
+from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import home
 
@@ -67,7 +67,7 @@ def console(
         raise InvalidValueError("delay", delay, "left out with --connect and --alone: no robot is begun here")
     if name != USUAL and connect is not None:
         raise InvalidValueError("robot", name, "left out with --connect: the server has its own")
-    robot = load(name)
+    robot = val_robot(name)
     if not files.is_dir():
         raise InvalidValueError("files", str(files), "a directory")
     delay_profile(delay)

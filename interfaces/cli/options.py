@@ -49,6 +49,8 @@ Order: TypeAlias = Annotated[
 Out: TypeAlias = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Where report.html, summary.json and run.mcap go.")
 ]
+VAL_JOINTS = 6
+"""Joints that VAL-II's places have."""
 RobotName: TypeAlias = Annotated[
     str,
     typer.Option(
@@ -100,6 +102,23 @@ _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(:[0-9]{1,5})?", re.IGNORECAS
 def recorded_robot(name: str | None) -> Robot | None:
     """The robot that `RecordedRobot` asks for, if it does."""
     return None if name is None else load(name)
+
+
+def speaks_val(robot: Robot) -> bool:
+    """Whether VAL-II has places for a robot: an arm of six joints that turn."""
+    return not robot.is_base and robot.arm.limits.dof == VAL_JOINTS and not robot.arm.prismatic
+
+
+def val_robot(name: str) -> Robot:
+    """A robot for VAL-II.
+
+    Raises:
+        InvalidValueError: If there's none of that name, or VAL-II has no places for it.
+    """
+    robot = load(name)
+    if not speaks_val(robot):
+        raise InvalidValueError("robot", name, f"an arm of {VAL_JOINTS} joints that turn, as VAL-II has places for")
+    return robot
 
 
 def is_loopback(host: str) -> bool:

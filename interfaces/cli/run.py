@@ -20,9 +20,9 @@ from interfaces.cli.demo import (
     show,
     write,
 )
-from interfaces.cli.options import Delay, Offset, Order, Out, RobotName
+from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, val_robot
 from interfaces.system import read_within
-from robots.robot import USUAL, load
+from robots.robot import USUAL
 
 if TYPE_CHECKING:
     from interfaces.val2.source import SourceFile
@@ -59,7 +59,7 @@ def run(
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    source, robot = read(program), load(name)
+    source, robot = read(program), val_robot(name)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(

@@ -44,6 +44,7 @@ from interfaces.cli.options import (
     keep_quiet,
     say_lost,
     say_robot,
+    speaks_val,
     start_robot,
 )
 from interfaces.system import software
@@ -212,6 +213,8 @@ def serve(
         "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM), "jobs": (jobs, JOBS),
         "operator-loss": (operator_loss, OPERATOR_LOSS), "camera": (camera, CAMERA),
     })  # fmt: skip
+    if not speaks_val(robot):
+        without(robot.name, {"val-port": (val_port, None), "val-files": (val_files, Path())})
     behind = spelled(fixed_offset(offset, profile))
     options = ["--robot", name, "--offset", behind, "--max-age", f"{max_age:g}"]
     options += ["--body", body] if body else []
@@ -322,6 +325,7 @@ async def _serve(
         from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
         from interfaces.station.chain import described
         from interfaces.station.page import Station
+        from interfaces.station.panels import PANELS
         from interfaces.station.record import RecordingFacts, Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
@@ -337,7 +341,8 @@ async def _serve(
         )  # fmt: skip
         operator = LiveOperator(config, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
-        station = Station(described(model, operator.scene.tool))
+        panels = tuple(panel for panel in PANELS if speaks_val(arm) or panel.name != "terminal")
+        station = Station(described(model, operator.scene.tool), panels=panels)
         shown = Address(host, port)
         near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}/ws", doors.own_token, access, doors.val_files, software())

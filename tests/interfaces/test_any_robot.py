@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 
 from interfaces.cli.main import app, exit_status
 from tests.interfaces import own_arm
+from tests.interfaces.live_rig import child
+from tests.interfaces.station.opened import Page, station
 
 HERE = Path(__file__).parent
 ARM = "tests.interfaces.own_arm:ROBOT"
@@ -135,3 +137,46 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
     )
     shapes = json.loads(page.locator("#run-data").text_content())["links"]
     assert [shape["name"] for shape in shapes] == ["link 0", "link 1", "link 2", "link 3"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("serve", "--robot", ARM, "--val-port", "0"), "val-port must be left out"),
+        (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, exact"),
+        (("console", "--robot", ARM), "an arm of 6 joints that turn"),
+        (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),
+        (("lab", "--robot", ARM, "--out", "."), "a mobile robot; this one is an arm"),
+        (("demo", "--robot", "tests.interfaces.own_arm:Crane"), "a Robot there (ROBOT)"),
+        (("demo", "--robot", "crane.urdf"), "aren't read from files yet"),
+    ],
+)
+def test_doors_say_which_robots_they_take(
+    arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_status(list(arguments)) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_it_is_driven_live_seen_on_the_page_and_recorded(tmp_path: Path, new_page: Any) -> None:
+    path = tmp_path / "live.mcap"
+    with child("serve", "--port", "0", "--robot", ARM, "--link-loss", "hold", "--record", str(path)) as server:
+        url = station(server)
+        page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open()
+        assert not page.get("station.config.panels.some((panel) => panel.name === 'terminal')")
+        page.take_control()
+        page.get(
+            "station.session.order({ type: 'move', target: { type: 'joints', q: [0.5, 0.35, -0.5] }, "
+            "insertion: 'replace' }, 'lift')"
+        )
+        page.until(lambda: np.allclose(page.real, [0.5, 0.35, -0.5], atol=2e-3))
+        page.wait("document.querySelectorAll('.joint .value')[1].textContent === '0.350 m'")
+        page.wait("document.querySelectorAll('.joint .value')[0].textContent === '28.6°'")
+        assert page.errors == []
+        page.page.context.close()
+    summary = json.loads(vrs("compare", path, "--robot", ARM, "--json"))
+    assert summary["robot"] == "crane"
+    assert summary["receipts_virtual"][-1]["q_m"] == [None, 0.35, None]
+    assert "identical" in vrs("replay", path, "--commands", "--robot", ARM)
