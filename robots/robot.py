@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robots.base import MobileBase
+from robots.base import MobileBase, box_shape, upright
 from robots.solids import LinkShape
 from vrs.checks import one_of
 from vrs.errors import FormatError, InvalidValueError
@@ -182,7 +182,7 @@ class Robot:
     model: RobotModel | MobileBase
     """What an engine needs: limits, named poses, kinematics; or, of a base, its limits and wheels."""
     appearance: Appearance | None = None
-    """None draws an arm's frames and traces."""
+    """None draws a base as a box, an arm as its frames and traces."""
     bodies: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     """What can be real of it, by name, the usual one first. Of an arm an `ArmMaker` each; of a base what makes a
     `robots.ipr.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
@@ -225,12 +225,16 @@ class Robot:
         return (0.0, 0.0, 0.0) if gripper is None else gripper.point
 
     def shapes(self) -> tuple[LinkShape, ...]:
-        """Its shapes; none where it has no appearance."""
-        return () if self.appearance is None else tuple(self.appearance.shapes())
+        """Its shapes; without an appearance a mobile robot is a box, and an arm has none."""
+        if self.appearance is None:
+            return (box_shape(self.base.body),) if self.is_base else ()
+        return tuple(self.appearance.shapes())
 
     def placed(self, where: ArrayLike) -> Array:
         """Poses of its shapes, (m, 4, 4), at joints (n,) or at a posture (x, y, θ), (3,)."""
-        return np.empty((0, 4, 4)) if self.appearance is None else self.appearance.poses(where)
+        if self.appearance is None:
+            return upright(*np.asarray(where).tolist())[None] if self.is_base else np.empty((0, 4, 4))
+        return self.appearance.poses(where)
 
     def device(self, kind: type[_D]) -> _D | None:
         """What it carries of a kind; None where it carries none."""

@@ -5,20 +5,25 @@ from __future__ import annotations
 import ast
 import csv
 import json
+import time
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from interfaces import connect_mobile
 from interfaces.cli.main import app, exit_status
-from tests.interfaces import own_arm
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import DriveCase
+from tests.interfaces import own_arm, own_base
 from tests.interfaces.live_rig import child
 from tests.interfaces.station.opened import Page, station
 
 HERE = Path(__file__).parent
-ARM = "tests.interfaces.own_arm:ROBOT"
+ARM, BASE = "tests.interfaces.own_arm:ROBOT", "tests.interfaces.own_base:ROBOT"
 PLAN = """{"title": "Lifting"}
 {"issue": 0.0, "execute": 0.5, "move": [40, 0.4, -60], "speed": 0.8}
 {"issue": 1.0, "payload": {"mass_kg": 2.0}}
@@ -48,8 +53,9 @@ def code_lines(path: Path) -> int:
     return sum(bool(line.strip()) and number not in left for number, line in enumerate(text.splitlines(), start=1))
 
 
-def test_a_robot_is_made_up_in_60_lines() -> None:
-    assert code_lines(Path(own_arm.__file__)) <= 60
+@pytest.mark.parametrize("module", [own_arm, own_base])
+def test_a_robot_is_made_up_in_60_lines(module: ModuleType) -> None:
+    assert code_lines(Path(str(module.__file__))) <= 60
 
 
 @pytest.fixture(scope="module")
@@ -180,3 +186,57 @@ def test_it_is_driven_live_seen_on_the_page_and_recorded(tmp_path: Path, new_pag
     assert summary["robot"] == "crane"
     assert summary["receipts_virtual"][-1]["q_m"] == [None, 0.35, None]
     assert "identical" in vrs("replay", path, "--commands", "--robot", ARM)
+
+
+def test_a_base_of_another_size_drives_in_the_laboratory(tmp_path: Path) -> None:
+    case = DriveCase(robot=BASE, operator="slalom", delay="constant:0.3", length=5.0)
+    drive = run(case)
+    assert 0.1 < np.abs(drive.drives[:, 0]).max() <= own_base.LIMITS.v_max
+    assert drive.limits_passed() == 0
+    assert drive.compare().path_error_max < 0.05
+    vrs(
+        "lab",
+        "--robot",
+        BASE,
+        "--operator",
+        "slalom",
+        "--runs",
+        1,
+        "--length",
+        2,
+        "--workers",
+        1,
+        "--out",
+        tmp_path,
+    )
+    with open(tmp_path / "runs.csv", newline="") as file:
+        assert {row["robot"] for row in csv.DictReader(file)} == {BASE}
+
+
+def test_a_base_without_shapes_is_a_box_where_it_stands() -> None:
+    (box,) = own_base.ROBOT.shapes()
+    front = own_base.CHASSIS.centre_x + own_base.CHASSIS.length / 2
+    assert box.vertices[:, 0].max() == pytest.approx(front)
+    assert box.vertices[:, 0].min() == pytest.approx(front - own_base.CHASSIS.length)
+    (X,) = own_base.ROBOT.placed((1.0, 2.0, np.pi / 2))
+    assert pytest.approx([1.0, 3.0, 0.0, 1.0]) == X @ [1, 0, 0, 1]
+
+
+def test_a_base_of_another_size_is_driven_live_and_seen_on_the_page(new_page: Any) -> None:
+    with child("serve", "--port", "0", "--robot", BASE, "--room", "furnished", "--link-loss", "hold") as server:
+        url = station(server)
+        page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open(live=False)
+        with connect_mobile(url.rstrip("/"), name="somebody", timeout=20.0) as robot:
+            assert robot.welcome.robot == "cart"
+            assert robot.welcome.limits.v_max == own_base.LIMITS.v_max
+            assert robot.wait(lambda it: it.postures is not None and it.postures.real is not None, 60.0)
+            robot.acquire()
+            assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
+            begun = robot.postures.real.x
+            for _ in range(20):
+                robot.drive(0.7, 0.0, wait=5.0)
+                time.sleep(0.1)
+            assert robot.wait(lambda it: it.postures.real.x > begun + 0.2, 30.0)
+            assert not page.get("station.config.panels.some((panel) => panel.name === 'camera')")
+        assert page.errors == []
+        page.page.context.close()
