@@ -45,7 +45,7 @@ class DriveCase:
     reality: MobileReality | None = None
     """Of the real robot; all of it unless given."""
     room: str | Room = ""
-    """Where it drives, a room or a name of `robots.ipr.robot.PLACES`; the operator's own unless given."""
+    """Where it drives, a room or one that comes with the package; the operator's own unless given."""
     position: str = "fused"
     """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
     of its room), `odometry`, or the `truth`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import csv
 import json
+import re
 import time
 from pathlib import Path
 from types import ModuleType
@@ -29,6 +30,32 @@ PLAN = """{"title": "Lifting"}
 {"issue": 1.0, "payload": {"mass_kg": 2.0}}
 {"issue": 2.0, "execute": 2.5, "move": {"pose": "low"}}
 """
+
+
+NAMES = re.compile(r"puma|\bipr\b|\bmicro\b|cubo", re.IGNORECASE)
+OF_ALL_BASES = re.compile(
+    r"\s*from robots\.ipr\.(camera|chassis|floor_plan|model|navigation|position|robot|shapes) import"
+)
+"""Modules of `robots.ipr` that are of any mobile robot, and bear its name only by where they lie."""
+STORED = '    body: Literal["ipr", "micro", "bare"]'
+"""What recordings of drives may be of: the schema stands in each file."""
+
+
+def test_no_shared_room_names_a_robot() -> None:
+    shared = [
+        path
+        for path in sorted((HERE.parents[1] / "interfaces").rglob("*"))
+        if path.suffix in {".py", ".js", ".html", ".css"}
+        and path.parts[len(HERE.parents[1].parts) + 1] not in {"val2", "lab"}
+    ]
+    assert len(shared) > 200
+    found = [
+        f"{path.relative_to(HERE.parents[1])}:{number}: {line.strip()}"
+        for path in shared
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if NAMES.search(line) and not OF_ALL_BASES.match(line) and line != STORED
+    ]
+    assert found == []
 
 
 def vrs(*arguments: object) -> str:
